@@ -1,7 +1,7 @@
-//! Lists the agents of this user on this computer, so that a command can find the agent that owns its port.
+//! List of the agents of this user on this computer. With this list, a command finds the agent that owns its port.
 //!
-//! Each agent has a locked file in a folder to which no other user can write. The file of a killed agent is unlocked, and another program
-//! may then listen at its address.
+//! Each agent has a locked file in a folder to which no other user can write. The file of a killed agent is unlocked. Another program may
+//! listen at the address of a killed agent.
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub struct Registered {
     pub certificate: Option<PathBuf>,
 }
 
-/// File of an agent, locked while the agent runs and removed at its end.
+/// File of an agent. The file is locked while the agent runs, and is removed when the agent ends.
 #[derive(Debug)]
 pub struct Registration {
     path: PathBuf,
@@ -31,12 +31,12 @@ pub struct Registration {
 
 impl Drop for Registration {
     fn drop(&mut self) {
-        // Readers ignore an unlocked file, even if it cannot be removed.
+        // If the file cannot be removed, readers ignore it, because it is unlocked.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Writes the file of an agent. Returns `None` if other users can write to every possible folder.
+/// Writes the file of an agent. Returns `None` if other users can write to all possible folders.
 ///
 /// # Errors
 ///
@@ -51,13 +51,14 @@ pub fn register(agent: &Registered) -> io::Result<Option<Registration>> {
     Ok(Some(Registration { path, _lock: file }))
 }
 
-/// Returns the agents that are running.
+/// Returns the agents of this user that are running.
 pub fn registered() -> Vec<Registered> {
     let files = runtime::folders().into_iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten();
     files.flatten().filter_map(|file| alive(&file.path())).collect()
 }
 
-/// Returns the agent of this file if the file is locked. The file of a killed agent is unlocked.
+/// Returns the agent of a file. Returns `None` if the file is unlocked, because the agent of an unlocked file no longer
+/// runs.
 fn alive(path: &Path) -> Option<Registered> {
     let mut file = File::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {

@@ -18,11 +18,11 @@ use tungstenite::http::header::AUTHORIZATION;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Connector, Message, WebSocket, client_tls_with_config};
 
-/// Longest time for connecting and receiving the first message.
+/// Maximum time for connecting and receiving the first message.
 const CONNECTING: Duration = Duration::from_secs(5);
-/// Longest time for which an agent may leave a message unread.
+/// Maximum time for which the agent may leave a message of this client unread.
 const STALL: Duration = Duration::from_secs(5);
-/// Characters that must be escaped in a value in a URL, which are all except the unreserved characters (RFC 3986, 2.3).
+/// Characters that must be escaped in a value in a URL. Only the unreserved characters (RFC 3986, 2.3) need no escape.
 const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// Identity and options of a client.
@@ -30,11 +30,12 @@ const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b
 pub struct Options {
     /// Name of the client that users see. If the name is empty, users see the address of the client.
     pub name: String,
-    /// Token of the client. With `None`, the client has only the access that needs no token.
+    /// Token of the client. If the value is `None`, the client has only the access that needs no token.
     pub token: Option<String>,
     /// Policy for the motion of the client after it disconnects: `continue` (the default), `pause` or `stop`.
     pub policy: Option<&'static str>,
-    /// File with trusted certificates (PEM) for agents at `https://`; with `None`, the certificates of the system are trusted.
+    /// File with trusted certificates (PEM) for agents at `https://`. If the value is `None`, the client trusts the
+    /// certificates of the system.
     pub certificates: Option<PathBuf>,
 }
 
@@ -58,15 +59,14 @@ enum Notice {
     },
     Halted {
         number: u64,
-        /// Numbers of Stops and Pauses of other clients. The numbers are missing if the agent is older and does not count these Stops and
-        /// Pauses.
+        /// Numbers of Stops and Pauses of other clients. An older agent does not send these numbers.
         of_others: Option<Halts>,
     },
     #[serde(other)]
     Other,
 }
 
-/// Connection to an agent, used as a port.
+/// Connection to an agent that is used like a serial port.
 pub struct AgentPort {
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     url: String,
@@ -75,7 +75,7 @@ pub struct AgentPort {
     /// Bytes that were received but not read yet.
     received: Vec<u8>,
     denied: Option<String>,
-    /// Number of the last Stop or Pause that this client knows, if any occurred.
+    /// Number of the last Stop or Pause that the agent has reported to this client, if there was one.
     halted: Option<u64>,
     /// Numbers of Stops and Pauses of other clients.
     halts: Halts,
@@ -86,8 +86,8 @@ impl AgentPort {
     ///
     /// # Errors
     ///
-    /// [`PortError::NoAgent`] if no agent answers at this address, [`PortError::NotLetIn`] if the agent refuses this
-    /// client.
+    /// Returns [`PortError::NoAgent`] if no agent answers at this address. Returns [`PortError::NotLetIn`] if the agent
+    /// refuses this client.
     pub fn open(url: &str, options: &Options) -> Result<Self, PortError> {
         let no_agent = |what: String| PortError::NoAgent { url: url.to_owned(), what };
         let (secure, rest) = match (url.strip_prefix("https://"), url.strip_prefix("http://")) {
@@ -187,7 +187,8 @@ impl AgentPort {
                 Ok(Notice::Denied { why }) => self.denied = Some(why),
                 Ok(Notice::Halted { number, of_others }) => {
                     self.halted = Some(number);
-                    // If the agent sends no numbers, the client adds one, which makes earlier requests invalid.
+                    // If an older agent sends no numbers of Stops and Pauses, the client increments its own count. Earlier requests then
+                    // become invalid.
                     let one_more = Halts { all: self.halts.all + 1, stops: self.halts.stops + 1 };
                     self.halts = of_others.unwrap_or(one_more);
                 }
@@ -246,12 +247,12 @@ impl Port for AgentPort {
                 return Ok(0);
             }
         }
-        // The function also reads messages that have arrived in the meantime, because a caller that requests new data must not receive old
-        // data.
+        // The function also reads all other messages that have arrived, because a caller that requests new data must
+        // not receive old data.
         while self.received.len() < buffer.len() {
             match self.receive(Duration::ZERO) {
                 Ok(true) => {}
-                // The end of the connection is reported after all earlier messages are read.
+                // The end of the connection is reported after the caller has read all earlier messages.
                 Ok(false) | Err(_) => break,
             }
         }
@@ -277,7 +278,8 @@ impl Port for AgentPort {
     }
 
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
-        // Otherwise no request is sent, and the agent continues to refuse motions.
+        // If a Stop or Pause has occurred since the motion was requested, the client sends no request, and the agent
+        // continues to refuse motions.
         if halts == self.halts.all { self.ask_to_move() } else { Ok(()) }
     }
 
@@ -300,7 +302,7 @@ impl Port for AgentPort {
 
 impl Drop for AgentPort {
     fn drop(&mut self) {
-        // The agent also detects the end of the connection.
+        // Errors during closing are ignored, because the agent also detects the end of the connection.
         let _ = self.socket.close(None);
         let _ = self.socket.flush();
     }

@@ -10,7 +10,8 @@ use rustls::{ClientConfig, RootCertStore};
 use tungstenite::Connector;
 use tungstenite::stream::MaybeTlsStream;
 
-/// Creates a connector that trusts the certificates in this file. Without a file, the connector trusts the certificates of the system.
+/// Creates a connector that trusts the certificates in `file`. If no file is specified, the connector trusts the certificates of the
+/// system.
 ///
 /// # Errors
 ///
@@ -24,7 +25,7 @@ pub(crate) fn connector(file: Option<&Path>) -> io::Result<Connector> {
         }
         None => rustls_native_certs::load_native_certs().certs,
     };
-    // Some of the many certificates of the system may be invalid.
+    // Invalid certificates are ignored, because some of the system's many certificates may be invalid.
     let (added, _) = roots.add_parsable_certificates(certificates);
     if added == 0 {
         let whose = file.map_or("the system".into(), |path| path.display().to_string());
@@ -44,7 +45,7 @@ pub(crate) fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut 
     match stream {
         MaybeTlsStream::Rustls(stream) => Ok(&mut stream.sock),
         MaybeTlsStream::Plain(stream) => Ok(stream),
-        // The crate creates only streams of the kinds above.
+        // This crate creates only plain and TLS streams.
         _ => Err(io::ErrorKind::Unsupported.into()),
     }
 }

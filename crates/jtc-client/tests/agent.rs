@@ -1,5 +1,5 @@
-//! Tests of sessions through an agent. A session has all functions of a serial port, and several clients can have sessions at the same
-//! time.
+//! Tests of sessions through an agent. A session through an agent has the same functions as a session on a serial port.
+//! Several clients can have sessions at the same time.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use jtc_wire::{ControllerState, TrajectoryState};
 use test_kit::patience::{LONGEST, Patience, until};
 use test_kit::written::text_with;
 
-/// Sends the default parameters to the controller and waits until it holds the arm.
+/// Sends the default parameters to the controller, and waits until the controller holds the arm.
 fn hold(session: &mut Session<AgentPort>) {
     session.use_defaults().expect("it takes them");
     session.wait_ready(LONGEST).expect("it holds the arm");
@@ -86,13 +86,14 @@ fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
     );
 }
 
-/// If a client does not know about a Stop, its requests from before the Stop cannot move the arm, even if they arrive late.
+/// A client that does not know about a Stop sends requests that are older than the Stop. Requests that are older than a Stop cannot move
+/// the arm.
 #[test]
 fn what_a_client_was_asked_for_before_a_stop_moves_nothing_until_somebody_asks_anew() {
     let served = Served::start(921_600);
     let mut anna = served.operator("anna");
     hold(&mut anna);
-    // The controller may refuse the jog, but the agent forwards it.
+    // The controller may refuse the jog, but the agent forwards the jog to the controller.
     let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
         Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),
         _ => Ok(()),
@@ -151,7 +152,7 @@ fn one_that_hangs_commands_no_more_and_has_to_come_again() {
     bob.gripper(false).expect("nobody commands");
     drop(bob);
     until("the end of his lease", || served.line.with(|line, _| line.lease().is_none()));
-    // Her information about the arm is outdated, so the agent has disconnected her.
+    // The agent has disconnected anna, because her information about the arm is outdated.
     let gone = anna.gripper(false).expect_err("she was put out");
     assert!(matches!(gone, LinkError::Port(PortError::AgentGone { .. })), "{gone}");
 }
@@ -170,8 +171,8 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
     assert_eq!(status.state, ControllerState::HoldPos);
 }
 
-/// A queued request from before a Stop is refused even if the client sends it later. The client counts the Stops and Pauses of other
-/// clients, and compares the count with that at the time of the request.
+/// The agent refuses a queued request that is older than a Stop. The client counts the Stops and Pauses of other
+/// clients. If the count has changed since the request, the client does not ask the agent to permit the motion.
 #[test]
 fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requested_after_them() {
     let served = Served::start(921_600);

@@ -1,4 +1,5 @@
-//! Tests of the HTTP interface for programs, with leases, trajectories, runs, and events that can be read again after a disconnect.
+//! Tests of the HTTP interface for programs: leases, trajectories, runs, and events that a client can read again after
+//! a disconnect.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -9,7 +10,7 @@ use jtc_host::{Arm, plan};
 use serde_json::{Value, json};
 use test_kit::patience::until;
 
-/// Returns the text of a trajectory file with a motion from the zero pose and back at this speed.
+/// Returns the text of a trajectory file with a motion from the zero pose and back, at `percent` % of the limits.
 fn there_and_back(percent: f64) -> String {
     let (arm, to) = (Arm::avena(), [0.3, -0.2, 0.2, 0.3, -0.2, 0.3]);
     let way = |from: &[f64; 6], to: &[f64; 6]| {
@@ -40,7 +41,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     assert_eq!(check["passed"], true, "{check}");
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7 }));
     let (number, _) = event(&served, 0, "executing");
-    // Another command at the same time is refused, and the error contains the active job.
+    // The agent refuses another command at the same time, and the error contains the active job.
     let (status, busy) = anna.ask("POST /api/gripper", Some(json!({ "on": true })));
     assert!(
         status == 409
@@ -64,7 +65,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
         errors.len() == 6
             && errors.iter().all(|joint| joint["max_error_mrad"].as_f64().is_some_and(|e| e < 20.0))
     );
-    // Events can be read by their numbers more than once.
+    // A client can read events by their numbers more than once.
     let (_, all) = served.api(&format!("GET /api/events?after=0&job={job}"), None, None);
     let kinds: Vec<&str> = all["events"]
         .as_array()
@@ -132,8 +133,8 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
     {
         let anna = Program::new(&served, "anna", 1.0, policy);
-        // The jog is refused after the Stop or Pause of the previous client. If the client repeats the request for the jog, it is still
-        // refused.
+        // The agent refuses a jog after the Stop or Pause of the previous client. The agent also refuses repeated
+        // requests for this jog until the hold-off ends.
         let halted =
             || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": ([0.0; 6]) }))).1["code"] == "denied";
         while halted() {
@@ -143,7 +144,7 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
         let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
         event(&served, last, "executing");
-        // The program sends no more requests. The following requests do not renew the lease of this program.
+        // The program sends no more requests. The next requests of the test do not renew the lease of this program.
         let ended = || served.api(&format!("GET /api/jobs/{job}"), None, None).1;
         let paused =
             || served.line.with(|line, _| line.status().map(|(_, s)| s.trajectory.name().to_owned()));
@@ -212,7 +213,7 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
         200
     );
     anna.recover();
-    // A check and a plan find the same error.
+    // A check and a plan each report the joint, its value and the limit.
     for (request, body, code) in [
         ("POST /api/runs", json!({ "trajectory": 2 }), "check"),
         ("POST /api/moves", json!({ "to_rad": [0.0, 9.0, 0.0, 0.0, 0.0, 0.0] }), "plan"),
@@ -251,7 +252,7 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
         let (status, denied) = anna.ask(request, Some(body));
         assert_eq!((status, denied["code"].as_str()), (409, Some("denied")), "{request}: {denied}");
     }
-    // The hold-off also applies after a reconnect. Repeated requests extend the hold-off only if they are jogs.
+    // The hold-off also applies after a reconnect. Of all repeated requests, only jog requests extend the hold-off.
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     let anna = Program::new(&served, "anna", 30.0, "continue");
     let asked = Instant::now();
@@ -325,7 +326,7 @@ fn a_program_that_is_begun_again_and_again_keeps_nobody_out() {
         if n == 0 {
             assert_eq!((status, grant["held"].as_bool()), (200, Some(false)), "{grant}");
         } else {
-            // The first client is still waiting.
+            // The first client is still waiting for the lease.
             assert_eq!((status, grant["code"].as_str()), (409, Some("denied")), "{grant}");
             assert!(
                 grant["message"]

@@ -1,4 +1,4 @@
-//! Tests of a complete arm by HTTP. The arm is read, uploaded and stored, or refused completely.
+//! Tests of a complete arm by HTTP. A client reads, uploads and stores the arm. An invalid arm is refused completely.
 use crate::common;
 
 use common::Served;
@@ -15,7 +15,7 @@ fn arm(served: &Served) -> (Arm, Value) {
     (Arm::parse(found["text"].as_str().expect("a text")).expect("an arm file"), found)
 }
 
-/// Returns the text of the default arm file with this replacement.
+/// Returns the text of the default arm file in which `from` is replaced by `to`.
 fn other(from: &str, to: &str) -> String {
     assert!(AVENA_TOML.contains(from), "{from}");
     AVENA_TOML.replacen(from, to, 1)
@@ -60,7 +60,8 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
     assert!(done["given"]["stored_number"].is_null());
     assert_eq!(event(&served, 0, "given").1["job"], job);
 
-    // After the recovery, the controller holds the arm. Under torque, differences are refused and not applied.
+    // After the recovery, the controller holds the arm. While the torque is on, the controller rejects an arm with
+    // other settings and applies none of its values.
     anna.recover();
     let job = anna.begin("PUT /api/arm", json!({ "text": AVENA_TOML }));
     let failed = anna.over(job);

@@ -58,7 +58,7 @@ impl Port for Counted {
     }
 }
 
-/// Returns the arm of the controller after the agent has read it.
+/// Returns the arm of the controller after the agent has read this arm.
 fn model(served: &Served) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -115,7 +115,7 @@ fn the_arm_is_shown_as_numbers_without_a_question_for_each_who_looks() {
     let asked = sent.load(Ordering::Relaxed) - before;
     assert!(asked < 1000, "{asked} bytes for a hundred who look within some seconds");
 
-    // The agent shows a new arm at once, before its next regular request to the controller.
+    // The agent shows a changed arm at once, before its next regular request to the controller.
     let anna = Program::new(&served, "anna", 60.0, "continue");
     let slow = json!({ "settings": [{ "name": "velocity_max_rad_s", "joint": 2, "value": 0.25 }] });
     assert_eq!(anna.ask("PUT /api/settings", Some(slow)).0, 204);
@@ -194,8 +194,8 @@ fn codes_are_explained_by_name_number_and_words() {
     );
 }
 
-/// If a run fails in the middle, its errors have explanation pages and the commanded values are shown. The report begins with the first
-/// failure.
+/// If a run fails in the middle, the agent has explanation pages for its errors and shows the commanded values. The
+/// report of the run begins with the first failure.
 #[test]
 fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_goes_well() {
     let arm = Arm::avena();
@@ -274,7 +274,8 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
         "{}",
         good.len()
     );
-    // The path ends before the arm has settled. Until the arm has settled, the controller commands the end point of the path.
+    // The path ends before the arm has settled. The controller commands the end point of the path until the arm has
+    // settled.
     until("nothing is commanded", || controller()["commanded_rad"].is_null());
 
     // A stopped motion also has a report, and earlier reports are kept.

@@ -1,4 +1,4 @@
-//! Tests of the flight recorder by HTTP, with its state, its log as a file, and the start of a new log.
+//! Tests of the flight recorder by HTTP: its state, its log as a file, and the start of a new log.
 use crate::common;
 
 use common::Served;
@@ -23,8 +23,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let job = anna.begin("POST /api/moves", json!({ "to_rad": [0.5, 0.0, 0.0, 0.0, 0.0, 0.0] }));
     assert_eq!(anna.over(job)["stage"], "finished");
     assert!(blocks(&served) > before, "it records");
-    // Two requests are sent at the same time. One request reads the log, and the other request is refused or reads the log afterwards. The
-    // agent serves other requests during this time.
+    // Two requests are sent at the same time. The first request reads the log. The agent refuses the second request, or the second request
+    // reads the log after the first request. The agent serves other requests while it reads the log.
     let (viewer, operator) = (&served.tokens.viewer, &served.tokens.operator);
     let files = std::thread::scope(|scope| {
         let both = [(); 2].map(|()| scope.spawn(|| served.bytes_as(Some(operator), "GET /api/log")));
@@ -41,8 +41,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let (_, head, file) = files.iter().find(|(status, ..)| *status == 200).expect("one of them");
     assert!(head.to_ascii_lowercase().contains("content-type: application/octet-stream"), "{head}");
 
-    // The file is equal to the output of `jtc log fetch`. The file is a recording that any tool can read, and contains a log that
-    // reproduces every tick.
+    // The file is equal to the output of `jtc log fetch`. The file is a recording that any MCAP tool can read. The file also contains a log
+    // with which each tick can be computed again.
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
     std::fs::write(&path, file).expect("a file");
@@ -53,7 +53,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let said: Vec<&str> = account.story.events.iter().map(|event| event.text.as_str()).collect();
     assert!(said.iter().any(|text| text.contains("HoldPos")), "{said:?}");
 
-    // The response contains the values of every tick in the last 0.5 s, as in the recording.
+    // The response contains the values of every tick in the last 0.5 s. The values in the response are equal to the values in the
+    // recording.
     let (status, values) = served.api_as(Some(operator), "GET /api/log/values?last_s=0.5", None, None);
     assert_eq!(status, 200, "{values}");
     let column = |of: &Value| -> Vec<f64> {
@@ -69,7 +70,7 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
         let columns = ["position_rad", "commanded_rad", "error_rad", "velocity_rad_s", "torque_nm"]
             .map(|key| column(&joint[key]));
         assert!(columns.iter().all(|column| column.len() == times.len()));
-        // The arm has been at rest during these ticks.
+        // The arm was at rest during all ticks of the response.
         let [position, commanded, error, velocity, torque] = columns.map(|column| column[column.len() - 1]);
         assert!(
             (position - then.position).abs() < 1e-3 && (commanded - then.set_position).abs() < 1e-6,

@@ -1,4 +1,5 @@
-//! Tests of clients that use up all connections. The tests are a separate program, because they open many connections.
+//! Tests of clients that use all connections of the agent. These tests are a separate program, because they open many
+//! connections.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

@@ -79,7 +79,8 @@ fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
     assert_eq!(served.get("POST /api/stop").0, 200);
     let done = anna.over(job["number"].as_u64().expect("a number"));
     assert_eq!((&done["stage"], &done["error"]["code"]), (&json!("stopped"), &json!("stopped")), "{done}");
-    // The first frames were sent before the Stop. The agent does not revert parameters that the controller has accepted.
+    // The first frames were sent before the Stop. After the Stop, the controller keeps the parameters that it has
+    // already accepted.
     let (message, given) = (done["error"]["message"].as_str().expect("words"), &done["given"]);
     assert!(message.contains("the controller already uses: one setting"), "{done}");
     assert_eq!(message.contains("its name"), given["named"] == true, "{done}");
@@ -96,7 +97,7 @@ fn a_plan_that_nobody_waits_for_any_more_takes_no_number() {
         served.api("POST /api/plans", None, Some(body))
     };
     assert_eq!(keep("mine", two).0, 200);
-    // Planning a path with many corners takes seconds.
+    // The planning of a path with many corners takes seconds.
     let mut many = String::from("q1,q2,q3,q4,q5,q6\n");
     for i in 0..400 {
         many += &format!(

@@ -8,14 +8,15 @@ use common::program::Program;
 use serde_json::{Value, json};
 use test_kit::patience::{Patience, until};
 
-/// Waits until the arm is held and can be jogged. The joints cannot be jogged until they carry their load.
+/// Waits until the controller holds the arm and accepts jogging. The controller accepts jogging only after the joints
+/// carry their load.
 fn ready(anna: &Program<'_>) {
     anna.recover();
     let still = json!({ "rates_rad_s": vec![0.0; 6] });
     until("an arm that can be jogged", || anna.ask("POST /api/jog", Some(still.clone())).0 == 204);
 }
 
-/// Returns the current time and position that a user would see.
+/// Returns the status time and the position that a user sees at present.
 fn seen(served: &Served) -> (u64, f64) {
     let (_, status) = served.api("GET /api/status", None, None);
     let position = status["controller"]["joints"][5]["position_rad"].as_f64().expect("it is measured");
@@ -46,7 +47,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
     let (now_ms, after) = seen(&served);
     assert!((after - before).abs() < 1e-3, "{before} {after}");
     assert!(now_ms >= old_ms + 1_200, "{old_ms} {now_ms}");
-    // A jog with the time of the present status moves the joint.
+    // A jog request with the time of the present status moves the joint.
     let mut patience = Patience::begin();
     loop {
         let (now_ms, position) = seen(&served);
@@ -57,7 +58,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
         assert_eq!(status, 204, "{error}");
         patience.pause(format_args!("a jog away from {before}: {position}"));
     }
-    // A request to end a jog is accepted with any delay, and even with a time that no agent has sent.
+    // The agent accepts a request to end a jog with any delay, and even with a time that no agent has sent.
     for as_of_ms in [old_ms, u64::MAX] {
         let (status, error) = jog(&anna, as_of_ms, 0.0);
         assert_eq!(status, 204, "{error}");

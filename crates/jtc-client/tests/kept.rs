@@ -1,4 +1,5 @@
-//! Tests that a run executes the trajectory that the user saw. A stored trajectory is replaced only if the request asks for it.
+//! Tests that a run executes the trajectory that the user saw. A request with `new` = `true` does not replace a stored
+//! trajectory.
 use crate::common;
 
 use common::Served;
@@ -39,7 +40,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     let (status, kept) = put(&served, "7", "small", 0.1);
     assert_eq!(status, 200, "{kept}");
     let seen = digest(&kept);
-    // All responses contain equal digests.
+    // All responses contain the same digest.
     assert_eq!(digest(&get(&served, "/api/trajectories")[0]), seen);
     assert_eq!(digest(&get(&served, "/api/trajectories/7/points?most=2")), seen);
     let check = get(&served, "/api/trajectories/7/check");
@@ -61,7 +62,8 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     let (status, job) = run(&digest(&other));
     assert_eq!(status, 202, "{job}");
     assert_eq!(anna.over(job["number"].as_u64().expect("a number"))["stage"], "finished");
-    // Equal points have equal digests under any name. A run without a digest executes the stored trajectory.
+    // Trajectories with equal points have equal digests, even if their names differ. A run request without a digest
+    // executes the stored trajectory.
     assert_eq!(digest(&put(&served, "7", "small again", 0.1).1), seen);
     let (status, job) =
         anna.ask("POST /api/runs", Some(json!({ "trajectory": 7, "approach": true, "digest": seen })));
@@ -71,7 +73,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     assert_eq!(anna.over(job)["stage"], "finished");
 }
 
-/// J-55: an invalid trajectory moves no joint, even if its first point could be approached.
+/// J-55: a run on an invalid trajectory moves no joint, even if an approach to the first point is possible.
 #[test]
 fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
     let served = Served::start(921_600);
@@ -84,7 +86,7 @@ fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
         get(&served, "/api/status")["controller"]["joints"][1]["position_rad"].as_f64().expect("a position")
     };
     let before = place();
-    // The trajectory reaches 2 rad/s in the middle. A trajectory with this velocity can be stored.
+    // The trajectory reaches 2 rad/s in the middle. The agent can store a trajectory with this velocity.
     assert_eq!(put(&served, "7", "too fast", 2.6).0, 200);
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
     let ended = anna.over(job);
@@ -116,7 +118,8 @@ fn what_is_new_replaces_nothing() {
     assert_eq!((status, error["code"].as_str()), (409, Some("taken")), "{error}");
     assert_eq!(digest(&get(&served, "/api/trajectories")[0]), digest(&kept));
     assert_eq!(put(&served, "7?new=perhaps", "yours", 0.2).0, 400);
-    // A plan can be stored under a free number. A used number is replaced only if the request asks for it.
+    // With `new` = `true`, a plan can be stored only under a free number. With `new` = `false`, a request replaces the
+    // trajectory under a used number.
     let (status, planned) = plan(8, true);
     assert_eq!(status, 200, "{planned}");
     assert_eq!(digest(&planned["kept"]), digest(&get(&served, "/api/trajectories/8/points")));

@@ -1,4 +1,5 @@
-//! Tests with many viewers and one lease holder. Clients do not disturb each other, and a client that does not read is disconnected.
+//! Tests with many viewers and one lease holder. The clients do not disturb each other, and the agent disconnects a
+//! client that does not read its messages.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 
@@ -48,7 +49,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
             })
         })
         .collect();
-    // The clients request all data but do not read the data.
+    // Some clients request all data, but do not read the data.
     let deaf: Vec<_> = ["stream", "line", "foxglove"]
         .iter()
         .flat_map(|path| (0..4).map(move |_| *path))

@@ -1,5 +1,5 @@
-//! Tests of the recovery of a controller by HTTP, with clearing and resetting nodes, stored or uploaded arms, and the results of the
-//! doctor.
+//! Tests of the recovery of a controller by HTTP: clearing errors, resetting nodes, stored and uploaded arms, and the
+//! results of the doctor.
 use crate::common;
 
 use std::time::Duration;
@@ -72,7 +72,7 @@ fn nodes_start_anew_and_an_arm_with_torque_falls_only_where_it_may() {
     assert_eq!(anna.ask("POST /api/reset", Some(json!({ "gripper": true, "arm_may_fall": true }))).0, 204);
 }
 
-/// A drive fails while the arm is held. The drive can be cleared alone or together with all other drives.
+/// A drive fails while the arm is held. A request can clear this drive alone or together with all other drives.
 #[test]
 fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let arm = Arm::avena();
@@ -116,7 +116,8 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 35 }))).0, 204);
     assert_eq!(look(&served, "GET /api/speed"), (200, json!({ "percent": 35 })));
 
-    // An uploaded arm must be complete, and its parameters that cannot be sent in a frame must also be acceptable.
+    // An uploaded arm must be complete. A recovery does not send the limits of the arm. If the arm and the controller have different
+    // limits, the request must accept the difference.
     is_for_the_one_who_commands(&served, "POST /api/recover", &json!({ "arm": AVENA_TOML }));
     let heavy = AVENA_TOML.replacen("mass_kg = 4", "mass_kg = 5", 1);
     let other = heavy.replacen("position_max_rad = 2.97", "position_max_rad = 2.5", 1);
@@ -150,7 +151,7 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     }
     assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "HoldPos");
 
-    // The arm of the controller is selected again while the torque is off. After that, the controller holds the arm.
+    // The arm of the controller is selected again while the torque is off. The controller then holds the arm.
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
     until(&served, |controller| controller["state"] == "Init");
     assert_eq!(served.api("POST /api/arm/defaults", None, None).0, 403);

@@ -1,4 +1,5 @@
-//! Tests of moves by HTTP to joint positions, to a named pose, and to a flange pose, also on a straight line.
+//! Tests of moves by HTTP to joint positions, to a named pose, and to a flange pose. Some moves are straight lines of
+//! the flange.
 use crate::common;
 
 use common::Served;
@@ -36,12 +37,13 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     let done = moved(json!({ "to_pose": "bent" }));
     assert_eq!(done["what"], "move to bent");
     is_at(&served, bent);
-    // The test computes the flange pose of these joint positions without the agent.
+    // The test itself computes the flange pose of these joint positions.
     let arm = jtc_host::Arm::avena();
     let flange = jtc_host::plan::kinematics::Kinematics::new(&arm.model, &[(-3.0, 3.0); 6]).flange(&bent);
     let rpy = jtc_host::plan::kinematics::rpy_of(&flange);
     let [x, y, z] = flange.position;
-    // The arm moves down on a line, and back in joint space. The closure returns the largest distance of the flange from the line.
+    // The flange moves down on a straight line, and the arm moves back in joint space. The closure returns the largest distance of the
+    // flange from the line.
     let beside = |body: Value| {
         let job = anna.begin("POST /api/moves", body);
         let mut most = 0.0f64;
@@ -84,7 +86,7 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     }
     let (_, error) = anna.ask("POST /api/moves", Some(json!({ "to_pose": "bend" })));
     assert!(error["message"].as_str().is_some_and(|m| m.contains("bent")), "{error}");
-    // The target is out of reach. The job reports this error, and no joint moves.
+    // The target is out of reach. The job reports that the target is out of reach, and no joint moves.
     let far = json!({ "to_flange": { "xyz_m": [5.0, 0.0, 0.3], "rpy_rad": [0.0, 0.0, 0.0] } });
     let failed = anna.over(anna.begin("POST /api/moves", far));
     assert_eq!(failed["stage"], "failed", "{failed}");

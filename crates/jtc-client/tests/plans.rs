@@ -1,4 +1,5 @@
-//! Tests of trajectories through waypoints that the agent plans. The trajectories are stored and executed, or refused with an error.
+//! Tests of trajectories through waypoints that the agent plans. The agent stores and executes these trajectories, or
+//! refuses them with an error.
 use crate::common;
 
 use std::time::Duration;
@@ -37,7 +38,8 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     );
     assert!(planned["joints"][1]["torque_peak_nm"].as_f64().is_some_and(|torque| torque > 1.0), "{planned}");
 
-    // The default torque margin is kept. With a margin of 0, the remaining torque is smaller, and the response contains a warning.
+    // The plan keeps the default torque margin. If the request specifies a margin of 0, the remaining torque is
+    // smaller, and the response contains a warning.
     let left = |planned: &Value| planned["margin"]["percent"].as_f64().expect("a margin");
     assert!(left(&planned) >= 15.0 && planned["warnings"] == json!([]), "{}", planned["margin"]);
     let tight = plan(json!({ "waypoints": SWING, "margin_percent": 0 })).1;
@@ -67,7 +69,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     let anna = Program::new(&served, "anna", 30.0, "continue");
     anna.recover();
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 4 }));
-    // Another motion can be planned while a motion is executed.
+    // The agent can plan a motion while another motion is executed.
     assert_eq!(plan(json!({ "waypoints": THREE })).0, 200);
     assert_eq!(anna.over(job)["stage"], "finished");
 

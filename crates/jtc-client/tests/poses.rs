@@ -1,4 +1,4 @@
-//! Tests of named poses by HTTP, which are poses of the arm file and saved poses.
+//! Tests of named poses by HTTP. Named poses are poses of the arm file and saved poses.
 use crate::common;
 
 use common::Served;
@@ -11,7 +11,7 @@ use test_kit::written::text_with;
 
 const ZERO: [f64; 6] = [0.0; 6];
 
-/// Starts an agent with an arm file that contains one pose. A directory contains the trajectories and the saved poses.
+/// Starts an agent with an arm file that contains one pose. `directory` contains the trajectories and the saved poses.
 fn served(directory: &std::path::Path) -> Served {
     let poses = Poses::from([("home".to_owned(), [0.0, 0.1, 0.0, 0.0, 0.0, 0.0])]);
     let arm = Arm { poses, ..Arm::avena() };

@@ -1,4 +1,4 @@
-//! Test program with the tests of the crate, so that only one program is linked. Each file in this directory is a module of the program.
+//! Program with all tests of the crate. Therefore only one program is linked. Each file in this directory is a module of the program.
 mod agent;
 mod api;
 mod arm;

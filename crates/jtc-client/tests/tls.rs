@@ -42,7 +42,8 @@ fn a_session_works_over_tls_where_the_certificate_is_trusted() {
     }
     session.gripper(true).expect("it commands");
 
-    // The cases are trust in the certificate of another agent, trust in no certificate, and a connection without TLS.
+    // The client trusts only the certificate of another agent, trusts only the certificates of the system, or connects without TLS. Each of
+    // these connections fails.
     let (other, _) = certificate(&dir, "other", 0o600);
     for certificates in [Some(other), None] {
         let refused = AgentPort::open(&url, &options(certificates)).err().expect("it is not trusted");

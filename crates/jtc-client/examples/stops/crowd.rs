@@ -1,4 +1,4 @@
-//! Separate process with many viewers and some clients that never read.
+//! Separate process with many viewers and with some clients that never read their messages.
 use std::io::Read as _;
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
@@ -10,18 +10,19 @@ use tungstenite::Message;
 
 use crate::common::socket;
 
-/// Number of viewers, each of which receives 25 statuses per second, and URL paths of the clients that never read.
+/// Number of viewers, and URL paths of the clients that never read their messages. Each viewer receives 25 statuses per
+/// second.
 pub(crate) const VIEWERS: usize = 50;
 const DEAF: [&str; 12] = [
     "stream", "line", "foxglove", "stream", "line", "foxglove", "stream", "line", "foxglove", "stream",
     "line", "foxglove",
 ];
 
-/// A group of clients that runs until `dismiss` is called.
+/// Group of clients that run until `dismiss` is called.
 pub(crate) struct Crowd(Child);
 
 impl Crowd {
-    /// Starts the clients. All clients are connected when this function returns.
+    /// Starts the clients. When this function returns, all clients are connected.
     pub(crate) fn gather(address: SocketAddr) -> Self {
         let program = std::env::current_exe().expect("this program");
         let mut child = Command::new(program)
@@ -41,7 +42,7 @@ impl Crowd {
     }
 }
 
-/// Runs the clients in the separate process until its stdin ends.
+/// Runs the clients in the separate process until the stdin of this process ends.
 pub(crate) fn look(address: &str) {
     let address: SocketAddr = address.parse().expect("an address");
     let ended = Arc::new(AtomicBool::new(false));

@@ -1,5 +1,5 @@
-//! Serial line of the measurement, which consists of a pseudo-terminal to the controller and a model of a UART that transmits the bytes of
-//! the agent.
+//! Serial line of the measurement. The line consists of a pseudo-terminal to the controller, and of a model of a UART
+//! that transmits the bytes of the agent.
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -31,7 +31,7 @@ pub(crate) struct Stop {
 pub(crate) struct Seen {
     /// Time at which the line has transmitted all bytes.
     free_at: Instant,
-    /// Number of bytes of the current frame that were not sent yet.
+    /// Number of bytes of the current frame that are not sent yet.
     left: usize,
     /// Largest number of bytes that waited for transmission at the same time.
     pub queued_most: usize,
@@ -41,7 +41,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// Returns `true` while a frame is incomplete.
+    /// Returns `true` while a frame on the line is incomplete.
     pub(crate) fn is_in_a_frame(&self) -> bool {
         self.left > 0
     }
@@ -106,8 +106,8 @@ pub(crate) fn begin() -> (Watched, Watch) {
     (Watched { port, seen: seen.clone() }, Watch(seen))
 }
 
-/// Runs the controller side of the line until this program ends. `_slave` stays open, because the pseudo-terminal would report a hang-up
-/// without a host.
+/// Runs the controller side of the line until this program ends. `_slave` stays open, because a pseudo-terminal without
+/// a host would report a hang-up.
 fn control(master: &OwnedFd, _slave: &OwnedFd) {
     let flags = rustix::fs::fcntl_getfl(master).expect("flags");
     rustix::fs::fcntl_setfl(master, flags | OFlags::NONBLOCK).expect("flags");

@@ -1,4 +1,5 @@
-//! Measures Stops under each load and, at the same time, simple round trips to a server built with the same library.
+//! Measurement of Stops under each load. At the same time, the example measures simple round trips to a server that
+//! uses the HTTP library of the agent.
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
@@ -10,13 +11,13 @@ use crate::crowd::Crowd;
 use crate::line::{self, Watch};
 use crate::operator::Operator;
 
-/// Time between two Stops, which is long enough for the response record of the first Stop. A random time up to `AT_ANY_TIME_US` is added,
-/// so that Stops occur at random times between two statuses.
+/// Time between two Stops. Within this time, the record of the first Stop arrives. A random time up to `AT_ANY_TIME_US` is added. Therefore
+/// Stops occur at random times between two statuses.
 const BETWEEN: Duration = Duration::from_millis(220);
 const AT_ANY_TIME_US: u64 = 120_000;
-/// Longest wait for an event. If the event has not occurred by then, the measurement has failed.
+/// Longest wait for an event. If the event does not occur within this time, the measurement has failed.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Number of bytes of an upload that are sent on the line before the Stop.
+/// Number of bytes of an upload that the agent has written to the line before the Stop.
 const UPLOADED: usize = 300;
 
 /// Measurements under one load, ms.
@@ -25,7 +26,7 @@ struct Samples {
     /// Time from the start of the request (before it connects) to the first and to the last byte of the Stop on the line.
     first: Vec<f64>,
     last: Vec<f64>,
-    /// Time from a request to its response, for a server that answers every request at once.
+    /// Time from a request to the response of a server that answers every request at once.
     bare: Vec<f64>,
     /// Silence after an interrupted frame.
     gaps: Vec<f64>,

@@ -11,9 +11,9 @@ use jtc_wire::{FRAME_MAX, RawPoint, fixed, trajectory};
 use crate::common::Served;
 use crate::line::Watch;
 
-/// Points per segment. The transmission of a segment takes five seconds.
+/// Points per segment. The transmission of a segment with this number of points takes five seconds.
 const POINTS: usize = 1600;
-/// Time after which a segment that is not on the line has been removed by a Stop and will not be sent.
+/// If a segment is not on the line after this time, a Stop has removed the segment from the queue.
 const AGAIN: Duration = Duration::from_millis(30);
 
 /// A client that holds the lease until it is dropped.

@@ -1,4 +1,4 @@
-//! Agent for a simulated controller in this process, and functions for requests of any client.
+//! Agent for a simulated controller in this process, and functions with which a test sends requests of a client.
 
 pub(crate) mod program;
 
@@ -24,14 +24,15 @@ use tungstenite::http::HeaderValue;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};
 
-/// Creates a simulated arm on a serial line with this bit rate.
+/// Creates a simulated arm on a serial line with the bit rate `baud`.
 pub(crate) fn simulated(baud: u32) -> LivePort {
     let arm = Arm::avena();
     let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
     LivePort::new(World::new(config))
 }
 
-/// Opens a WebSocket of a viewer, which is `stream`, `line`, or `foxglove` with all its channels.
+/// Opens a WebSocket of a viewer at `stream`, `line` or `foxglove`. At `foxglove`, the function subscribes to all
+/// channels.
 #[allow(dead_code, reason = "the test of a load and the example of stops take it, the suite does not")]
 pub(crate) fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
@@ -68,12 +69,12 @@ impl std::ops::Deref for Served {
 }
 
 impl Served {
-    /// Starts an agent for a simulated arm on a serial line with this bit rate.
+    /// Starts an agent for a simulated arm on a serial line with the bit rate `baud`.
     pub(crate) fn start(baud: u32) -> Self {
         Self::start_with(baud, None, &[])
     }
 
-    /// Like [`Self::start`], with TLS if configured, and with read access for web pages from these origins.
+    /// Like [`Self::start`], with TLS if `tls` is `Some`, and with read access for web pages from `origins`.
     pub(crate) fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
         Self::start_on(simulated(baud), tls, origins)
     }

@@ -36,7 +36,7 @@ impl<'a> Program<'a> {
         assert_eq!(done["stage"], "finished", "{done}");
     }
 
-    /// Waits for the end of the job and returns the job. Renews the lease during this time.
+    /// Waits for the end of the job and returns the job. The function renews the lease while it waits.
     pub(crate) fn over(&self, job: u64) -> Value {
         over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
     }
@@ -56,7 +56,7 @@ pub(crate) fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Va
     }
 }
 
-/// Waits for an event of this kind after a number, and returns the event with its number.
+/// Waits for an event of `kind` after the event number `after`. Returns the event and its number.
 pub(crate) fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     let (mut patience, mut last) = (Patience::begin(), after);
     loop {

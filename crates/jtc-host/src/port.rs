@@ -36,13 +36,13 @@ pub struct Halts {
 
 /// Byte stream to a controller, polled by one thread.
 ///
-/// The port also provides the clock. In the simulator time is virtual and advances while `read` waits, so that simulations are
+/// The port also provides the clock. In the simulator, time is virtual and advances while `read` waits. Therefore simulations are
 /// deterministic.
 pub trait Port {
     /// Waits until at least one byte is available or `timeout` has passed. Returns the number of bytes read, which is 0
     /// after a timeout.
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError>;
-    /// Writes all bytes to the serial line. The call may block while the transmit buffer is full.
+    /// Writes all bytes to the serial line. The function may block while the transmit buffer is full.
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError>;
     /// Returns the time since a fixed reference time.
     fn now(&self) -> Duration;
@@ -57,17 +57,19 @@ pub trait Port {
     fn take_denial(&mut self) -> Option<String> {
         None
     }
-    /// Marks the start of a motion request. Frames that are written from now on belong to this request. A shared line rejects requests that
-    /// are older than another client's Stop. On other lines this call has no effect.
+    /// Marks the start of a motion request. Frames that are written after this call belong to the request. A shared line rejects requests
+    /// that are older than another client's Stop. On a line that is not shared, this call has no effect.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
-    /// Returns the number of times that other programs have stopped or paused the arm, as far as known to this port.
+    /// Returns the number of times that other programs have stopped or paused the arm. The number includes only the Stops and Pauses that
+    /// this port has detected.
     fn halts(&self) -> Halts {
         Halts::default()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), for a motion that was requested when [`halts`](Self::halts) returned `halts`. If another
-    /// program stopped the arm while the request waited, for example in a queue, the motion is rejected.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a motion request that has waited, for example in a queue. `halts` is the value of
+    /// [`halts`](Self::halts) at the time of the request. If another program has stopped or paused the arm since then, the line rejects the
+    /// motion.
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         let _ = halts;
         self.ask_to_move()
@@ -111,7 +113,7 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
 }
 
-/// Returns the time that `bytes` take on a line with 8N1 at `baud`; returns zero for a line without a bit rate.
+/// Returns the transmission time of `bytes` on a line with 8N1 at `baud`. Returns zero for a line without a bit rate.
 pub fn line_time(bytes: usize, baud: Option<u32>) -> Duration {
     match baud {
         Some(baud) if baud > 0 => Duration::from_secs_f64(bytes as f64 * 10.0 / f64::from(baud)),

@@ -1,14 +1,15 @@
 //! Recordings of the execution of a motion. Recordings are written as MCAP or CSV, depending on the extension of the file name, and are
 //! read again for reports.
 //!
-//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that Foxglove,
-//! PlotJuggler and Rerun can plot the data directly. The topic `/jtc/control` contains the parts of the torque, and `/jtc/state` contains
-//! the states. If the arm is known, the topic `/robot_description` contains its robot description (URDF), and `/tf` contains the pose of
-//! each link. The metadata contain the limits, gains and hash of the arm, and the controller's firmware. A CSV file has one row per sample,
-//! and a header with the units. If a run did not finish, lines that begin with `#` at the end of the file report how the run ended.
+//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), which Foxglove,
+//! PlotJuggler and Rerun can plot directly. The topic `/jtc/control` contains the parts of the torque, and `/jtc/state` contains the
+//! states. If the arm is known, the topic `/robot_description` contains its robot description (URDF), and `/tf` contains the pose of each
+//! link. The metadata contain the limits, gains and hash of the arm, and the identity of the controller's firmware. A CSV file has one row
+//! per sample, and a header with the units. If a run did not finish, lines that begin with `#` at the end of the file report how the run
+//! ended.
 //!
-//! A truncated file (after the program was killed, or if the disk was full) is read up to the damage. [`Recording::cut`] describes the
-//! missing part in this case.
+//! A truncated file (after the program was killed, or if the disk was full) is read up to the damage. For a truncated file,
+//! [`Recording::cut`] describes the missing part.
 
 #[cfg(feature = "mcap")]
 mod cdr;
@@ -135,7 +136,7 @@ impl Recorder {
         self.finish()
     }
 
-    /// Passes all samples so far to the operating system, so that they are not lost if this program ends.
+    /// Passes all samples written so far to the operating system. Passed samples are not lost if this program ends.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|e| e.at(&self.path))
     }
@@ -146,7 +147,7 @@ impl Recorder {
         self.finish()
     }
 
-    /// Completes the file and returns the number of samples. In MCAP, this adds the index and the summary.
+    /// Completes the file and returns the number of samples. For MCAP, the function also writes the index and the summary.
     ///
     /// # Errors
     ///
@@ -230,7 +231,7 @@ pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
     }
 }
 
-/// Recording that was read from a file.
+/// A recording that was read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// Arm, limits and source of the samples; `None` for a CSV file, which does not contain these data.
@@ -269,11 +270,12 @@ pub struct Scanned {
     pub cut: Option<String>,
 }
 
-/// Maximum number of samples that wait for messages that follow later in the file. This number corresponds to several chunks of the writer.
+/// Maximum number of incomplete samples in memory; the missing messages of these samples follow later in the file. 4096 samples fill
+/// several chunks of an MCAP file.
 const ROOM: usize = 4096;
 
-/// Calls `see` with each sample of a file that [`Recorder`] wrote, oldest first. Only a part of the file is in memory, independent of the
-/// file size.
+/// Calls `see` with each sample of a file that [`Recorder`] wrote, oldest first. The function keeps only a part of the file in memory, also
+/// for large files.
 ///
 /// # Errors
 ///
@@ -283,7 +285,7 @@ pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingE
     scan_with(path, ROOM, see)
 }
 
-/// Content of a file without the samples, and the reason if the file is incomplete.
+/// Content of a file without the samples. For an incomplete file, the content includes the reason.
 struct Found {
     info: Option<RecordingInfo>,
     ending: Ending,

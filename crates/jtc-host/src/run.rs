@@ -1,7 +1,7 @@
 //! Procedure of a run, in which each motion of an [`Order`] is checked, uploaded, executed and monitored until its end.
 //!
-//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`] to show the steps, to
-//! decide on changes of the motion, and to store the samples.
+//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`]. The observer shows the
+//! steps, decides on changes of the motion, and stores the samples.
 mod course;
 mod start;
 
@@ -33,7 +33,8 @@ pub struct Order<'a> {
     pub later: &'a Trajectory,
     /// Number of runs. 0 is treated as 1.
     pub runs: u32,
-    /// Speed of an approach, % of the limits. If `None`, approaches are not allowed, and the arm must be at the first point of each run.
+    /// Speed of an approach, % of the limits. If the value is `None`, the run makes no approaches, and the arm must be at the first point
+    /// of each run.
     pub approach_pct: Option<f64>,
 }
 
@@ -99,14 +100,14 @@ pub trait Observer<P: Port> {
     /// Error type of the front end.
     type Failure;
 
-    /// Converts a [`StartError`], the reason why a motion does not begin, into an error of the front end.
+    /// Converts a [`StartError`] into an error of the front end. A `StartError` is the reason why a motion does not begin.
     fn refused(&mut self, error: StartError) -> Self::Failure;
 
     /// Converts an error that occurred before a motion began into an error of the front end. The error is [`Error::Cancelled`] if
     /// [`Observer::is_cancelled`] has ended the run.
     fn failed(&mut self, error: Error) -> Self::Failure;
 
-    /// Returns `true` if the run must end before its next motion. During a motion, [`Observer::status`] makes this decision.
+    /// Returns `true` if the run must end before its next motion. During a motion, [`Observer::status`] decides if the run ends.
     fn is_cancelled(&mut self) -> bool;
 
     /// Reports that the next motion has passed the check.
@@ -122,7 +123,7 @@ pub trait Observer<P: Port> {
     ///
     /// # Errors
     ///
-    /// If this method returns an error, the run ends with the failure and the motion does not begin.
+    /// If this method returns an error, the motion does not begin, and the run ends with this error.
     fn begins(
         &mut self,
         session: &mut Session<P>,
@@ -133,23 +134,23 @@ pub trait Observer<P: Port> {
     /// Evaluates a status during the motion. Returns the action that the run must carry out next.
     fn status(&mut self, phase: Phase, status: &Status) -> Flow;
 
-    /// Reports the result of the action that [`Observer::status`] returned. If the controller rejects a change of speed or a Resume, the
+    /// Receives the result of the action that [`Observer::status`] returned. If the controller rejects a change of speed or a Resume, the
     /// motion continues.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
-    /// Reports the end of the motion. The run does not carry out the action that [`Observer::status`] returned for the last status.
+    /// Reports the end of the motion. The run ignores the action that [`Observer::status`] returned for the last status.
     ///
     /// # Errors
     ///
-    /// If this method returns an error, the run ends with the failure.
+    /// If this method returns an error, the run ends with this error.
     fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
 
     /// Reports that run `n` (from 1) has finished and that another run follows.
     fn goes_on(&mut self, _n: u32) {}
 }
 
-/// Executes all motions of `order`, and ends early if a motion does not finish. `status` must show the arm while the drives hold it at
-/// rest. **The arm moves.**
+/// Executes all motions of `order`. If a motion does not finish, the run ends early. `status` must be a status from an arm that the drives
+/// hold at rest. **The arm moves.**
 ///
 /// # Errors
 ///

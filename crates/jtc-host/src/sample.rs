@@ -7,7 +7,7 @@ use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
 use crate::labels;
 use crate::trajectory::Trajectory;
 
-/// Values of a joint in a [`Sample`]; NaN for a value that the source does not know.
+/// Values of a joint in a [`Sample`]. A value that the source does not supply is NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSample {
     /// Commanded position, rad.
@@ -24,15 +24,15 @@ pub struct JointSample {
     pub velocity: f64,
     /// Model torque, N·m.
     pub torque_model: f64,
-    /// Proportional part, N·m.
+    /// Proportional part of the torque, N·m.
     pub torque_p: f64,
-    /// Integral part, N·m.
+    /// Integral part of the torque, N·m.
     pub torque_i: f64,
-    /// Derivative part, N·m.
+    /// Derivative part of the torque, N·m.
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// Torque commanded on the bus, N·m. Over a real link, this value is the torque that the drive reports.
+    /// Torque commanded on the bus, N·m. In a sample from a status, the value is the torque that the drive reports.
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: f64,
@@ -43,7 +43,7 @@ pub struct JointSample {
 }
 
 impl JointSample {
-    /// Values of a joint of which no value is known.
+    /// Joint sample in which all values are unknown.
     pub const UNKNOWN: Self = Self {
         set_position: f64::NAN,
         set_velocity: f64::NAN,
@@ -62,15 +62,15 @@ impl JointSample {
         internal: 0,
     };
 
-    /// Returns the sample without the values that a silent joint cannot have sent. As a result, a plot shows a gap
-    /// instead of a joint at 0 rad.
+    /// Returns the sample with NaN instead of the values that a silent joint cannot have sent. A plot of NaN shows a gap instead of a joint
+    /// at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
         Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
     }
 
-    /// Returns the position error, rad. If no error was recorded, this is the commanded minus the measured position of this
-    /// sample. NaN if a value is unknown.
+    /// Returns the position error, rad. If no error was recorded, returns the commanded position of this sample minus its measured
+    /// position. Returns NaN if one of these positions is unknown.
     pub fn position_error(&self) -> f64 {
         if self.error.is_finite() { self.error } else { self.set_position - self.position }
     }
@@ -117,7 +117,7 @@ pub struct Sample {
     pub point: u32,
     /// Current error word of the controller.
     pub errors: u16,
-    /// Current CAN flags; 0 if the source does not know them.
+    /// Current CAN flags; 0 if the source does not supply the flags.
     pub can_current: u32,
     /// Joints, base to wrist.
     pub joints: [JointSample; JOINTS],
@@ -135,7 +135,7 @@ impl From<&Telemetry> for Sample {
             can_current: 0,
             joints: std::array::from_fn(|j| {
                 let own = &t.joints[j];
-                // Without torque, the values of a joint that is not measured are exactly zero.
+                // In a state without torque, the values of a joint that is not measured are exactly zero.
                 let torque_off = matches!(
                     t.state,
                     ControllerState::Start | ControllerState::Init | ControllerState::Error
@@ -155,7 +155,7 @@ pub fn is_measured(status: &Status, j: usize) -> bool {
 }
 
 impl Sample {
-    /// Returns the values of a status received at `time_s`. Commanded values and the torque split are unknown.
+    /// Returns the values of a status received at `time_s`. In this sample, the commanded values and the parts of the torque are unknown.
     pub fn from_status(time_s: f64, status: &Status) -> Self {
         Self {
             time_s,
@@ -186,9 +186,8 @@ impl Sample {
         self.state == ControllerState::Operate && self.trajectory == TrajectoryState::Execute
     }
 
-    /// Returns the values of a status while `trajectory` is executed. The commanded values are computed for the reported
-    /// point, as the controller does. For the position error, the measurements are assumed to be `delay_ticks` old
-    /// (J-62).
+    /// Returns the values of a status while `trajectory` is executed. The commanded values are computed for the reported point, as the
+    /// controller does. The position error is computed for measurements that are `delay_ticks` old (J-62).
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory, delay_ticks: u8) -> Self {
         let mut sample = Self::from_status(time_s, status);
         if status.state == ControllerState::Operate
@@ -222,13 +221,13 @@ mod tests {
         let sample = Sample::from_status(0.0, &status);
         assert!(sample.joints[2].position.is_nan() && sample.joints[2].torque.is_nan());
         assert_eq!((sample.joints[0].position, sample.joints[1].position), (0.0, 0.5));
-        // The joint answers again, and its error is still latched.
+        // In this status, the joint answers again, but its error is still latched.
         status.joints[2].position = 0.3;
         assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
     }
 
-    /// A measurement is compared with the position that was commanded for its time. If that commanded position is
-    /// unknown, the current commanded position is used.
+    /// The position error compares a measurement with the position that was commanded for the time of the measurement. If this commanded
+    /// position is unknown, the current commanded position is used.
     #[test]
     fn j62_the_error_of_a_sample_is_that_of_the_time_of_the_measurement() {
         let now = JointTelemetry {

@@ -1,9 +1,9 @@
-//! Session with the controller. The session is the only writer, receives the stream of statuses, and receives a
-//! confirmation of each request.
+//! Session with the controller. Only the session writes to the port. The session receives the stream of statuses and a confirmation of each
+//! request.
 //!
-//! The controller sends each record only once (J-04). For each received frame, exactly one status contains the record of
-//! the frame, in the order of the frames. The session queues the records and passes each one to the request that waits
-//! for it.
+//! The controller sends each record only once (J-04). For each frame that the controller receives, exactly one status contains the record
+//! of this frame. The records are in the order of the frames. The session queues the records, and passes each record to the request that
+//! waits for this record.
 
 mod bench;
 mod capture_pose;
@@ -62,14 +62,14 @@ use crate::port::{Port, line_time};
 /// Callback that receives the port's time and each status.
 type Observer = Box<dyn FnMut(Duration, &Status)>;
 
-/// Timeouts of a session, and number of transmissions of a frame.
+/// Timeouts of a session, and maximum number of transmissions of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeouts {
     /// Time without a status after which the link is considered lost.
     pub status: Duration,
-    /// Time for a confirmation, in addition to the transmission time.
+    /// Maximum time until a confirmation, in addition to the transmission time.
     pub confirmation: Duration,
-    /// Number of times that a frame is sent before it is considered not confirmed.
+    /// Maximum number of times that a frame is sent before the session reports that the frame is not confirmed.
     pub tries: u32,
 }
 
@@ -101,7 +101,7 @@ pub struct Session<P> {
 }
 
 impl<P: Port> Session<P> {
-    /// Creates a session on an open port. This function sends nothing and does not wait.
+    /// Creates a session on an open port. This function sends no frame and does not wait.
     pub fn new(port: P) -> Self {
         let start = port.now();
         Self {
@@ -122,7 +122,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Calls `observer` with each status that arrives from now on, whichever function of the session receives it.
+    /// Sets `observer`. Each function of the session that receives a status passes the status to this observer.
     pub fn observe(&mut self, observer: impl FnMut(Duration, &Status) + 'static) {
         self.observer = Some(Box::new(observer));
     }
@@ -137,8 +137,8 @@ impl<P: Port> Session<P> {
         &self.port
     }
 
-    /// Returns the port, for calls that the session does not offer. If bytes are written directly to the port, the
-    /// session no longer works correctly.
+    /// Returns the port, for calls that the session does not provide. If the caller writes bytes directly to the port, the session no
+    /// longer works correctly.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -167,11 +167,11 @@ impl<P: Port> Session<P> {
         self.last.as_ref()
     }
 
-    /// Returns the next status. `None` if none arrives within `timeout`.
+    /// Returns the next status. Returns `None` if no status arrives within `timeout`.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Port`] if the port is lost.
+    /// Returns [`LinkError::Port`] if the port is lost.
     pub fn poll(&mut self, timeout: Duration) -> Result<Option<Status>, LinkError> {
         let end = self.port.now() + timeout;
         loop {
@@ -185,11 +185,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the next status. Returns an error if the controller sends nothing.
+    /// Returns the next status. Returns an error if the controller sends no status.
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoLink`] if no status arrives within [`Timeouts::status`], [`LinkError::Port`] if the port is lost.
+    /// Returns [`LinkError::NoLink`] if no status arrives within [`Timeouts::status`]. Returns [`LinkError::Port`] if the port is lost.
     pub fn next_status(&mut self) -> Result<Status, LinkError> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
         let mut limit = Limit::new(self.timeouts.status);
@@ -218,7 +218,7 @@ impl<P: Port> Session<P> {
         self.next_status()
     }
 
-    /// Reads all received bytes without waiting.
+    /// Reads all bytes that have arrived, without waiting.
     fn catch_up(&mut self) -> Result<(), LinkError> {
         // The number of reads is limited, so that a line with continuous data cannot block this loop.
         for _ in 0..64 {
@@ -230,8 +230,8 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Reads all received bytes, and discards records and denials of earlier frames. Some of these records and denials may have arrived only a
-    /// moment ago.
+    /// Reads all received bytes, and discards records and denials of earlier frames. Records and denials of earlier frames may still be in
+    /// the receive buffer.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();
@@ -253,7 +253,7 @@ impl<P: Port> Session<P> {
                         self.extensions = Extensions::Asked(at);
                     }
                     let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
-                    // The encoded answer has the length of the received answer.
+                    // The encoded answer is as long as the received answer.
                     let n = answer.emit(&mut bytes).unwrap_or(0);
                     bytes.truncate(n);
                     self.answers.push_back(bytes);
@@ -297,14 +297,15 @@ impl<P: Port> Session<P> {
 
     /// Returns the maximum time until the confirmation of a frame of `len` bytes must arrive.
     fn confirmation_time(&self, len: usize) -> Duration {
-        // The time covers the frame, a status that is already being sent, and the status with the record.
+        // The confirmation time covers the transmission of the frame, of a status that is already being sent, and of the status with the
+        // record.
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
-    /// Sends a frame and waits for its record. If the frame arrived damaged, or its record does not arrive, the frame is
-    /// sent again. Execute and TeachingModeEnable are sent again only if the controller received them damaged. Without a
-    /// record, the controller may have executed the frame, and a Stop from another line may have stopped the arm after
-    /// that. This function is not public, because a frame can start a motion.
+    /// Sends a frame and waits for its record. If the frame arrived damaged, or if its record does not arrive, the session sends the frame
+    /// again. The session repeats Execute and TeachingModeEnable only if the frame arrived damaged. If only the record is missing, the
+    /// controller may have executed the frame, and a Stop from another line may then have stopped the arm. The function `request` is not
+    /// public, because a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
@@ -319,14 +320,14 @@ impl<P: Port> Session<P> {
             let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
-                // The first record of an unknown type may mean that the frame was damaged. The second such record means
-                // that the device does not know the frame type.
+                // The first record that reports an unknown frame type may mean that the frame was damaged. A second equal record means that
+                // the device does not know the frame type.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // No status has arrived either, so the device is only late and has not lost the frame. The session sends a
-                // Stop or a Pause again in this case too.
+                // If neither a record nor a status has arrived, the device is late and has not lost the frame. Therefore the session
+                // repeats the frame only if it is a Stop or a Pause.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;
@@ -340,12 +341,12 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })
     }
 
-    /// Returns the record of the frame that was just sent. `None` if no record arrived in time.
+    /// Returns the record of the frame that was just sent. Returns `None` if no record arrived in time.
     fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
         let mut limit = Limit::new(self.confirmation_time(len));
         loop {
             while let Some(record) = self.records.pop_front() {
-                // A record without an error but of another type belongs to a request that has timed out.
+                // A record of another frame type that reports no error belongs to an earlier request that has timed out.
                 if record.status != FrameStatus::NoError || record.frame_type == kind {
                     return Ok(Some(record));
                 }
@@ -365,7 +366,7 @@ impl<P: Port> Session<P> {
         Ok(true)
     }
 
-    /// Sends a command. Returns an error if the request is rejected.
+    /// Sends a command. Returns an error if the command is rejected.
     fn command(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         self.introduce()?;
         let record = self.request(frame)?;
@@ -391,7 +392,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Timeout`] with the last status, and the errors of [`Session::next_status`].
+    /// Returns [`StateError::Timeout`] with the last status. Also returns the errors of [`Session::next_status`].
     pub fn wait_for(
         &mut self,
         what: &'static str,

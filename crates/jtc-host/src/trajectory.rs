@@ -1,4 +1,4 @@
-//! Trajectories, which consist of points at a fixed time step. This module reads trajectories from common file formats.
+//! Trajectories of points at a fixed time step. This module reads trajectories from common file formats.
 
 mod csv;
 pub mod fit;
@@ -33,13 +33,13 @@ pub struct Point {
 }
 
 impl From<&Point> for SetPoint {
-    /// Converts the point without rounding the values as in a frame.
+    /// Converts the point without the rounding that a frame applies.
     fn from(p: &Point) -> Self {
         Self { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
     }
 }
 
-/// A trajectory, which consists of points at a fixed time step.
+/// Trajectory of points at a fixed time step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     /// Time between points, ms.
@@ -73,9 +73,9 @@ pub struct Loaded {
     pub trajectory: Trajectory,
     /// Format of the file.
     pub form: Form,
-    /// Descriptions of derived, resampled and ignored data.
+    /// Messages about derived, resampled and ignored data.
     pub notes: Vec<String>,
-    /// Overshoot of the curve beyond the waypoints, if the file contains only positions.
+    /// Overshoot of the curve beyond the waypoints. The list is empty if the file contains velocities.
     pub overshoot: Vec<Overshoot>,
     /// `true` if the file states the units of its numbers.
     pub units_named: bool,
@@ -90,7 +90,7 @@ impl Loaded {
     /// Reads a file of any of these formats. `joint_names` are the names of the arm's joints, if the caller knows them.
     /// # Errors
     ///
-    /// Returns an error with line and column if the file cannot be read or is not a trajectory of a known form.
+    /// Returns an error with line and column if the file cannot be read or is not a trajectory of a known format.
     pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         if replay::is_recording(path, None) {
             return replay::load(path);
@@ -105,12 +105,12 @@ impl Loaded {
         read.map_err(|e| e.in_file(path))
     }
 
-    /// Reads the measured motion of a recording instead of the commanded one. The result is the last motion by hand,
-    /// or, without such a motion, the last execution.
+    /// Reads the measured motion of a recording instead of the commanded motion. The result is the last motion by hand. If the recording
+    /// has no motion by hand, the result is the last execution.
     ///
     /// # Errors
     ///
-    /// Returns an error if the file is not a recording, or contains no such motion.
+    /// Returns an error if the file is not a recording, or contains no motion by hand and no execution.
     pub fn load_measured(path: &Path) -> Result<Self, FileError> {
         replay::load_measured(path)
     }
@@ -133,11 +133,11 @@ impl Loaded {
         Ok(self)
     }
 
-    /// Parses a text, and recognises the format by the content.
+    /// Parses a text. The content of the text determines the format.
     ///
     /// # Errors
     ///
-    /// Returns an error with line and column if the text is not a trajectory of a known form.
+    /// Returns an error with line and column if the text is not a trajectory of a known format.
     pub fn parse(text: &str, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let keyed = || start.lines().any(|l| l.trim_start_matches([' ', '-']).starts_with("joint_names:"));
@@ -151,7 +151,7 @@ impl Loaded {
     }
 }
 
-/// A value does not fit into a trajectory frame.
+/// Error for a value that does not fit into a trajectory frame.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("point {point}, {joint}: {channel} {value} is outside the scale of ±{limit} {unit}")]
 pub struct ScaleError {
@@ -161,11 +161,11 @@ pub struct ScaleError {
     pub joint: Joint,
     /// "position", "velocity" or "acceleration".
     pub channel: &'static str,
-    /// Value.
+    /// Value that does not fit.
     pub value: f64,
     /// Largest value that fits.
     pub limit: f64,
-    /// Unit of both values.
+    /// Unit of `value` and `limit`.
     pub unit: &'static str,
 }
 
@@ -181,7 +181,7 @@ impl From<&RawPoint> for Point {
 }
 
 impl Point {
-    /// Returns the point in the integer form of a frame. `index` is the index of the point for the error.
+    /// Returns the point as integers, in the units of a trajectory frame. The error contains `index`, the index of the point.
     ///
     /// # Errors
     ///
@@ -191,8 +191,8 @@ impl Point {
             let mut out = [0i16; JOINTS];
             for (joint, (to, v)) in Joint::ALL.into_iter().zip(out.iter_mut().zip(values)) {
                 let exact = v * 32767.0 / scale;
-                // The value is neither clipped nor wrapped. A small tolerance covers the rounding of the multiplication.
-                // NaN is outside every range.
+                // The value is not clipped and does not wrap. A small tolerance allows for the rounding of the multiplication. NaN is
+                // outside every range.
                 if !(-32768.0 - 1e-9..=32767.0 + 1e-9).contains(&exact) {
                     return Err(ScaleError { point: index, joint, channel, value: *v, limit: scale, unit });
                 }
@@ -209,7 +209,7 @@ impl Point {
 }
 
 impl Trajectory {
-    /// Returns all points in the integer form of a frame.
+    /// Returns all points as integers, in the units of a trajectory frame.
     ///
     /// # Errors
     ///

@@ -1,11 +1,10 @@
-//! Waypoint files, which contain positions for a motion, with or without times. The files are used by
-//! [`plan`](crate::plan).
+//! Waypoint files. A waypoint file contains the positions of a motion, with or without times. [`plan`](crate::plan) uses these files.
 //!
-//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a
-//! flange pose. A flange pose is in the base frame, in m with a quaternion or roll, pitch and yaw. If a flange pose has
-//! several solutions, the joint positions nearest to the previous waypoint are used. `leg` selects the motion to the
-//! waypoint, which is straight in joint space, or with the flange on a [line or an arc](LegKind). Times are in s from
-//! the first waypoint. A file is CSV with a header, or JSON whose keys have the names of the CSV columns:
+//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a flange pose. A flange
+//! pose is in the base frame, and consists of a position (m) and of a quaternion or roll, pitch and yaw. If several sets of joint positions
+//! have this flange pose, the reader uses the set nearest to the previous waypoint. `leg` selects the motion to the waypoint: straight in
+//! joint space, or with the flange on a [line or an arc](LegKind). Times are in s, counted from the first waypoint. A file is CSV with a
+//! header, or JSON whose keys have the names of the CSV columns:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;
@@ -56,9 +55,9 @@ pub enum Target {
 pub struct FileWaypoint {
     /// Position.
     pub target: Target,
-    /// Time of the waypoint after the first waypoint, s. If `None`, the arm arrives as soon as the limits permit.
+    /// Time of the waypoint after the first waypoint, s. If the value is `None`, the arm arrives as soon as the limits permit.
     pub time: Option<f64>,
-    /// Motion from the previous waypoint, if the file specifies it.
+    /// Type of motion from the previous waypoint, if the file specifies the type.
     pub leg: Option<LegKind>,
     /// Location in the file.
     pub place: Place,
@@ -113,7 +112,7 @@ impl Diagnose for WaypointError {
             Self::Pose { source, .. } => source.diagnosis(),
             Self::Route(e) => e.diagnosis(),
             Self::Flange { source, .. } => {
-                // The values are not a valid pose for any arm.
+                // Values that are not finite and quaternions of another length than 1 are not a valid pose for any arm.
                 let kind = match **source {
                     kinematics::PoseError::NotFinite { .. } | kinematics::PoseError::NotUnit { .. } => {
                         ErrorKind::Usage
@@ -136,11 +135,11 @@ impl Diagnose for WaypointError {
 }
 
 impl WaypointFile {
-    /// Reads a CSV or JSON file. The format is recognised by the content.
+    /// Reads a CSV or JSON file. The content of the file determines the format.
     ///
     /// # Errors
     ///
-    /// Returns an error with line, column and value if the file cannot be read or has none of these formats.
+    /// Returns an error with line, column and value if the file cannot be read, or is neither CSV nor JSON.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let file = Self::parse(&text).map_err(|e| e.in_file(path))?;
@@ -194,14 +193,15 @@ impl WaypointFile {
         Ok(())
     }
 
-    /// Returns `true` if the flange moves on a line or an arc on at least one leg. If `line` is set, legs without a
-    /// specified motion are lines.
+    /// Returns `true` if the flange moves on a line or an arc on at least one leg. If `line` is set, legs without a specified type of
+    /// motion are lines.
     pub fn has_lines(&self, line: bool) -> bool {
         let is_line = |w: &FileWaypoint| w.leg.map_or(line, |leg| leg != LegKind::Joint);
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Returns the indices of the waypoints that are flange poses and that a leg in joint space reaches from another flange pose.
+    /// Returns the indices of flange poses whose previous waypoint is also a flange pose, if the leg between the two poses is in joint
+    /// space.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
@@ -227,14 +227,14 @@ impl WaypointFile {
         Ok(self)
     }
 
-    /// Returns the waypoints as positions of an arm, for [`Planner::through`](crate::plan::Planner::through). For a flange
-    /// pose, the solution nearest to the previous waypoint is used. For the first waypoint, the solution nearest to the
-    /// zero pose is used.
+    /// Returns the waypoints as positions of an arm, for [`Planner::through`](crate::plan::Planner::through). A flange pose becomes the
+    /// joint positions nearest to the previous waypoint. If the first waypoint is a flange pose, it becomes the joint positions nearest to
+    /// the zero pose.
     ///
     /// # Errors
     ///
-    /// [`WaypointError::Pose`] if a name is not one of this arm's poses, with the most similar name;
-    /// [`WaypointError::Flange`] if the arm does not reach a flange pose.
+    /// Returns [`WaypointError::Pose`], with the most similar name, if a name is not one of this arm's poses. Returns
+    /// [`WaypointError::Flange`] if the arm cannot reach a flange pose.
     pub fn positions(&self, arm: &Arm) -> Result<Vec<jtc_plan::Waypoint>, WaypointError> {
         let start = self.waypoints.first().and_then(|w| w.time).unwrap_or(0.0);
         let config = arm.config();
@@ -250,8 +250,8 @@ impl WaypointFile {
         Ok(found)
     }
 
-    /// Returns the waypoints as a route for [`Planner::on_route`](crate::plan::Planner::on_route), and their times. If
-    /// `line` is set, legs without a specified motion are lines. `blends` are the arguments of [`Route::new`].
+    /// Returns the waypoints as a route for [`Planner::on_route`](crate::plan::Planner::on_route), and their times. If `line` is set, legs
+    /// without a specified type of motion are lines. `blends` are the arguments of [`Route::new`].
     ///
     /// # Errors
     ///
@@ -317,7 +317,7 @@ impl WaypointFile {
                 .at(*position)
                 .and_then(|pose| kinematics.solve(&pose, before))
                 .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
-            // This case does not occur, because `kinematics` is `Some` if a waypoint needs it.
+            // This branch is never reached, because `kinematics` is `Some` if a waypoint is a flange pose.
             (Target::Flange(..), None) => Ok(*before),
         }
     }
@@ -330,14 +330,14 @@ impl WaypointFile {
         }
     }
 
-    /// Returns the location of waypoint `number` (from 1), including the file.
+    /// Returns the location of waypoint `number` (from 1), including the file name.
     pub fn place_of(&self, number: usize) -> Option<String> {
         let waypoint = self.waypoints.get(number.checked_sub(1)?)?;
         Some(format!("{}{}", self.path.display(), waypoint.place))
     }
 }
 
-/// Returns the kind of motion that a word in a file names. Returns `None` if the word is empty.
+/// Returns the type of motion for a word in a file. Returns `None` if the word is empty.
 ///
 /// # Errors
 ///
@@ -362,7 +362,7 @@ fn leg_word(leg: LegKind) -> &'static str {
     }
 }
 
-/// Formats waypoints as CSV, with a resolution of 1 µrad.
+/// Returns waypoints as CSV text, with a resolution of 1 µrad.
 pub fn to_csv<'a>(positions: impl IntoIterator<Item = &'a [f64; JOINTS]>) -> String {
     let mut text = String::from("q1,q2,q3,q4,q5,q6\n");
     for position in positions {

@@ -1,4 +1,4 @@
-//! The test changes one number of an arm file at a time: it removes the number, duplicates it, or reverses its sign. The
+//! The test changes one number of an arm file at a time. A change removes the number, duplicates the number, or reverses its sign. The
 //! reader must detect each change.
 use std::ops::Range;
 
@@ -49,12 +49,12 @@ fn line_of(number: &Number) -> Range<usize> {
     start..end
 }
 
-/// Returns the file without the number and without the separators next to it.
+/// Returns the file without the number and without the separators around the number.
 fn without(number: &Number) -> String {
     let line = line_of(number);
     let (before, after) = (&AVENA[line.start..number.at.start], &AVENA[number.at.end..line.end]);
     if let Some(pair) = before.rfind("{ ").or(before.rfind(", ")).filter(|_| before.contains('{')) {
-        // In an inline table the pair of key and number is removed with its comma.
+        // In an inline table, the key, the number and their comma are removed.
         let pair = before.rfind(", ").unwrap_or(pair) + 2;
         return with(line.start + pair..number.at.end + after.find([',', ' ']).unwrap_or(0) + 1, "");
     }
@@ -75,8 +75,8 @@ fn a_number_that_is_left_out_is_missed() {
                 let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, expected ");
                 assert!(named, "{} {text}: {e}", number.key);
             }
-            // If the missing value has a default, it must be listed as a default or have a warning. If the rotor inertia is
-            // missing, the arm records this.
+            // A default value for a missing number must be listed as a default or cause a warning. If a rotor inertia is missing, the arm
+            // records that it is missing.
             Ok(arm) => {
                 let default = arm.values().iter().any(|v| v.name == number.key && v.from == Source::Default);
                 let listed = default || arm.warnings.iter().any(|w| w.problem.contains(number.key));
@@ -101,15 +101,16 @@ fn a_number_that_is_given_twice_is_refused() {
     }
 }
 
-/// A number with the opposite sign is rejected, or it is valid. If it is valid, no other value of the arm changes.
+/// The reader either rejects a number with the opposite sign or accepts it. If the reader accepts the number, no other value of the arm
+/// changes.
 #[test]
 fn a_number_of_the_other_sign_is_refused_or_is_what_differs() {
     let avena = Arm::parse(AVENA).unwrap();
     for number in numbers() {
         let text = &AVENA[number.at.clone()];
         let value: f64 = text.parse().unwrap();
-        // The arm uses polynomials instead of the friction tables. So the reader only checks that the values of both
-        // table axes increase.
+        // The arm uses polynomials instead of the friction tables. Therefore the reader only checks that the values of both table axes
+        // increase.
         let unused = ["temperature_c", "velocity_rad_s"].contains(&number.key);
         match Arm::parse(&with(number.at.clone(), &(-value).to_string())) {
             Ok(arm) if value != 0.0 && !unused => {

@@ -1,4 +1,4 @@
-//! The section of docs/codes.md about the arm contains the pages of `jtc explain`. `UPDATE_DOCS=1` rewrites it.
+//! The section of docs/codes.md about the arm contains the pages of `jtc explain`. `UPDATE_DOCS=1` rewrites this section.
 
 use std::fmt::Write as _;
 

@@ -1,5 +1,5 @@
-//! Torque margin of plans. The tests compute the margin independently, from the inverse dynamics and the friction law,
-//! at each millisecond that the controller computes.
+//! Tests of the torque margin of plans. The tests compute the margin independently of the planner, from the inverse dynamics and the
+//! friction law. The margin is computed at each millisecond of the motion, as in the controller.
 //!
 //! The tests use the shipped arm, and imported arms with the proportions of a UR5 and a Z1. The environment variable
 //! `JTC_TEST_ARMS` can list further arm files or robot descriptions, separated by `:`.
@@ -81,15 +81,15 @@ fn friction_at(friction: Option<&Friction>, config: &Config, j: usize, v: f64, c
 /// Bearing temperatures of a plan and of a run, °C.
 const TEMPERATURES: [f64; 2] = [20.0, 30.0];
 
-/// Checks a plan that must leave the share `margin` of each limit unused. Returns all torque problems as text, and the
-/// smallest unused share of a limit.
+/// Checks a plan that must leave the share `margin` of each torque limit unused. Returns all torque problems as text, and the smallest
+/// unused share of a limit.
 fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String, f64) {
     let (friction, mut wrong, mut left) = (arm.friction(), String::new(), f64::INFINITY);
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let end = (planned.trajectory.duration_s() * 1e3).round() as u32;
-    // The breakaway friction is the greatest friction at low speeds. The highest of these speeds is slightly above the
-    // speed at which the sign of the friction is fully applied.
+    // The breakaway friction is the greatest friction at low speeds. The highest of these low speeds is slightly above the width of the
+    // friction's sign transition.
     let breakaway: [f64; JOINTS] = std::array::from_fn(|j| {
         let fastest = config.friction_sign_width + config.joints[j].velocity_max / 128.0;
         let speeds = (-20..=20).map(|i| f64::from(i) / 20.0 * fastest);
@@ -131,7 +131,7 @@ fn share() -> impl Strategy<Value = [f64; JOINTS]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// For random waypoints, the plan keeps the margin at each millisecond and reports its own margin.
+    /// For random waypoints, the plan keeps the margin at each millisecond, and the plan reports the correct margin.
     #[test]
     fn plans_keep_the_margin_at_each_millisecond(
         which in 0..64usize,
@@ -174,7 +174,7 @@ proptest! {
     }
 }
 
-/// Returns the arm with a payload whose weight requires this share of the torque of joint 2 in the stretched pose.
+/// Returns the arm with a payload. In the stretched pose, the weight of the payload requires the share `share` of the torque of joint 2.
 fn stretched(share: f64) -> (Arm, Config) {
     let (arm, mut config) = (Arm::avena(), Arm::avena().config());
     let hold = |config: &Config| {
@@ -189,8 +189,8 @@ fn stretched(share: f64) -> (Arm, Config) {
 
 const OUT: [f64; JOINTS] = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
 
-/// A pose that needs more torque than the margin permits can be the end or the start of a motion. The plan keeps the
-/// margin if possible. If the margin is below 10 %, the plan contains a warning.
+/// A pose that needs more torque than the margin permits can be the start or the end of a motion. The plan keeps the margin wherever the
+/// pose permits it. If the margin is below 10 %, the plan contains a warning.
 #[test]
 fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     for share in [0.6, 0.7, 0.8, 0.86, 0.9, 0.94] {
@@ -235,7 +235,7 @@ fn the_default_margin_suffices_for_ten_percent_of_mass_and_twenty_of_friction() 
     }
 }
 
-/// A margin out of range is a usage error that contains the range. Each margin in the range is accepted.
+/// A margin out of range causes a usage error that contains the range. Every margin within the range is accepted.
 #[test]
 fn a_margin_is_zero_to_fifty_percent() {
     let arm = Arm::avena();
@@ -271,7 +271,7 @@ fn a_margin_is_zero_to_fifty_percent() {
     }
 }
 
-/// A check reports the margin of any trajectory, and warns if it is below 10 %.
+/// A check reports the torque margin of any trajectory, and warns if this margin is below 10 %.
 #[test]
 fn a_check_names_the_margin_and_warns_below_ten_percent() {
     let arm = Arm::avena();
@@ -290,6 +290,6 @@ fn a_check_names_the_margin_and_warns_below_ten_percent() {
     assert!(kept.to_string().starts_with("torque margin "), "{kept}");
     let share = 100.0 * (1.0 - tight.torque_nm.abs() / tight.limit_nm);
     assert!((share - tight.percent).abs() < 1e-9);
-    // Without a model the check reports no margin.
+    // If the arm has no model, the check reports no margin.
     assert_eq!(Checker::new(&config).check(&jtc_host::Trajectory::default()).margin, None);
 }

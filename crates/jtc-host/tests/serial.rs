@@ -83,7 +83,7 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!((&got[..300], &got[300..]), (&segment[..300], &fixed::STOP[..]));
     let error = port.write_all(&segment[300..]).expect_err("it was given up");
     assert!(error.to_string().contains("a test stopped the arm after this motion was requested"), "{error}");
-    // Frames that move the arm are blocked. Other frames are still sent.
+    // The port blocks frames that move the arm, and still sends other frames.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
     // A Pause after the Stop would only pause the motion instead of stopping it.
@@ -93,12 +93,11 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
     assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
-    // The owner of the port does not read. The port finds the record in spite of this, and the owner receives the bytes
-    // of the record later.
+    // The owner of the port does not read. The port still finds the record, and the owner receives the bytes of the record later.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
-        // Statuses continue to arrive, as from a controller.
+        // Statuses continue to arrive, as from a real controller.
         far.write_all(&status(Response::default())).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         if asked.is_finished() {
@@ -111,8 +110,8 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!(first, status(record));
 }
 
-/// A Stop that arrives damaged or is not answered is sent again. If the Stop is never confirmed, the client gets an
-/// error.
+/// The port sends a Stop again if the Stop arrives damaged or is not answered. If the controller never confirms the Stop, the client
+/// receives an error.
 #[test]
 fn a_stop_is_written_until_the_controller_confirms_it() {
     let (mut far, path) = pair();
@@ -139,33 +138,33 @@ fn halt_unconfirmed(path: &str, halt: Halt) {
     std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
 }
 
-/// The client requested a motion before the Stop. The request then waits, for example in a queue. The request remains
-/// an old request, although it waits.
+/// The client requested a motion before the Stop, and the request then waits, for example in a queue. The port rejects this request,
+/// because it is older than the Stop.
 #[test]
 fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
     let (_far, path) = pair();
     let mut port = SerialPort::open(&path, 115_200).unwrap();
     let none = Halts::default();
     assert_eq!(port.halts(), none);
-    // Before the Stop, the port sends a motion.
+    // Before the Stop, the port sends the frames of a motion.
     port.ask_to_move_after(none.all).unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     assert_eq!(port.halts(), Halts { all: 1, stops: 1 });
-    // This time is longer than the 3 s for which new requests are rejected.
+    // This pause is longer than the 3 s in which the port rejects new requests.
     std::thread::sleep(Duration::from_millis(3100));
     for _ in 0..10 {
         port.ask_to_move_after(none.all).unwrap();
         let error = port.write_all(&fixed::EXECUTE).expect_err("requested before the Stop");
         assert!(matches!(error, PortError::Halted { by: Some(_) }), "{error}");
     }
-    // The port sends a motion that was requested after the Stop.
+    // The port sends the frames of a motion that was requested after the Stop.
     port.ask_to_move_after(1).unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
 }
 
-/// J-33: a controller rejects a Pause while it decelerates after a Stop. An older controller accepts it and pauses. So
-/// the port does not write a Pause of any client after a Stop.
+/// J-33: a controller rejects a Pause while it decelerates after a Stop. An older controller accepts this Pause and pauses the motion.
+/// Therefore the port writes no Pause after a Stop.
 #[test]
 fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     let (mut far, path) = pair();
@@ -179,7 +178,7 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     };
     halt_unconfirmed(&path, Halt::Pause);
     read(&mut far, &[fixed::PAUSE; 8]);
-    // A Pause may follow a Pause. A Stop replaces a Pause.
+    // After a Pause, the port writes another Pause. A Stop replaces a Pause.
     port.write_all(&fixed::PAUSE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     read(&mut far, &[fixed::PAUSE; 1]);
@@ -203,8 +202,8 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     read(&mut far, &[fixed::EXECUTE; 1]);
 }
 
-/// Simulates a controller. Starts a controller that calls `next` with the received bytes, and sends the status that
-/// `next` returns. Returns the thread of the controller, and a flag that ends it.
+/// Starts a simulated controller that calls `next` with the received bytes, and sends the status that `next` returns. Returns the thread of
+/// the controller, and a flag that ends this thread.
 fn controller(
     mut far: TTYPort,
     mut next: impl FnMut(&[u8]) -> Status + Send + 'static,
@@ -228,8 +227,8 @@ fn is_in(bytes: &[u8], frame: &[u8]) -> bool {
     bytes.windows(frame.len()).any(|window| window == frame)
 }
 
-/// The port repeats the command that ends teaching until the statuses show the end. Until the statuses show this, the
-/// arm is not considered at rest.
+/// The port repeats the command that ends teaching until the statuses show the end of teaching. Until the statuses show the end of
+/// teaching, the arm is not considered at rest.
 #[test]
 fn the_end_of_teaching_is_written_until_statuses_show_it() {
     for heard in [1, 2, 5, u32::MAX] {
@@ -259,8 +258,8 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. This teaching counts as
-/// ended when the record of the command that ends it has arrived.
+/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. Teaching that has not begun is considered ended
+/// when the record of the command that ends teaching has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {
@@ -314,8 +313,8 @@ fn a_pause_that_came_after_the_stop_is_stopped() {
     }
 }
 
-/// Two programs of the superuser may have one port open at the same time. The later program does not replace the socket
-/// of the earlier one, and removes only its own socket.
+/// Two programs of the superuser may have one port open at the same time. The later program does not replace the socket of the earlier
+/// program, and removes only its own socket.
 #[test]
 fn a_socket_of_a_living_program_is_left_alone() {
     let (_far, path) = pair();
@@ -323,7 +322,7 @@ fn a_socket_of_a_living_program_is_left_alone() {
     let socket = door(&path);
     let kept = socket.with_extension("kept");
     std::fs::rename(&socket, &kept).unwrap();
-    // After that, another program listens at the path of this socket.
+    // Another program now listens at the path of this socket.
     let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     drop(port);
     assert!(socket.exists(), "it is not the port's own");
@@ -335,14 +334,13 @@ fn a_socket_of_a_living_program_is_left_alone() {
     std::fs::remove_file(&socket).unwrap();
 }
 
-/// A request whose bytes arrive slowly has one deadline for the whole request. So the request cannot prevent the port
-/// from closing.
+/// A request whose bytes arrive slowly has one deadline for the whole request. Therefore the request cannot prevent the port from closing.
 #[test]
 fn a_request_that_comes_byte_by_byte_is_given_up() {
     let (_far, path) = pair();
     let _port = SerialPort::open(&path, 115_200).unwrap();
     let mut stream = std::os::unix::net::UnixStream::connect(door(&path)).unwrap();
-    // The door closes the connection before the request line is complete. The complete request would take much more
+    // The door closes the connection before the request line is complete. The transmission of the complete request would take much more
     // than one second.
     let closed = (0..100).any(|_| {
         std::thread::sleep(Duration::from_millis(100));

@@ -1,4 +1,5 @@
-//! Raw capture of both directions of a port. Each text line contains the time in seconds, the direction, and the bytes in hexadecimal.
+//! Raw capture of the bytes that a port sends and receives. Each text line contains the time in seconds, the direction, and the bytes in
+//! hexadecimal.
 //!
 //! ```text
 //! 0.001250 > 9B 06 00 06 0A E6
@@ -50,7 +51,7 @@ impl<P: Port, W: Write> Capture<P, W> {
         for b in bytes {
             let _ = write!(line, " {b:02X}");
         }
-        // A motion must continue even if the disk is full. So the error is stored, and `finish` returns it.
+        // A motion must continue even if the disk is full. Therefore the capture stores the write error, and `finish` returns this error.
         self.failed = writeln!(self.out, "{line}").err();
     }
 }
@@ -91,7 +92,7 @@ impl<P: Port, W: Write> Port for Capture<P, W> {
     }
 }
 
-/// Text line of a capture.
+/// One text line of a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Captured {
     /// Time, s.
@@ -102,7 +103,7 @@ pub struct Captured {
     pub bytes: Vec<u8>,
 }
 
-/// Reads a capture. The error for an invalid line contains the line number.
+/// Reads a capture. If a line is invalid, the error contains the line number.
 ///
 /// # Errors
 ///

@@ -18,7 +18,7 @@ use super::runtime;
 
 /// Maximum number of programs that a door serves at the same time.
 const ASKERS: usize = 8;
-/// Maximum time until the thread of the door detects that the door is closed, if no event wakes the thread.
+/// Maximum time until the door's thread detects that the door is closed. An event wakes the thread earlier.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 /// Pause after an attempt to accept a connection has failed.
 const RETRY: Duration = Duration::from_millis(20);
@@ -29,15 +29,14 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// path.
 pub(super) struct Door {
     path: PathBuf,
-    /// Device and inode of the socket. These numbers show if another program has created a new socket at the same path.
+    /// Device and inode of the socket. Another socket at the same path has different numbers.
     file: (u64, u64),
     line: Arc<Line>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Door {
-    /// Opens the door of this program's port. Returns `None` if no socket can be created. The port then works without a
-    /// door.
+    /// Opens the door of this program's port. Returns `None` if no socket can be created. The port also works without a door.
     pub(super) fn open(line: &Arc<Line>) -> Option<Self> {
         let name = socket_name(&line.path)?;
         let (path, listener, file) = runtime::candidates().into_iter().find_map(|folder| {
@@ -61,7 +60,8 @@ impl Door {
 impl Drop for Door {
     fn drop(&mut self) {
         self.line.close();
-        // The connection wakes the thread immediately. Without the connection, the thread would detect the end after at most 200 ms.
+        // The connection wakes the door's thread immediately. Without the connection, the thread would detect the closed door only after up
+        // to 200 ms.
         let _ = UnixStream::connect(&self.path);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -77,8 +77,9 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// Creates the socket at `path`. If no program serves an existing socket, a killed program left it, and it is replaced. If a program still
-/// serves the socket, it is not replaced. This program belongs to the superuser, who can open any port.
+/// Creates the socket at `path`. If a socket file exists but no program serves it, a killed program left the file, and the function
+/// replaces it. If a program still serves the socket, the function returns an error. Only a program of the superuser meets such a socket,
+/// because only the superuser can open a port that is already open.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());
@@ -102,7 +103,7 @@ fn serve(listener: &UnixListener, line: &Line) {
                 Ok((stream, _)) => stream,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
                 Err(_) => {
-                    // The cause may be too many open files. Without a pause, the next attempt would fail in the same way.
+                    // The cause may be too many open files. Without a pause, the next accept would fail with the same error.
                     std::thread::sleep(RETRY);
                     continue;
                 }
@@ -114,17 +115,17 @@ fn serve(listener: &UnixListener, line: &Line) {
                 continue;
             }
             let counted = Counted::new(&busy);
-            // If no thread can be started, the client is disconnected and repeats its request.
+            // If no thread can be started, the door disconnects the client, and the client repeats its request.
             let _ = std::thread::Builder::new().spawn_scoped(scope, move || {
                 let _counted = counted;
-                // If the client has disconnected, the answer is not needed.
+                // An error is ignored here, because a client that has disconnected does not need the answer.
                 let _ = answer(&stream, line);
             });
         }
     });
 }
 
-/// Reader with one common deadline for a whole request, even if its bytes arrive slowly.
+/// Reader with one deadline for a whole request. The deadline also limits a client that sends its bytes slowly.
 struct Within<'a> {
     stream: &'a UnixStream,
     end: Instant,

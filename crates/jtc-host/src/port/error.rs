@@ -50,7 +50,7 @@ pub enum PortError {
         /// Problem found.
         what: String,
     },
-    /// The agent rejects this client.
+    /// The agent denies this client access.
     #[error("{url}: the agent denies access to this program: {what}")]
     NotLetIn {
         /// Address of the agent.
@@ -83,7 +83,7 @@ pub enum PortError {
         /// Names found.
         paths: Vec<String>,
     },
-    /// The path is a file or directory instead of a port.
+    /// The path is a file or directory, and not a port.
     #[error("{path} is no serial port")]
     NoPort {
         /// Name of the port.
@@ -92,7 +92,7 @@ pub enum PortError {
     /// The port does not send a frame that would move the arm, because the arm was stopped after the motion was requested.
     #[error("not sent: {} after this motion was requested", stopped_by(by.as_deref()))]
     Halted {
-        /// Program that stopped the arm, if another program did.
+        /// Name of the program that stopped the arm. `None` if the name is unknown.
         by: Option<String>,
     },
     /// The program that holds the port does not answer a Stop or Pause.
@@ -115,7 +115,7 @@ pub enum PortError {
         /// Cause, if the frame could not be written.
         what: Option<String>,
     },
-    /// Any other error of the operating system.
+    /// The operating system reports another error.
     #[error("{path}: {source}")]
     Io {
         /// Name of the port.

@@ -1,7 +1,7 @@
 //! Stop or Pause by another program of the same user: messages through the [door](super) of the program that holds the port.
 //!
 //! The client sends one line with a request as JSON. The program that holds the port writes the frame to the line and answers with an
-//! [`Answer`]. When the arm is at rest, this program also sends an [`End`].
+//! [`Answer`]. When the arm is at rest, the program that holds the port also sends an [`End`].
 
 use std::io;
 use std::time::Duration;
@@ -28,9 +28,10 @@ pub(super) const REQUEST_MAX: usize = 1024;
 const ANSWER_MAX: usize = 4096;
 /// Maximum size of a final message, bytes.
 pub(super) const END_MAX: usize = 1024;
-/// Timeout for the answer of the program that holds the port. This timeout is longer than the time for writing a Stop eight times.
+/// Timeout for the answer of the program that holds the port. The timeout is longer than the time in which the holder of the port writes a
+/// Stop eight times.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Timeout for the final message. This timeout is longer than the time that an arm needs to come to rest after a Stop.
+/// Timeout for the final message. The timeout is longer than the time in which an arm comes to rest after a Stop.
 const REST: Duration = Duration::from_secs(6);
 
 /// Command that a program requests from the holder of the port.
@@ -67,7 +68,7 @@ pub struct Answer {
     pub program: String,
     /// Process id of that program.
     pub pid: u32,
-    /// Name with which this program opened the port.
+    /// Absolute path of the port.
     pub port: String,
     /// Bit rate of the port, Bd.
     pub baud: u32,
@@ -100,14 +101,14 @@ pub struct End {
     /// Trajectory execution state.
     #[serde(default)]
     pub trajectory: String,
-    /// `true` if the arm is in a held stop. In a held stop, a joint that still moves yields to a push or lowers its load.
+    /// `true` if the arm is in a held stop. During a held stop, a joint that still moves either yields to a push or lowers its load.
     #[serde(default)]
     pub held_stop: bool,
 }
 
 impl Answer {
     pub(super) fn of(port: String, baud: u32, done: Result<Option<HaltOutcome>, PortError>) -> Self {
-        // The client may have another working directory.
+        // The path is made absolute, because the client may have another working directory.
         let port = std::path::absolute(&port).map_or(port, |absolute| absolute.display().to_string());
         let own = Self { program: this_program(), pid: std::process::id(), port, baud, ..Self::default() };
         match done {
@@ -198,7 +199,7 @@ pub(super) fn peer(_: &UnixStream) -> Option<u32> {
     Some(rustix::process::geteuid().as_raw())
 }
 
-/// Returns the id of the process at the other end of a socket, if the operating system reports it.
+/// Returns the id of the process at the other end of a socket, if the operating system reports the id.
 #[cfg(unix)]
 fn process(stream: &UnixStream) -> Option<i32> {
     #[cfg(target_os = "linux")]
@@ -265,7 +266,8 @@ pub fn is_alive(socket: &Path) -> bool {
 ///
 /// # Errors
 ///
-/// [`PortError::HolderSilent`] if the program does not answer, [`PortError::NotHalted`] if the frame did not reach the controller.
+/// Returns [`PortError::HolderSilent`] if the program does not answer. Returns [`PortError::NotHalted`] if the frame did not reach the
+/// controller.
 #[cfg(unix)]
 pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option<End>)>, PortError> {
     let Ok(stream) = UnixStream::connect(socket) else { return Ok(None) };
@@ -293,7 +295,7 @@ pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option
         let holder = format!("{} (process {})", answer.program, answer.pid);
         return Err(PortError::NotHalted { path: answer.port, holder, what: answer.error });
     }
-    // The Stop can cause the other program to exit before the arm is at rest.
+    // A missing final message is not an error. The Stop can cause the other program to exit before the arm is at rest.
     let end = stream.set_read_timeout(Some(REST)).and_then(|()| read_line(&stream, END_MAX)).ok();
     Ok(Some((answer, end)))
 }

@@ -1,9 +1,10 @@
-//! Serial line with both directions of transfer. The line is used by the owner of the port, and by the [door](super::door) through which
-//! other programs stop the arm.
+//! Serial line to the controller, for sending and receiving. The owner of the port uses the line. The [door](super::door), through which
+//! other programs stop the arm, also uses the line.
 //!
-//! The thread of the door writes the Stop of another program even while the owner is busy. The Stop is written between two frames. If a
-//! long frame is only partly written, the rest is not sent, and a gap on the line causes the controller to discard it (J-03). After the
-//! Stop, frames that move the arm and were requested before the Stop are not written.
+//! The thread of the door writes the Stop of another program even while the owner is busy. The Stop of another program is written between
+//! two frames of the owner. If a long frame is only partly written, the remainder of the frame is not sent. A gap on the line then causes
+//! the controller to discard the incomplete frame (J-03). After the Stop, the line does not write frames of a motion that was requested
+//! before the Stop.
 
 use std::collections::VecDeque;
 use std::io;
@@ -20,29 +21,30 @@ use super::halt::Halt;
 use super::standstill::{Standstill, is_moving, is_paused};
 use super::{Halts, PortError, line_time};
 
-/// Timeout for a write during which no byte is accepted.
+/// Timeout for a write if the line accepts no byte.
 const STALL: Duration = Duration::from_secs(5);
-/// Maximum number of bytes per write. This number limits the delay until a stalled line is detected, and the delay of a Stop.
+/// Maximum number of bytes per write. A small number of bytes per write limits the delay until a stalled line is detected, and the delay of
+/// a Stop.
 const CHUNK: usize = 256;
-/// Gap on the line after an abandoned frame. The gap is the 5 ms of J-03 plus a reserve for adapters that shorten it.
+/// Gap on the line after an abandoned frame. The gap is the 5 ms of J-03 plus a reserve, because some adapters shorten gaps.
 const GAP: Duration = Duration::from_millis(8);
-/// Maximum time between two pieces of one frame. A piece that is written later does not continue the frame.
+/// Maximum time between two pieces of one frame. A piece that is written later starts a new frame.
 const PIECE: Duration = Duration::from_millis(50);
-/// Time to wait for the record of a Stop, in addition to the duration of three status frames on the line.
+/// Timeout for the record of a Stop, in addition to the transmission time of three status frames.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Maximum number of times that a Stop is written. After the last time, the Stop is considered not confirmed.
+/// Maximum number of times that a Stop is written. If the controller does not confirm any of these Stops, the Stop has failed.
 const TRIES: u32 = 8;
 /// Timeout for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
 /// Time after another program's Stop in which motion requests are rejected. An agent rejects motion requests for the same duration.
 const CALM: Duration = Duration::from_secs(3);
-/// Maximum age of a status or a jog for which it still describes the current state of the arm.
+/// Maximum age at which a status or a jog still describes the current state of the arm.
 const RECENT: Duration = Duration::from_millis(300);
 /// Interval at which a Stop or the end of teaching is repeated, until the status frames show the effect.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Maximum time in which an arm comes to rest after a Stop.
 const REST: Duration = Duration::from_secs(5);
-/// Maximum number of received bytes that are buffered if the owner does not read them.
+/// Maximum number of received bytes in the buffer while the owner does not read.
 const KEPT: usize = 1 << 16;
 
 /// Result of a Stop or Pause from another program.
@@ -62,13 +64,12 @@ pub(super) struct Line {
     pub baud: u32,
     pub start: Instant,
     output: Mutex<Output>,
-    /// Number of Stops that wait for access to the output. The owner writes the next piece of a frame after these Stops.
+    /// Number of Stops that wait for access to the output. Stops that wait are written before the owner's next piece of a frame.
     urgent: AtomicUsize,
-    /// Number of Stops and Pauses of other programs, followed by the number of only the Stops. Both numbers change together with
-    /// `Output::halted`.
+    /// Number of Stops and Pauses of other programs, and number of Stops alone. The two numbers change together with `Output::halted`.
     halts: AtomicU64,
     stops: AtomicU64,
-    /// Lock for the time until a Stop is written and confirmed, so that Stops are executed one after the other.
+    /// Lock that is held until a Stop is written and confirmed. Therefore Stops are executed one after the other.
     turn: Mutex<()>,
     input: Mutex<Input>,
     seen: Mutex<Seen>,
@@ -105,7 +106,7 @@ struct Input {
     pending: VecDeque<u8>,
 }
 
-/// Facts from the received status frames, independent of the thread that has read them.
+/// Data from all received status frames. Either the owner's thread or the door's thread has read these frames.
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
@@ -183,7 +184,7 @@ impl Line {
         })
     }
 
-    /// Reads for the owner of the port.
+    /// Reads bytes from the line for the owner of the port.
     pub(super) fn read(&self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
         let mut input = lock(&self.input);
         if input.pending.is_empty() {
@@ -248,11 +249,12 @@ impl Line {
         self.closing.load(Ordering::SeqCst)
     }
 
-    /// Writes the Stop or Pause of another program, and repeats it until the controller has received it. Returns `None` if the controller
-    /// does not confirm the command. An owner that closes the port waits for this call, because the Stop may be the reason for closing.
+    /// Writes the Stop or Pause of another program, and repeats the frame until the controller has received it. Returns `None` if the
+    /// controller does not confirm the command. An owner that closes the port waits for the end of `halt`, because the Stop may be the
+    /// reason for closing the port.
     pub(super) fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
-            // The code does not write a Pause after a Stop, because a stopped motion cannot be paused.
+            // No Pause is written after a Stop, because a stopped motion cannot be paused.
             Err(PortError::Halted { .. }) => {
                 let status = lock(&self.seen).status.map(|(_, status)| status);
                 Ok(status.map(|status| HaltOutcome { accepted: false, moved: false, status }))
@@ -263,7 +265,7 @@ impl Line {
 
     fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
-        // As the first step, the code blocks all frames that move the arm.
+        // First, the line blocks all frames of the owner that move the arm.
         self.urgently(|output| {
             if halt == Halt::Pause && output.is_stopped() {
                 return Err(output.refusal());
@@ -295,13 +297,13 @@ impl Line {
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            // If the owner has not read the port for some time, the first status frames read here are old.
+            // If the owner has not read the port for some time, the first status frames that this function reads are old.
             moved: moved || taught || self.moved_since(begin),
             status,
         }))
     }
 
-    /// Waits until the arm is at rest, at most 5 s. Returns the last status and the evaluation of the standstill.
+    /// Waits until the arm is at rest, but at most 5 s. Returns the last status and the evaluation of the standstill.
     pub(super) fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
         let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::after(halt), None);
         let mut written_at = Instant::now();
@@ -315,7 +317,7 @@ impl Line {
             {
                 if halt == Halt::Stop && written_at.elapsed() >= AGAIN {
                     written_at = Instant::now();
-                    // If the line does not accept bytes, the status frames will show that the arm is not at rest.
+                    // A write error is ignored here. If the line does not accept bytes, the status frames show that the arm is not at rest.
                     let _ = self.insist(&status);
                 }
                 standstill.see(at.duration_since(self.start), &status);
@@ -333,8 +335,8 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// Repeats the parts of a Stop whose effect the status frames do not show yet. These are the end of teaching, and the Stop itself if a
-    /// Pause of another sender arrived later.
+    /// Repeats the frames of a Stop whose effect the status frames do not show yet. If teaching is still on or may still begin, the
+    /// function sends the end of teaching again. If a Pause of another sender arrived after the Stop, the function sends the Stop again.
     fn insist(&self, status: &Status) -> Result<(), PortError> {
         if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
@@ -371,7 +373,7 @@ impl Line {
         }
     }
 
-    /// Waits for the next status frame. If the owner does not read, this function reads instead.
+    /// Waits for the next status frame. If the owner does not read from the line, this function reads.
     fn look(&self) {
         let seen = lock(&self.seen);
         let before = seen.statuses;
@@ -382,7 +384,7 @@ impl Line {
             return;
         }
         if let Ok(mut input) = self.input.try_lock() {
-            // The owner receives the error at the next read.
+            // An error is ignored here, because the owner receives the error at its next read.
             let _ = self.receive(&mut input, Duration::from_millis(20));
         }
     }
@@ -480,8 +482,8 @@ impl Line {
         work(&mut lock(&self.output))
     }
 
-    /// Waits until all pending Stops are written, because a mutex does not guarantee the order. Each Stop needs only the time of a short
-    /// write.
+    /// Waits until all pending Stops are written. The wait is necessary because a mutex does not guarantee the order of the threads. The
+    /// transmission of a Stop takes only a short time.
     fn let_urgent_pass(&self) {
         let end = Instant::now() + STALL;
         while self.urgent.load(Ordering::SeqCst) > 0 && Instant::now() < end {
@@ -553,7 +555,7 @@ impl Seen {
         }
     }
 
-    /// Removes frames whose record is overdue, and old records that no thread has read.
+    /// Removes the entries of frames whose record is overdue, and removes old records that no thread has read.
     fn forget(&mut self) {
         self.written.retain(|(at, _)| at.elapsed() < RECORD_TIME);
         let excess = self.answered.len().saturating_sub(16);

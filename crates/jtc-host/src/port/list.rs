@@ -1,4 +1,4 @@
-//! List of the serial ports of this computer. For a port that cannot be used, the list contains the reason.
+//! List of the serial ports of this computer. If a port cannot be used, the list contains the reason.
 
 use serialport::SerialPortType;
 
@@ -14,7 +14,7 @@ pub enum PortKind {
         vendor: u16,
         /// Product number.
         product: u16,
-        /// Serial number, if the device has one.
+        /// Serial number, if the device has a serial number.
         serial: Option<String>,
         /// Description that the device reports.
         description: String,

@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Returns the folder that this program uses, if the operating system provides a folder only for this user.
+/// Returns the folder that this program uses. Returns `None` if the operating system provides no folder that belongs to only this user.
 pub fn folder() -> Option<PathBuf> {
     by_environment().or_else(by_user)
 }
@@ -23,8 +23,8 @@ pub fn folders() -> Vec<PathBuf> {
     all.into_iter().filter(|folder| is_own(folder)).collect()
 }
 
-/// Returns the folders that follow from the given environment variables. If the runtime folder is not the usual folder, its programs are
-/// isolated and use only this folder and the folder for temporary files.
+/// Returns the folders for these values of the environment variables. A program with an unusual runtime folder is isolated, and uses only
+/// this runtime folder and the folder for temporary files.
 fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
     let user = name.trim_start_matches("openjtc-");
     let usual = Path::new("/run/user").join(user);
@@ -106,7 +106,7 @@ mod tests {
             all.iter().map(|folder| folder.display().to_string()).collect()
         };
         let (runtime, tmp) = ("/run/user/1000/openjtc", "/tmp/openjtc-1000");
-        // Under su and cron the variables are not set.
+        // `su` and `cron` do not set these environment variables.
         assert_eq!(all(None, "/tmp"), [tmp, runtime]);
         assert_eq!(all(None, "/var/x"), ["/var/x/openjtc-1000", runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000"), "/tmp"), [runtime, tmp]);

@@ -41,7 +41,7 @@ impl SerialPort {
         Ok(port)
     }
 
-    /// Like `open`, but without a door. The function is intended for a program that offers another way to stop the arm, such as an agent.
+    /// Like `open`, but without a door. The function is for programs that other programs can stop by another method, for example the agent.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Port to a controller, drives and an arm that are simulated in this process, in virtual time.
+//! Port to a simulated controller with drives and an arm. The simulation runs in this process, in virtual time.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use jtc_sim::World;
 
 use super::{Port, PortError};
 
-/// Size of the write buffer of the line, bytes. A write to a full buffer blocks, as in an operating system.
+/// Size of the write buffer of the line, bytes. A write to a full buffer blocks, as in a real operating system.
 const WRITE_BUFFER: usize = 4096;
 
 /// Callback that is called after each simulated millisecond.
@@ -29,12 +29,12 @@ impl SimPort {
         self.observer = Some(Box::new(observer));
     }
 
-    /// Returns the world.
+    /// Returns the simulated world.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// Returns the world for modification.
+    /// Returns the simulated world, which the caller may modify.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }
@@ -81,20 +81,20 @@ impl Port for SimPort {
     }
 }
 
-/// Maximum simulated time that the port catches up in one step. If the delay is longer, for example after the computer was suspended, the
-/// whole delay is skipped.
+/// Maximum delay of the simulated time that the port simulates at once. A longer delay, for example after the computer was suspended, is
+/// skipped completely.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
 /// Port to a simulated world that runs in real time, like a real controller.
 pub struct LivePort {
     world: World,
     start: Instant,
-    /// Real time that the simulation has skipped.
+    /// Duration of the real time that the simulation has skipped.
     left_out: Duration,
 }
 
 impl LivePort {
-    /// Creates a port to `world`. The time of the world begins when the port is created.
+    /// Creates a port to `world`. The simulated time begins when the port is created.
     pub fn new(world: World) -> Self {
         Self { world, start: Instant::now(), left_out: Duration::ZERO }
     }
@@ -106,7 +106,7 @@ impl LivePort {
         if behind > CATCH_UP {
             self.left_out += behind;
         }
-        // Reads the clock once, so that the loop ends on a slow computer.
+        // The clock is read before the loop and not in the loop, so that the loop also ends on a slow computer.
         let now = self.now();
         while Duration::from_micros(self.world.now_us()) < now {
             self.world.step();

@@ -7,7 +7,7 @@ use jtc_wire::{ControllerState, Status, TrajectoryState};
 use super::halt::Halt;
 use crate::labels;
 
-/// Time without motion after which the arm is considered at rest.
+/// If the arm does not move for this time, it is considered at rest.
 const STILL: Duration = Duration::from_millis(200);
 
 /// Returns `true` if the arm follows a path or can be guided by hand, or if a joint moves under torque.
@@ -28,7 +28,8 @@ pub(super) fn has_torque(status: &Status) -> bool {
     status.state.is_in(&[HoldPos, Operate, Teaching])
 }
 
-/// Evaluation of status frames until the arm is at rest. An arm that falls without torque is not at rest, although a Stop cannot hold it.
+/// Evaluation of status frames until the arm is at rest. An arm that falls without torque is not at rest, although a Stop cannot hold the
+/// arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Standstill {
     halt: Halt,
@@ -38,7 +39,7 @@ pub struct Standstill {
 }
 
 impl Standstill {
-    /// Begins the evaluation of status frames after a Stop or Pause.
+    /// Creates the evaluation of status frames after a Stop or Pause.
     pub fn after(halt: Halt) -> Self {
         Self { halt, since: None, reached: false, moved: false }
     }
@@ -53,8 +54,8 @@ impl Standstill {
         self.reached = now.saturating_sub(since) >= STILL;
     }
 
-    /// Returns `true` if a Stop is not yet fully effective, although the arm does not move. After a Stop, the arm must hold its position,
-    /// and there must be no motion that can be resumed.
+    /// Returns `true` if the arm does not move, but a Stop has not yet taken full effect. After a Stop, the arm must hold its position, and
+    /// there must be no motion that can be resumed.
     fn is_incomplete(&self, status: &Status) -> bool {
         self.halt == Halt::Stop && (status.state == ControllerState::Teaching || is_paused(status))
     }
@@ -103,7 +104,7 @@ mod tests {
                 let reached = stands_after(Halt::Stop, |_| status(state, velocity));
                 assert_eq!(reached, stands, "{state:?} {velocity}");
             }
-            // The arm is at rest only for short moments.
+            // In this test, the arm is at rest only for short moments.
             let swings = |i: u32| status(state, if i % 4 == 3 { 0.1 } else { 0.0 });
             assert!(!stands_after(Halt::Stop, swings), "{state:?}");
         }

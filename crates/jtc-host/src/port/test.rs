@@ -1,4 +1,4 @@
-//! Port with a closure instead of a device, for tests and for protocol experiments without a device.
+//! Port with a closure instead of a device. The port is used for tests and for protocol experiments.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{Port, PortError, line_time};
 
 /// Port that calls `device(now, bytes)` when bytes are written. While a call waits, the port calls `device` without bytes after each
-/// virtual millisecond. The port receives the bytes that `device` returns.
+/// virtual millisecond. The bytes that `device` returns can then be read from the port.
 pub struct ScriptedPort<F> {
     device: F,
     now: Duration,

@@ -1,5 +1,5 @@
-//! Encoder and decoder for little-endian CDR, the encoding of ROS 2 messages. Each value is aligned to its size, and offsets begin after
-//! the 4-byte header.
+//! Encoder and decoder for little-endian CDR, the encoding of ROS 2 messages. Each value is aligned to its size. Offsets are counted from
+//! the end of the 4-byte header.
 
 /// Encoder of a message.
 #[derive(Default)]
@@ -10,7 +10,7 @@ pub(super) struct Encoder {
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 impl Encoder {
-    /// Starts a message, and reuses the memory of the previous message.
+    /// Begins a new message in the memory of the previous message.
     pub(super) fn start(&mut self) -> &mut Self {
         self.bytes.clear();
         self.bytes.extend(HEADER);

@@ -1,6 +1,6 @@
 //! CSV files with a header that contains the units, followed by one row per sample. An unknown value is an empty field. If a run did not
-//! finish, comment lines that begin with `#` report how the run ended. These lines follow after all rows, so that a reader without support
-//! for comments can still read the whole table.
+//! finish, comment lines that begin with `#` report how the run ended. The comment lines are after all rows, so that a reader without
+//! support for comments can still read the whole table.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use jtc_wire::{Code, NodeState};
 use super::{Ending, Found, RecordingError, Writer};
 use crate::sample::{JointSample, Sample};
 
-/// Value of a joint: column name after the prefix (`q1_` and so on), and accessor.
+/// A value of a joint: column name without the prefix (`q1_` and so on), and accessor.
 type Column = (&'static str, fn(&mut JointSample) -> &mut f64);
 
 const COLUMNS: [Column; 13] = [
@@ -107,8 +107,8 @@ impl<W: Write + Send> Writer for CsvWriter<W> {
     }
 }
 
-/// Formats a number with nine decimals. The resolution of 1 nrad is far below that of any sensor, and needs half the space of a number with
-/// all digits.
+/// Formats a number with nine decimals. The resolution of 1 nrad is much finer than the resolution of any sensor. A number with nine
+/// decimals needs half the space of a number with all digits.
 fn number(row: &mut String, value: f64) {
     use std::fmt::Write as _;
     if value.is_finite() {
@@ -187,7 +187,7 @@ fn whole<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
 }
 
 /// Parses a number like [`str::parse`], but faster for short numbers such as the numbers that this program writes. If the digits and the
-/// power of ten are exact as floats, the quotient is rounded only once and is therefore correct (Clinger 1990).
+/// power of ten are exact as floats, only the quotient is rounded. The result is therefore correctly rounded (Clinger 1990).
 fn decimal(field: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];

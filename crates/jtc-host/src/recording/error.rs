@@ -52,7 +52,7 @@ pub enum RecordingError {
     Disorder {
         /// The file.
         path: PathBuf,
-        /// Log time of the first message that is too late, s.
+        /// Log time of the first message that is out of order, s.
         time_s: f64,
     },
     /// A message of a known topic is shorter than its schema requires.

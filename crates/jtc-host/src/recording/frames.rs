@@ -1,19 +1,19 @@
-//! Poses of the arm's links as transforms for viewers. Each transform gives the frame of a joint in its parent frame. The frame names are
-//! the names in the robot description.
+//! Poses of the arm's links as transforms for viewers. Each transform is the pose of a joint's frame in its parent frame. The frame names
+//! are the names in the robot description.
 
 use super::RecordingInfo;
 use super::cdr::Encoder;
 use crate::arm::frame_name;
 use crate::sample::Sample;
 
-/// Length of a time interval in which at most one message with transforms is written, ns. The interval corresponds to the display rate of a
-/// viewer.
+/// Length of a time interval in which at most one message with transforms is written, ns. The interval of 20 ms corresponds to the display
+/// rate of a viewer (50 Hz).
 const EVERY_NS: u64 = 20_000_000;
 
 /// Rotation as a unit quaternion in the order x, y, z, w.
 type Quaternion = [f64; 4];
 
-/// Returns the rotation `b` followed by `a`.
+/// Returns the rotation that consists of rotation `b` followed by rotation `a`.
 fn product(a: Quaternion, b: Quaternion) -> Quaternion {
     let ([ax, ay, az, aw], [bx, by, bz, bw]) = (a, b);
     [
@@ -67,8 +67,8 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// Writes the message with the transforms of a sample, unless a message was already written in the same interval ([`EVERY_NS`]) or no position
-    /// is known. The message does not contain joints whose position is unknown.
+    /// Writes the message with the transforms of a sample, unless a message was already written in the same interval ([`EVERY_NS`]) or all
+    /// positions are unknown. The message does not contain joints whose position is unknown.
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,

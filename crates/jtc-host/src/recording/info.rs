@@ -86,7 +86,7 @@ pub struct RecordingInfo {
     pub arm: String,
     /// Source of the samples: "simulator", or the name of the serial port.
     pub source: String,
-    /// Client that commanded the motion, if several clients share the line. Otherwise empty.
+    /// Client that commanded the motion, if several clients share the line. With a single client, the field is empty.
     pub commanded_by: String,
     /// Name of the trajectory.
     pub trajectory: String,
@@ -96,7 +96,7 @@ pub struct RecordingInfo {
     pub joints: [JointInfo; 6],
     /// Origin of the flange in the frame of the last joint, as in [`JointInfo::origin`].
     pub flange: [f64; 6],
-    /// Robot description (URDF) of the arm; only in MCAP files. If the description is present, the file also contains the poses of the
+    /// Robot description (URDF) of the arm; only in MCAP files. If the file contains the description, it also contains the poses of the
     /// links.
     pub description: Option<Arc<str>>,
     /// Gains of the joints, base to wrist; only in MCAP files.
@@ -111,8 +111,8 @@ pub struct RecordingInfo {
     pub commanded: Option<Arc<Trajectory>>,
     /// Number of runs that the user requested, including the first run; only in MCAP files. `None` if the number was not recorded.
     pub runs: Option<u32>,
-    /// Trajectory of all runs except the first run, if it differs from `commanded`. In this case the first run was the remainder of an
-    /// interrupted run.
+    /// Trajectory of all runs except the first run, if it differs from `commanded`. A different trajectory means that the first run was the
+    /// remainder of an interrupted run.
     pub then: Option<Arc<Trajectory>>,
 }
 
@@ -137,7 +137,7 @@ impl RecordingInfo {
             flange: origin(6),
             description: Some(arm.to_urdf().into()),
             gains: arm.pid,
-            // Without an image of the arm, the hash is unknown.
+            // If the arm has no image, its hash is unknown.
             hash: arm.hash().ok().flatten(),
             ..Self::default()
         }

@@ -1,6 +1,6 @@
 //! Recording that is written during the run, so that only the last samples are lost if the program is killed.
 //!
-//! A separate thread writes the file. Therefore a slow or full disk does not delay the caller.
+//! A separate thread writes the file. Because of this thread, a slow or full disk does not delay the caller.
 
 use std::fs::File;
 use std::path::Path;
@@ -13,8 +13,8 @@ use crate::sample::Sample;
 
 /// Maximum delay until recorded samples are passed to the operating system.
 pub const FLUSH: Duration = Duration::from_millis(200);
-/// Maximum number of samples that wait to be written to the disk. This number corresponds to 16 s with a simulator, or to many minutes on a
-/// serial line.
+/// Maximum number of samples that wait to be written to the disk. 16,384 samples correspond to 16 s with a simulator, or to many minutes on
+/// a serial line.
 const WAITING_MAX: usize = 1 << 14;
 
 enum Message {
@@ -41,8 +41,8 @@ pub struct LiveRecorder {
 }
 
 impl LiveRecorder {
-    /// Creates the file and writes the header, so that this function reports an error of the disk. The extension of `path` selects the
-    /// format. If writing fails, the writing thread calls `on_error` once.
+    /// Begins the recording in `file` and writes the header to the disk. Therefore this function returns an error if the disk is full. The
+    /// extension of `path` selects the format. If writing fails, the writing thread calls `on_error` once.
     pub fn begin(
         file: File,
         path: &Path,
@@ -70,7 +70,7 @@ impl LiveRecorder {
         self.end(Message::End(ending.clone()))
     }
 
-    /// Ends the recording without completing the file, because it will be written again from the start.
+    /// Ends the recording without completing the file. The caller then writes the file again from the start.
     pub fn abandon(self) {
         let _ = self.end(Message::Abandon);
     }
@@ -121,7 +121,7 @@ mod tests {
         }
     }
 
-    /// The test never ends the recording. As after `kill -9`, the file contains only the data that were passed to the operating system.
+    /// The test never ends the recording. The file contains only the data that were passed to the operating system, as after `kill -9`.
     #[test]
     fn what_was_recorded_is_readable_while_it_goes_on() {
         let dir = tempfile::tempdir().unwrap();

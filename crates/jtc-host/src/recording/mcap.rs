@@ -224,13 +224,13 @@ impl Carries {
 
 /// Returns the header of a file. Returns `None` if the file is truncated before the header.
 ///
-/// The whole file is searched, because a program that rewrote the file may have moved the header to the end.
+/// The function searches the whole file, because another program may have moved the header to the end of the file.
 pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     let mut info = None;
     let mut see = |record: records::Record<'_>| match record {
         records::Record::Metadata(metadata) if metadata.name == METADATA => {
             info = Some(RecordingInfo::from_map(&metadata.metadata));
-            // The header was found, and this error value ends the search.
+            // The header was found. The error value only ends the search.
             Err(RecordingError::Empty { path: PathBuf::new() })
         }
         _ => Ok(()),
@@ -239,8 +239,8 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     info
 }
 
-/// Reads a file that [`McapWriter`] wrote, up to the first damage. Messages of other topics are ignored. Calls `see` with each sample in
-/// time order. Up to `room` samples wait for messages that follow later in the file. `info` is the result of [`read_info`].
+/// Reads a file that [`McapWriter`] wrote, up to the first damaged record. Messages of other topics are ignored. Calls `see` with each
+/// sample in time order. Up to `room` samples wait for messages that follow later in the file. `info` is the result of [`read_info`].
 pub(super) fn scan(
     file: impl Read,
     mut info: Option<RecordingInfo>,

@@ -1,5 +1,5 @@
-//! Messages about an arm, with ROS 2 schemas and CDR encoding. The messages are used in recordings, and for the live display in viewers
-//! that can also show recordings.
+//! Messages about an arm, with ROS 2 schemas and CDR encoding. Recordings contain these messages, and the live display sends them to
+//! viewers.
 
 use super::cdr::Encoder;
 use super::frames::Frames;

@@ -13,10 +13,10 @@ struct Reassembled {
 }
 
 /// Reassembler of samples with a buffer of at most `room` incomplete samples. If the buffer is full, the oldest sample is released, because
-/// no further message of this sample is expected.
+/// no more messages of this sample are expected.
 ///
 /// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may group messages by topic.
-/// Messages of one sample are still matched if their distance in the file is at most one chunk.
+/// The reassembler still matches messages of one sample if their distance in the file is at most one chunk.
 pub(super) struct Reassembler {
     /// Incomplete samples, sorted by time.
     waiting: VecDeque<Box<Reassembled>>,
@@ -28,7 +28,7 @@ pub(super) struct Reassembler {
     spare: Option<Box<Reassembled>>,
 }
 
-/// Error if a message arrived after its sample, or a later sample, was released.
+/// Error for a message whose sample, or a later sample, has already been released.
 #[derive(Debug)]
 pub(super) struct Late;
 
@@ -38,7 +38,7 @@ impl Reassembler {
         Self { waiting: VecDeque::new(), room, given_ns: None, most: 0, spare: None }
     }
 
-    /// Returns the sample at this time, to which the message `bit` belongs. If a sample must be released to make space, the sample is
+    /// Returns the sample at time `time_ns`, to which the message `bit` belongs. If a sample must be released to make space, the sample is
     /// passed to `give`.
     pub(super) fn at(
         &mut self,
@@ -85,8 +85,8 @@ impl Reassembler {
         self.waiting.is_empty() && self.given_ns.is_none()
     }
 
-    /// Releases the remaining samples at the end of the file. If the file is truncated (`cut`), the last sample is discarded if some of its
-    /// messages are missing.
+    /// Releases the remaining samples at the end of the file. If messages of the last sample are missing in a truncated file (`cut`), the
+    /// last sample is discarded.
     pub(super) fn finish(mut self, cut: bool, give: &mut dyn FnMut(u64, Sample)) {
         if cut && self.waiting.back().is_some_and(|last| last.came.count_ones() < self.most) {
             self.waiting.pop_back();

@@ -17,7 +17,7 @@ const AT_REST: f64 = 0.01;
 /// Maximum distance between the commanded positions in a recording and the trajectory of the recording, rad.
 const SAME: f64 = 2e-3;
 
-/// Progress of a run along its path, as far as the recording proves this progress.
+/// Progress of a run along its path that the recording proves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResumePoint {
     /// Path time of the last position that the recording shows, ms; 0 if the motion had not begun.
@@ -29,8 +29,8 @@ pub struct ResumePoint {
 pub struct Resumption {
     /// Path time, ms.
     pub ms: u32,
-    /// `true` if the controller reports this point, because the motion continued after the end of the recording. `false` if the point is
-    /// known from the recording.
+    /// `true` if the controller reports this point, because the motion continued after the end of the recording. `false` if the point comes
+    /// from the recording.
     pub shown: bool,
     /// `true` if the arm is at this point.
     pub stands: bool,
@@ -38,16 +38,16 @@ pub struct Resumption {
 
 impl ResumePoint {
     /// Returns the point at which the run on `trajectory` can be resumed without skipping a part of the path. The point is the last
-    /// position that the recording shows. A later point is used if `status` shows that the motion continued to that point and that the arm
-    /// is there. The position of the arm alone is not a proof, because a user may have moved the arm along the path. A controller that was
-    /// restarted or that received another motion does not report a point of this motion. After a Stop, a controller reports the point index
-    /// from the start again.
+    /// position that the recording shows. The function returns a later point if `status` shows that the motion continued to this point and
+    /// that the arm is at this point. The position of the arm alone does not prove progress, because a user may have moved the arm along
+    /// the path. A controller that was restarted or that received another motion does not report a point of this motion. After a Stop, a
+    /// controller counts the point index from the start of the trajectory again.
     ///
     /// `tolerance` is the maximum distance (rad) at which the arm is considered to be at a point.
     ///
     /// # Errors
     ///
-    /// [`NothingLeft::Finished`] if the controller reports the end of the path.
+    /// Returns [`NothingLeft::Finished`] if the controller reports the end of the path.
     pub fn resumption(
         &self,
         trajectory: &Trajectory,
@@ -111,8 +111,8 @@ impl Diagnose for NothingLeft {
 }
 
 impl Recording {
-    /// Returns the progress of the last run in this recording along `trajectory`. The progress ends at the last sample in motion, or, after
-    /// a Stop, at the later position at which the recording shows the arm at rest.
+    /// Returns the progress of the last run in this recording along `trajectory`. The progress ends at the last sample of the moving arm.
+    /// After a Stop, the progress ends at the later position at which the arm is at rest.
     ///
     /// # Errors
     ///
@@ -131,8 +131,7 @@ impl Recording {
             let own = |of: Option<&Arc<Trajectory>>| of.is_some_and(|own| **own == *trajectory);
             let own = own(info.and_then(|info| info.commanded.as_ref()))
                 || own(info.and_then(|info| info.then.as_ref()));
-            // The interrupted motion was the approach to the first point. The arm has not moved along the trajectory
-            // itself.
+            // The interrupted motion was the approach to the first point, so the arm has not moved along the trajectory.
             return if own { Ok(ResumePoint { last_ms: 0 }) } else { Err(NothingLeft::Other) };
         }
         if is_end || last.point >= end_ms(trajectory) {
@@ -154,7 +153,7 @@ impl Recording {
         finished
     }
 
-    /// Returns the samples of each execution, and `true` if the execution reached its end. An execution reached its end if another
+    /// Returns the samples of each execution, and `true` if the execution reached its end. An execution is considered complete if another
     /// execution follows or if the controller reports the end.
     fn executions(&self) -> Vec<(Vec<&Sample>, bool)> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
@@ -181,9 +180,9 @@ impl Recording {
     }
 }
 
-/// Returns the path time at which the arm came to rest after a Stop, ms. The result is the first path position after `last_ms` that matches
-/// the arm at rest; `last_ms` is the last position in motion. If the arm had no torque, it may have left the path, so its position is not a
-/// proof.
+/// Returns the path time at which the arm came to rest after a Stop, ms. `last_ms` is the path time of the last sample in motion. The
+/// result is the first path time after `last_ms` at which the path position matches the arm at rest. An arm without torque may have left
+/// the path, so its position does not prove progress.
 fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u32> {
     let held = |s: &Sample| s.errors == 0 && s.state.known().is_none_or(ControllerState::has_torque);
     let rest = behind.last().filter(|_| behind.iter().all(held))?;
@@ -196,8 +195,8 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
         let far = away(&trajectory.at_ms(ms)?.position, &stood);
         match nearest {
             Some((_, least)) if far < least => nearest = Some((ms, far)),
-            // From here on, the path leads away from the position of the arm. If the path reaches this position again later, that is
-            // ignored.
+            // After this point, the path leads away from the position of the arm. The search ends here, even if the path reaches this
+            // position again later.
             Some(_) if far > AT_REST => break,
             None if far <= AT_REST => nearest = Some((ms, far)),
             _ => {}
@@ -212,7 +211,7 @@ fn is_on(sample: &Sample, trajectory: &Trajectory) -> bool {
     let Some(at) = trajectory.at_ms(sample.point) else { return false };
     (0..JOINTS).all(|j| {
         let joint = &sample.joints[j];
-        // The measured positions are delayed and contain the tracking error.
+        // The tolerance for measured positions is larger, because these positions are delayed and contain the tracking error.
         let (value, same) =
             if joint.set_position.is_finite() { (joint.set_position, SAME) } else { (joint.position, 0.1) };
         (value - at.position[j]).abs() <= same
@@ -265,7 +264,7 @@ mod tests {
         let mut approach = recording(&way, "fault");
         approach.samples[2].joints[1].set_position += 0.1;
         assert_eq!(approach.resume_point(&demo_motion()), Err(NothingLeft::Other));
-        // If the recording contains this trajectory, the arm was moving to its first point.
+        // If the header of the recording contains this trajectory, the recorded motion was the approach to its first point.
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
         assert_eq!(approach.resume_point(&demo_motion()), at(0));
@@ -312,13 +311,13 @@ mod tests {
                 parts.len()
             );
         }
-        // The remainder of a run is followed by two complete runs.
+        // This recording contains the remainder of a run, followed by two complete runs.
         let rest = joined(&[approach(), run(), part()], "stopped");
         assert_eq!(rest.runs_finished(&other, &demo), 2);
         assert_eq!(rest.resume_point(&demo), Ok(ResumePoint { last_ms: 5_000 }));
     }
 
-    /// After a Stop, the point index of the controller is 0 again. The position of the arm at rest shows the progress.
+    /// After a Stop, the point index of the controller is 0 again. The position of the arm at rest therefore shows the progress of the run.
     #[test]
     fn a_stop_proves_the_place_at_which_the_arm_came_to_rest() {
         use TrajectoryState::{Execute, Stop};
@@ -336,8 +335,8 @@ mod tests {
             let found = stood(3_400, ms).resume_point(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
-        // The path has reversed its direction before the Stop, so the arm is at an earlier position. In this case the reversal is executed
-        // again instead of being skipped.
+        // The path has reversed its direction before the Stop, so the arm is at an earlier position. The resumed run therefore repeats the
+        // reversal instead of skipping it.
         assert!(stood(4_900, 5_100).resume_point(&path).unwrap().last_ms < 4_920);
         // If the arm is elsewhere on the path, away from the path, or without torque, its position does not prove the progress.
         let elsewhere = stood(3_400, 12_000);
@@ -362,15 +361,16 @@ mod tests {
         status
     }
 
-    /// If the arm is on the remaining path, the function assumes that this run moved it there only if the controller reports this.
+    /// An arm at a later point of the path does not prove that the run reached this point. The controller must also report this point of
+    /// the path.
     #[test]
     fn only_what_is_proved_counts_as_done() {
         use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
         let (path, broken) = (back_and_forth(), ResumePoint { last_ms: 3_400 });
         let at = |status: &Status| broken.resumption(&path, status, 0.02);
         let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
-        // In these cases the controller was restarted or stopped, or a user moved the arm. At 0 rad the arm is at the position of the path
-        // at 15 s, and at −0.5 rad the arm is at the end of the path.
+        // The next statuses come from a controller that was restarted or stopped, or from an arm that a user moved. At 0 rad, the arm is at
+        // the path position of the time 15 s. At −0.5 rad, the arm is at the end of the path.
         for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
             for (trajectory, point) in
                 [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
@@ -382,7 +382,7 @@ mod tests {
                 );
             }
         }
-        // The motion continued after the end of the recording.
+        // The next statuses come from a motion that continued after the end of the recording.
         for trajectory in [Execute, Pause] {
             let on = at(&status(trajectory, 8_000, 0.7));
             assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));

@@ -68,8 +68,8 @@ float64 w 1
 
 /// Name of the message with the parts of the control law.
 pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
-/// Definition of the control message, with values for each joint, base to wrist. A value is NaN if the source of the samples does not know
-/// it.
+/// Definition of the control message, with values for each joint, base to wrist. A value is NaN if the source of the samples does not
+/// supply the value.
 pub(super) const CONTROL_TEXT: &str = with_header!(
     "\
 std_msgs/Header header

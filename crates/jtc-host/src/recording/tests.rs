@@ -109,7 +109,8 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(read_mcap(b"not an mcap file").is_err());
 }
 
-/// The test truncates a file at any byte. All samples of complete blocks are read in the order of writing, and the truncation is reported.
+/// The test truncates a file at any byte. The reader returns all samples of complete blocks in the order of writing, and reports the
+/// truncation.
 #[test]
 fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -145,7 +146,7 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
                     assert_eq!(sample.point, i as u32);
                     assert!(sample.joints.iter().all(|j| j.temperature == 31.0 && j.position.is_finite()));
                 }
-                // The last block is followed by the end of the MCAP file.
+                // After the last block, the file contains only the end of the MCAP file.
                 if k + 1 == sizes.len() && more > 0 {
                     continue;
                 }
@@ -233,8 +234,9 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
     counts
 }
 
-/// The file contains everything that is needed to understand its values. This includes the arm, its gains and limits, and the identity of
-/// the controller. Poses of the links are written at most 50 times a second, at any sample rate, and only if a position is known.
+/// The file contains all data that a reader needs to understand the values. The file contains the arm, its gains and limits, and the
+/// identity of the controller. Poses of the links are written at most 50 times a second, at any sample rate, and only if a position is
+/// known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {
     let dir = tempfile::tempdir().unwrap();

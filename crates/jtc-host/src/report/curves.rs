@@ -1,9 +1,9 @@
-//! Curves of a report. For a short recording, the curves contain every sample. A longer recording is divided into pieces of equal length,
-//! and the curves contain the minimum and maximum of each piece.
+//! Curves of a report. For a short recording, the curves contain every sample. A longer recording is divided into pieces of equal length.
+//! The curves of a longer recording contain the minimum and the maximum of each piece.
 
 use crate::sample::{JointSample, Sample};
 
-/// Maximum number of points per curve. With 16 000 points the page stays below about 4 MB, and the curve has four times the
+/// Maximum number of points per curve. With 16 000 points per curve, the page stays below about 4 MB, and a curve has four times the
 /// resolution of a screen.
 pub(super) const POINTS_MAX: usize = 16_000;
 
@@ -50,7 +50,7 @@ fn values(joint: &JointSample) -> [f64; KINDS] {
 struct Bucket {
     begin_s: f64,
     middle_s: f64,
-    /// Minimum of each curve. If no value is known, the minimum is above `high`.
+    /// Minimum of each curve. If all values are unknown, the minimum is above the maximum.
     low: [f64; ALL],
     high: [f64; ALL],
     /// `true` if the lowest value occurred before the highest value.
@@ -111,11 +111,11 @@ impl Bucket {
     }
 }
 
-/// Curves of streamed samples, with bounded memory use. If there are too many buckets, each pair of neighbours is joined.
+/// Curves of streamed samples, with bounded memory use. If there are too many buckets, each pair of neighbouring buckets is joined.
 #[derive(Clone, Debug)]
 pub(super) struct Curves {
     buckets: Vec<Bucket>,
-    /// Number of samples in a bucket. If the number is 1, each sample is a point of the curve.
+    /// Number of samples in a bucket. If the number is 1, each sample is one point of the curve.
     width: usize,
     /// Number of samples that the last bucket already contains.
     filled: usize,
@@ -189,8 +189,8 @@ impl Curves {
         times
     }
 
-    /// Returns the values at the times of [`Self::times`]. These are the minimum and maximum of each bucket, in the order in which they
-    /// occurred. A value is NaN if it is unknown.
+    /// Returns the values of a curve at the times of [`Self::times`]. The values are the minimum and maximum of each bucket, in the order
+    /// in which they occurred. An unknown value is NaN.
     pub(super) fn values(&self, curve: Curve, joint: usize) -> Vec<f64> {
         let i = joint * KINDS + curve as usize;
         let mut values = Vec::with_capacity(self.len());
@@ -208,15 +208,15 @@ impl Curves {
     }
 }
 
-/// Number of pieces to which a sequence of states is reduced when it has twice as many pieces.
+/// Number of pieces after the reduction of a sequence of states. The reduction begins when the sequence has twice as many pieces.
 const RUNS_MAX: usize = 8_192;
 
-/// Rule for the common value when two pieces are joined.
+/// Rule for the value of a piece that is joined from two pieces.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joined {
-    /// Keep the value of the longer piece; used for states.
+    /// The joined piece has the value of the longer piece. States use this rule.
     Longer,
-    /// Combine the bits of both pieces; used for errors, so that no error is lost.
+    /// The joined piece has the bits of both pieces. Error words use this rule, so that no error is lost.
     Both,
 }
 
@@ -246,9 +246,9 @@ impl Runs {
         }
     }
 
-    /// Joins the pieces in pairs. Neighbouring pieces that have equal values after this are also joined.
+    /// Joins the pieces in pairs. If neighbouring pieces have equal values after this step, they are also joined.
     fn halve(&mut self) {
-        // The last piece is not joined, because it may still become longer.
+        // The last piece is not joined with another piece, because the last piece may still become longer.
         let last = self.runs.pop();
         let mut fewer: Vec<(f64, f64, u64)> = Vec::with_capacity(RUNS_MAX);
         for two in self.runs.chunks(2) {

@@ -1,4 +1,4 @@
-//! Data from the samples that a report needs. The samples are streamed, so the memory use does not increase with their number.
+//! Data that a report needs from the samples. The samples are streamed, so the memory use does not increase with the number of samples.
 
 use super::curves::{Curves, Joined, Runs};
 use super::summary::Figures;

@@ -1,4 +1,4 @@
-//! First error of a failed run, with its time, its joint, and the values before and after it.
+//! First error of a failed run, with the time, the joint, and the values before and after the error.
 
 use std::fmt::Write;
 
@@ -14,8 +14,8 @@ use crate::sample::Sample;
 /// Number of samples that are shown before and after the first sample with an error.
 pub(super) const BEFORE: usize = 3;
 const AFTER: usize = 2;
-/// Factor for detecting a jump: a position step is a jump if it exceeds this factor times the step that the velocity limit permits. Noise
-/// and time jitter cause smaller steps.
+/// Factor for detecting a jump. A position step is a jump if it exceeds this factor times the largest step at the velocity limit. Noise and
+/// time jitter cause smaller steps.
 const STEP_SHARE: f64 = 1.2;
 
 /// Values of a joint at one time near the failure. Unknown values are NaN.
@@ -50,9 +50,9 @@ pub struct RunFailure {
     pub causes: Vec<String>,
     /// First joint that failed; `None` if no joint failed.
     pub joint: Option<Joint>,
-    /// Time since the start of the run, ms. During a motion, this time is computed from the point index of the controller.
+    /// Time since the start of the run, ms. During a motion, the time is computed from the point index of the controller.
     pub at_ms: f64,
-    /// Time of the first sample that shows the failure (s), on the clock of the samples.
+    /// Time of the first sample that shows the failure, s. The time is on the clock of the samples.
     pub time_s: f64,
     /// Time since the last sample without an error, ms. The failure occurred during this time.
     pub within_ms: f64,
@@ -73,8 +73,9 @@ impl RunFailure {
         Some(Self::found(info, &Around::of(samples, at)))
     }
 
-    /// Returns the failure of a recorded run. The failure is an error in the samples, otherwise the recorded reason for the end. If both
-    /// are missing, the failure is that the recording does not show the end.
+    /// Returns the failure of a recorded run. The failure is the first error in the samples. If the samples contain no error, the failure
+    /// is the recorded reason for the end. If there is neither an error nor a reason, the failure is that the recording does not show the
+    /// end of the run.
     pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);
@@ -83,7 +84,8 @@ impl RunFailure {
         Some(Self::ended_by(info, samples, why_it_ended(ending, unseen)?))
     }
 
-    /// Returns the failure of a log at the sample of the time `time_s`, with the given causes and joint.
+    /// Returns the failure in a log, with the given `causes` and `joint`. `time_s` is the time of the sample that shows
+    /// the failure.
     pub fn in_log(
         info: &RecordingInfo,
         samples: &[Sample],
@@ -108,7 +110,7 @@ impl RunFailure {
         found.unwrap_or_else(|| Self::ended_by(info, samples, error.to_string())).with_error(error)
     }
 
-    /// Adds the errors that the drives report, which only `error` contains.
+    /// Adds the errors of the drives, which only `error` contains.
     pub fn with_error(self, error: &Error) -> Self {
         match error {
             Error::Motion(MotionError::RunFault { status, .. }) => self.with_status(status),
@@ -169,8 +171,8 @@ impl RunFailure {
                 first: i == at,
             }
         };
-        // If a joint failed, the table shows this joint before and after the failure. Otherwise the table shows all joints up to the
-        // failure.
+        // If a joint failed, the table shows this joint before and after the failure. If no joint failed, the table shows all joints up to
+        // the failure.
         let moments = match joint {
             Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
                 .map(|i| moment(i, joint))
@@ -260,8 +262,8 @@ pub(super) fn is_bad(sample: &Sample) -> bool {
     sample.errors != 0 || sample.state == ControllerState::Error
 }
 
-/// Returns the reason why a run failed although its samples do not show an error. `unseen` is `true` if the arm is in motion at the last
-/// sample. Returns `None` if the run did not fail.
+/// Returns the reason why a run failed although its samples show no error. `unseen` is `true` if the last sample is from a moving arm.
+/// Returns `None` if the run did not fail.
 pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
         (true, "") => Some("the run ended in a fault, but the recording does not name the fault".to_owned()),
@@ -274,11 +276,11 @@ pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     }
 }
 
-/// Sample at the time of a failure, with the samples before and after it that are shown.
+/// Sample at the time of a failure, with the samples before and after this sample that the report shows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Around {
     pub(super) samples: Vec<Sample>,
-    /// Index of this sample in all samples.
+    /// Index of the failure's sample in `samples`.
     pub(super) at: usize,
     /// Start time of the run, s.
     pub(super) start_s: f64,
@@ -299,14 +301,15 @@ impl Around {
     }
 }
 
-/// Finds a joint whose measured position changed by more than its velocity limit permits, between two samples near the sample `at`. Returns
-/// the joint and a description of the change. The function is used if the status does not show which joint failed.
+/// Finds a joint whose measured position changed too fast between two samples near sample `at`. A change is too fast if it is more than
+/// `STEP_SHARE` times the largest change at the velocity limit of the joint. Returns the joint and a description of the change. The caller
+/// uses this joint if the status does not show which joint failed.
 fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
     let mut worst: Option<(f64, Joint, String)> = None;
     for i in at.max(1)..samples.len().min(at + 2) {
         let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
-        // After a failure, the times of the samples are arrival times. Samples that arrive together were not measured together, so the
-        // function uses the longest of the last intervals.
+        // After a failure, the times of the samples are arrival times. Samples that arrive together were not measured at the same time.
+        // Therefore the function uses the longest of the last three intervals.
         let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
         for (joint, limits) in Joint::ALL.into_iter().zip(&info.joints) {
             let position = |i: usize| samples[i].joints[joint.index()].position;
@@ -339,7 +342,7 @@ fn start_s(samples: &[Sample], at: usize) -> f64 {
     }
 }
 
-/// Returns the start time of the run that follows from the sample, s.
+/// Computes the start time of the run from one sample, s.
 pub(super) fn began_s(sample: &Sample) -> f64 {
     sample.time_s - f64::from(sample.point) * 1e-3
 }
@@ -391,8 +394,8 @@ impl Words {
     }
 }
 
-/// Returns the problems and the first failed joint. The list begins with the joints, because the errors of the controller are consequences
-/// of joint errors.
+/// Returns the problems and the first failed joint. The problems of the joints are first in the list, because the errors of the controller
+/// are consequences of joint errors.
 fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     let mut all = Vec::new();
     let mut first = None;

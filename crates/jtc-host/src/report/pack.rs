@@ -13,7 +13,7 @@ pub(super) fn fine(values: &[f64]) -> Value {
     json!({ "k": "f32", "d": STANDARD.encode(bytes) })
 }
 
-/// Returns the values as `{"k":"i16","o":offset,"s":scale,"d":base64}` scaled to the range of the values. The number -32768 marks an
+/// Returns the values as `{"k":"i16","o":offset,"s":scale,"d":base64}` scaled to the range of the values. The integer -32768 marks an
 /// unknown value. If all values are equal, returns `{"k":"c","v":value}`; if all values are unknown, returns `null`.
 pub(super) fn coarse(values: &[f64]) -> Value {
     let finite = || values.iter().copied().filter(|v| v.is_finite());

@@ -24,7 +24,7 @@ pub fn html(input: &ReportInput<'_>) -> String {
     });
     let mut page = String::with_capacity(data.len() + 200_000);
     let mut rest = PAGE;
-    // The search for a mark starts after the previous mark, so that inserted text is never searched.
+    // The search for a placeholder starts after the previous placeholder. Inserted text is therefore never searched.
     for (mark, text) in [
         ("{{title}}", title.as_str()),
         ("{{plot_style}}", PLOT_STYLE),
@@ -110,7 +110,7 @@ fn data(input: &ReportInput<'_>) -> Value {
     })
 }
 
-/// Returns times relative to the first sample, because an f32 has a resolution of microseconds only for times of up to a few minutes.
+/// Returns times relative to the first sample. An f32 has a resolution of microseconds only for times up to a few minutes.
 fn relative(times: &[f64]) -> Vec<f64> {
     let start = times.first().copied().unwrap_or(0.0);
     times.iter().map(|t| t - start).collect()

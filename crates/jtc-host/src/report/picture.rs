@@ -9,12 +9,12 @@ const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
 /// Maximum number of points per curve, which is sufficient for the width in pixels.
 const POINTS: usize = 260;
-/// Minimum and maximum number of grid lines of an axis.
+/// Minimum and maximum number of grid lines on an axis.
 const TICKS: (usize, usize) = (3, 12);
 /// Largest magnitude that is drawn. Larger values are considered invalid.
 const DRAWN_MAX: f64 = 1e30;
 
-/// Style with light colours by default, and with dark colours if the reader has selected a dark theme.
+/// Style with light colours by default. If the reader has selected a dark theme, the style uses dark colours.
 const STYLE: &str = "\
 svg{--paper:#fffefb;--ink:#1b1f24;--soft:#5f666f;--grid:#eceae2;--j0:#2559d6;--j1:#dd6412;--j2:#0c8a5b;--j3:#c02c7c;--j4:#7547cf;--j5:#94780a}\
 @media (prefers-color-scheme:dark){svg{--paper:#161a20;--ink:#e9ebee;--soft:#9aa3af;--grid:#262c35;--j0:#7aa5ff;--j1:#ff9d57;--j2:#43d39e;--j3:#ff77b6;--j4:#b79bff;--j5:#e3c84c}}\
@@ -168,7 +168,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     thinned
 }
 
-/// Returns the lowest and the highest value of each bucket, so that a peak of one sample is visible.
+/// Returns the lowest and the highest point of each bucket, so that a peak of a single sample stays visible.
 fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let bucket = points.len().div_ceil(2 * POINTS).max(1);
     let pair = |bucket: &[(f64, f64)]| {
@@ -192,26 +192,26 @@ fn is_drawn(v: f64) -> bool {
     v.abs() < DRAWN_MAX
 }
 
-/// Returns the smallest span of an axis around `v` at which the labels differ.
+/// Returns the smallest span of an axis around `v` for which the labels are different.
 fn margin(v: f64) -> f64 {
     1e-9 * v.abs()
 }
 
-/// Returns the axis for positions from `low` to `high`. The axis range includes a margin, even if the joint does not move.
+/// Returns the axis for positions from `low` to `high`. The range of the axis includes a margin, even if the joint does not move.
 fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     let margin = ((high - low) * 0.08).max(0.02).max(margin(low)).max(margin(high));
     (low - margin, high + margin)
 }
 
-/// Returns the values and labels of the grid lines between `low` and `high`; [`TICKS`] limits their number. About four steps fit into
-/// `share` of the span. For an axis with space for more labels, the caller passes a smaller share.
+/// Returns the values and labels of the grid lines between `low` and `high`. [`TICKS`] limits the number of grid lines. About four steps
+/// fit into the fraction `share` of the axis. If an axis has space for more labels, the caller passes a smaller fraction.
 fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     let rough = share * (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    // A step is 1, 2 or 5 times a power of ten. The function uses the first step that is large enough, or a finer step if there would be
-    // too few lines.
+    // A step is 1, 2 or 5 times a power of ten. The function uses the first step that is large enough. If this step gives too few grid
+    // lines, the function uses a smaller step.
     let power = 10f64.powf(rough.log10().floor());
     let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|m| m * power);
     let enough = steps.iter().rposition(|step| *step >= rough).unwrap_or(0);
@@ -259,7 +259,7 @@ mod tests {
 
     use super::*;
 
-    /// Checks that the labels are different and in ascending order, and that their number is within the limits.
+    /// Checks that the labels are different and in ascending order, and that the number of labels is within the limits.
     fn readable(low: f64, high: f64, share: f64) -> Result<(), TestCaseError> {
         let ticks = ticks(low, high, share);
         prop_assert!((TICKS.0..=TICKS.1).contains(&ticks.len()), "{low}..{high}: {ticks:?}");
@@ -271,7 +271,7 @@ mod tests {
         Ok(())
     }
 
-    /// Returns a magnitude from 1e-30 to 1e29 with either sign, or zero.
+    /// Returns zero, or a number of either sign with a magnitude from 1e-30 to 1e29.
     fn value() -> impl Strategy<Value = f64> {
         let magnitude = (-30.0..29.0f64, any::<bool>());
         prop_oneof![
@@ -312,7 +312,7 @@ mod tests {
             let (low, high) = position_axis((low, high));
             readable(low, high, 1.0).unwrap();
         }
-        // For a usual range, the grid lines are at simple numbers.
+        // For a typical range of values, the grid lines are at simple numbers.
         let words: Vec<String> = ticks(-1.08, 1.08, 1.0).into_iter().map(|tick| tick.1).collect();
         assert_eq!(words, ["−1", "0", "1"]);
         for none in [(f64::NAN, 1.0), (0.0, f64::INFINITY), (1.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN)] {

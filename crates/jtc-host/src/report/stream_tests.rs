@@ -1,4 +1,4 @@
-//! Tests that streamed samples give the same result as all samples together, with bounded memory.
+//! Tests that a report from streamed samples is equal to a report from all samples in memory, and that the memory use is bounded.
 
 use super::curves::{Curve, Joined, POINTS_MAX, Runs};
 use super::*;
@@ -7,7 +7,7 @@ use crate::sample::JointSample;
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use proptest::prelude::*;
 
-/// Returns a random sample, which may have unknown values and errors, and may be inside or outside an execution.
+/// Returns a random sample, inside or outside an execution. The sample may contain unknown values and errors.
 fn any_sample() -> impl Strategy<Value = Sample> {
     let value = || prop_oneof![4 => -10.0..10.0, 1 => Just(f64::NAN), 1 => Just(0.0)];
     let joint = (prop::array::uniform12(value()), any::<bool>()).prop_map(|(v, fault)| JointSample {

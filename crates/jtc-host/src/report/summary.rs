@@ -5,13 +5,13 @@ use serde::Serialize;
 use crate::recording::RecordingInfo;
 use crate::sample::{JointSample, Sample};
 
-/// Values of one joint in the summary. A value is `None` if the source of the samples does not know it.
+/// Values of one joint in the summary. A value is `None` if the source of the samples does not supply the value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointSummary {
     /// Name of the joint as in the arm file.
     pub name: String,
-    /// Root mean square of the position error, mrad. The error is the position that was commanded for the time of a measurement, minus the
-    /// measured position (J-62).
+    /// Root mean square of the position error, mrad. The position error is the position that was commanded for the time of a measurement,
+    /// minus the measured position (J-62).
     pub rms_error_mrad: Option<f64>,
     /// Largest magnitude of the position error, mrad.
     pub max_error_mrad: Option<f64>,
@@ -55,7 +55,7 @@ impl Summary {
     }
 }
 
-/// Summary data of streamed samples. The data are collected both for all samples and for an execution, which may begin later.
+/// Summary data of streamed samples. The samples before an execution and the samples of the execution are summed separately.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
     /// Times of the first and the last recorded sample.

@@ -54,7 +54,7 @@ fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
 #[test]
 fn figures_are_those_of_the_execution() {
     let (info, mut samples) = run(1000);
-    samples[3].joints[0].position = 9.0; // before the execution: not used for the figures
+    samples[3].joints[0].position = 9.0; // This sample is before the execution, so the summary does not use it.
     let summary = Summary::of(&info, &samples);
     let joint = &summary.joints[0];
     assert!((joint.rms_error_mrad.unwrap() - 1.0).abs() < 1e-9);
@@ -177,7 +177,8 @@ fn drives_name_their_own_faults() {
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }
 
-/// The status does not show which joint failed. The report finds the joint with an impossible step, and shows the samples before this step.
+/// The status does not show which joint failed. The report finds the joint with an impossible position step, and shows the samples before
+/// this step.
 #[test]
 fn an_encoder_that_jumps_is_named_by_its_step() {
     let (mut info, mut samples) = run(1000);
@@ -239,8 +240,8 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let summary = Summary::of(&info, &samples);
     for (of_page, of_check) in summary.joints.iter().zip(&planned.verdict.joints) {
         let (speed, torque) = (of_page.peak_velocity_rad_s.unwrap(), of_page.peak_torque_nm.unwrap());
-        // The page uses only the values at the points, and colder bearings than the check before a run. Therefore the values on the page
-        // differ from the values of the check.
+        // The page uses only the values at the trajectory points, and a lower bearing temperature than the check before a run. Therefore
+        // the values on the page differ slightly from the values of the check.
         assert!((speed / of_check.velocity_peak_rad_s - 1.0).abs() < 0.05, "{of_page:?} {of_check:?}");
         let peak = of_check.torque_peak_nm.unwrap();
         assert!((0.95..1.5).contains(&(torque / peak)), "{of_page:?} {of_check:?}");
@@ -255,7 +256,8 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     assert!(of_run.contains("\"plan\":null") && of_run.contains("\"set_acceleration_rad_s2\":null"));
 }
 
-/// The picture stays small and each axis is readable, even if a joint does not move, moves very little, is far from zero or has no values.
+/// For any motion of the joints, the picture is small and its axes are readable. The test includes joints that do not move, move very
+/// little, are far from zero, or have no values.
 #[test]
 fn a_picture_is_small_whatever_the_joints_do() {
     type Lead = fn(f64) -> f64;

@@ -16,11 +16,11 @@ pub(super) struct Watch {
     recent: VecDeque<Sample>,
     /// `true` if a trajectory was executed.
     begun: bool,
-    /// Start time of the run, computed from the last sample in motion. Before a motion, this is the time of the first sample.
+    /// Start time of the run, computed from the last sample in motion. Before a motion, the start time is the time of the first sample.
     start_s: Option<f64>,
     in_motion: bool,
     /// First error before an execution, followed by the first error since the start of the execution. The error before an execution is used
-    /// only without an execution.
+    /// only if there is no execution.
     before: Option<Around>,
     since: Option<Around>,
 }

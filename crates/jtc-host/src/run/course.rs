@@ -11,14 +11,14 @@ use crate::trajectory::Trajectory;
 /// Goal of a run.
 #[derive(Clone, Debug)]
 pub enum Course {
-    /// Along a trajectory.
+    /// Motion along a trajectory.
     Along(Arc<Trajectory>),
-    /// Move from the current position of the arm to a pose.
+    /// Motion from the current position of the arm to a pose.
     To {
         /// Target pose.
         target: Target,
-        /// `true` if the flange moves along a straight line. Otherwise the joints move in proportion to each other, unless another motion
-        /// is faster.
+        /// `true` if the flange moves along a straight line. `false` if the joints move in proportion to each other, or in another motion
+        /// that is faster.
         line: bool,
         /// Torque margin of the move, % of each limit.
         margin_pct: f64,
@@ -35,7 +35,7 @@ pub struct Planned {
 }
 
 impl Course {
-    /// Returns the text for an error that [`Course::planned`] returned.
+    /// Returns the message for an error that [`Course::planned`] returned.
     pub fn message(&self, error: &PlanError) -> String {
         match self {
             Self::Along(_) => error.to_string(),
@@ -43,8 +43,9 @@ impl Course {
         }
     }
 
-    /// Returns the trajectory for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is the speed of an
-    /// existing trajectory, % of its own speed. `move_speed` is the speed of a move, and `option` is the option that sets this speed.
+    /// Returns the trajectory for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is the speed for an
+    /// existing trajectory, % of the speed in this trajectory. `move_speed` is the speed of a move to a pose. `option` is the name of the
+    /// option that sets this speed.
     ///
     /// # Errors
     ///

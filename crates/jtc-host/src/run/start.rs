@@ -1,4 +1,4 @@
-//! Start of a run. The arm does not move before every motion of the run has passed its check (J-55).
+//! Start of a run. The arm moves only after every motion of the run has passed its check (J-55).
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::JOINTS;
 use jtc_wire::Joint;
@@ -24,7 +24,7 @@ pub enum StartError {
     /// A trajectory of the run did not pass the check.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// The arm is not at the first point, which is the only problem, and the order does not allow an approach.
+    /// The only problem is that the arm is not at the first point, and the order does not allow an approach.
     #[error(transparent)]
     Elsewhere(CheckError),
     /// The run needs an approach that is not possible.
@@ -35,7 +35,7 @@ pub enum StartError {
     Open(#[from] OpenPath),
 }
 
-/// The end of a path is too far from the first point of the next run.
+/// The distance between the end of a path and the first point of the next run is too large.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the path ends {distance:.3} rad from where it begins ({joint}), limit {tolerance} rad, so it cannot be repeated; nothing was sent"
@@ -121,7 +121,7 @@ impl Order<'_> {
         }
     }
 
-    /// Checks all runs after the first run, and checks that each run ends at the start of the next run.
+    /// Checks all runs after the first run. Also checks that each run ends at the start of the next run.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {
@@ -129,7 +129,7 @@ impl Order<'_> {
             CheckedTrajectory::check(next, self.arm, &begin, self.options)?;
         }
         let tolerance = self.arm.config_on_device(&self.options.device).start_tolerance_rad;
-        // The end of a later run matters only if there are at least two later runs.
+        // The end of a later run is checked only if another run follows this run.
         let before = [self.trajectory, next];
         for before in before.into_iter().take(if self.runs > 2 { 2 } else { 1 }) {
             let Some(open) = OpenPath::between(before, next, tolerance) else { continue };
@@ -157,7 +157,7 @@ mod tests {
         joint_move(&[0.0; JOINTS], &[0.0, 1.2, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
     }
 
-    /// Order with `runs` runs: the first run is on `trajectory`, and all other runs are on `later`.
+    /// Order of `runs` runs. The first run is on `trajectory`, and all other runs are on `later`.
     struct Course<'a> {
         trajectory: &'a Trajectory,
         later: &'a Trajectory,
@@ -188,7 +188,7 @@ mod tests {
         assert!(!start(&course, [0.0; JOINTS], |_| ()).unwrap().is_approach);
         let without = Course { approach_pct: None, ..course };
         assert!(matches!(start(&without, THERE, |_| ()), Err(StartError::Elsewhere(_))));
-        // The check uses the limits, the payload and the settings of the controller, and finds each kind of problem.
+        // The check finds each kind of problem. The check uses the limits, the payload and the settings of the controller.
         let slow = |config: &mut Config| config.joints[1].velocity_max = 0.3;
         let weak = |config: &mut Config| config.joints[1].torque_max = 90.0;
         let loaded = |config: &mut Config| config.payload.mass = 6.0;
@@ -218,7 +218,7 @@ mod tests {
         }
         let then = Course { later: &outside, ..course };
         assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
-        // An approach would begin at the end of the path. No approach can be planned with a speed of 0 %.
+        // The second run needs an approach from the end of the path. With a speed of 0 %, this approach cannot be planned.
         let none = Course { approach_pct: Some(0.0), ..course };
         assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
     }
@@ -232,14 +232,14 @@ mod tests {
         let StartError::Open(open) = &error else { panic!("{error}") };
         assert!(open.joint.number() == 2 && (open.distance - 1.2).abs() < 1e-3, "{error}");
         assert_eq!(error.diagnosis().code, "open-path");
-        // The end of the second run matters only if there is a third run.
+        // The end of the second run is checked only if there is a third run.
         let there = motion.points.last().unwrap().position;
         let back = joint_move(&there, &[0.0; JOINTS], &Config::avena(), 30.0).unwrap();
         let and_back = |runs| Course { trajectory: &motion, later: &back, runs, approach_pct: None };
         let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
         assert!(twice.is_ok(), "{twice:?}");
         assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
-        // The function first reports a problem that an approach cannot solve.
+        // If an approach cannot solve a problem, the function reports this problem first.
         assert!(matches!(start(&course(2), THERE, |_| ()), Err(StartError::Open(_))));
         assert!(matches!(start(&course(1), THERE, |_| ()), Err(StartError::Elsewhere(_))));
     }

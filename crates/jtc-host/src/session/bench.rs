@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Returns the position that the model uses for each joint that is marked as absent, rad. `None` for the other joints.
+    /// Returns the position that the model uses for each joint that is marked as absent, rad. The position of a present joint is `None`.
     ///
     /// # Errors
     ///
@@ -18,9 +18,8 @@ impl<P: Port> Session<P> {
         Ok(std::array::from_fn(|j| config.absent[j].then_some(config.absent_position[j])))
     }
 
-    /// Marks the joints that have a position (rad) as absent, and all other joints as present. The controller must be in
-    /// Init or Error. While a joint is absent, the controller executes no motion, and an answer from that joint's drive is
-    /// an error.
+    /// Marks each joint with a position (rad) in `absent` as absent, and all other joints as present. The controller must be in Init or
+    /// Error. While a joint is marked as absent, the controller executes no motion. An answer from the drive of this joint is an error.
     ///
     /// # Errors
     ///

@@ -9,8 +9,7 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{labels, sample};
 
-/// Movement within [`WATCHED`] below which the arm is at rest, rad. At the slowest jog, the arm moves twice this
-/// distance.
+/// Maximum movement during [`WATCHED`] of an arm that is considered at rest, rad. At the slowest jog, the arm moves twice this distance.
 const STILL: f64 = 1.2e-3;
 /// Time for which the arm is observed. A slow jog does not appear in any field of the status.
 const WATCHED: Duration = Duration::from_millis(250);
@@ -20,8 +19,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Moving`] if the arm moves, [`StateError::NotMeasured`] if the position of a joint is unknown; the
-    /// errors of [`Session::next_status`].
+    /// Returns [`StateError::Moving`] if the arm moves. Returns [`StateError::NotMeasured`] if the position of a joint is unknown. Also
+    /// returns the errors of [`Session::next_status`].
     pub fn standing(&mut self) -> Result<Status, Error> {
         let begin = self.fresh_status()?;
         let (start, mut now) = (self.now(), begin);
@@ -37,8 +36,7 @@ impl<P: Port> Session<P> {
 
 fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
     let moving = |what: String| Err(StateError::Moving { what });
-    // This comparison also detects the beginning, a reversal and the end of a motion, at which the speed is zero for a
-    // moment.
+    // The execution state also shows a motion at its beginning, at a reversal and at its end. At these times, the speed is zero.
     if now.is_executing() {
         return moving("the arm is on the path of a trajectory".into());
     }
@@ -68,7 +66,7 @@ mod tests {
 
     use super::*;
 
-    /// A slow jog does not appear in any field of the status, but the positions differ.
+    /// A slow jog does not appear in any field of one status, but the positions of two statuses differ.
     #[test]
     fn an_arm_that_is_jogged_slowly_does_not_stand() {
         let at = |q: f32| {

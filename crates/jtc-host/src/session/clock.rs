@@ -6,13 +6,13 @@ use jtc_wire::Status;
 
 /// Maximum transmission delay of a status that the clock assumes, s.
 const DELAY_S: f64 = 0.1;
-/// Minimum difference between the times of two statuses, s. Statuses that a slow computer reads together therefore get
+/// Minimum difference between the times of two statuses, s. With this difference, statuses that a slow computer reads together have
 /// different times.
 const APART_S: f64 = 1e-6;
 
-/// Clock for statuses. While the controller moves along the path, the clock uses the millisecond count of the controller,
-/// which have no transmission jitter. Otherwise the clock uses the time of arrival of the status. At a reduced speed the
-/// path time runs slower (J-57), so the clock is limited to 0.1 s around the time of arrival.
+/// Clock for statuses. While the arm moves along the path, the clock uses the millisecond count of the controller, which has no
+/// transmission jitter. At all other times, the clock uses the arrival time of the status. At a reduced speed the path time runs slower
+/// (J-57). Therefore the time of the clock differs from the arrival time by at most 0.1 s.
 pub struct StatusClock {
     start: Duration,
     arrived: Duration,
@@ -64,15 +64,15 @@ mod tests {
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);
-        // Several statuses are read at once. The arm is at a standstill, or the controller is ahead of the host's time.
-        // All times must differ, because a recording merges samples with equal times.
+        // Several statuses are read at once, from an arm at rest or from a controller that is ahead of the host's time. All times must be
+        // different, because a recording merges samples with equal times.
         let at_once = times(&[(40, 40), (200, 40), (200, 40), (200, 400), (200, 440), (200, 440)]);
         assert!(at_once.is_sorted_by(|a, b| a < b), "{at_once:?}");
     }
 
     proptest! {
-        /// The input is random. Statuses may be missing, and the point index may jump, for example because another
-        /// trajectory begins.
+        /// For random statuses, the times increase and stay within 0.1 s of the arrival times. Statuses may be missing, and the point index
+        /// may jump, for example because another trajectory begins.
         #[test]
         fn time_goes_on_and_is_that_of_arrival_to_a_tenth_of_a_second(
             begins_at in any::<u32>(),

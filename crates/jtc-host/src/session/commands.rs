@@ -12,7 +12,7 @@ use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::labels;
 use crate::port::Port;
 
-/// Maximum time for which a controller delays teaching until the arm is at rest with position hold, plus a reserve.
+/// Maximum delay of teaching until the arm is at rest and in position hold, plus a reserve.
 const TEACHING: Duration = Duration::from_secs(11);
 
 /// Parameter that a controller needs.
@@ -51,13 +51,13 @@ impl Parameter {
 }
 
 impl<P: Port> Session<P> {
-    /// Marks the start of a motion request. Call this before each motion if the session is used for several motions. On a
-    /// shared line, a request is rejected if it was made before another client's Stop. The time of a request is the time
-    /// of the last call of this function, or, without a call, the start of the session.
+    /// Marks the start of a motion request. If a session is used for several motions, the caller must call this function before each
+    /// motion. A shared line rejects requests that are older than another client's Stop. The time of a request is the time of the last call
+    /// of this function. If the function was never called, the time of a request is the start of the session.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Port`] if the port fails.
+    /// Returns [`LinkError::Port`] if the port fails.
     pub fn ask_to_move(&mut self) -> Result<(), LinkError> {
         Ok(self.port.ask_to_move()?)
     }
@@ -66,8 +66,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if the controller rejects the command in its current state; [`LinkError::NotConfirmed`],
-    /// [`LinkError::NoLink`] and [`LinkError::Port`] for errors of the line.
+    /// Returns [`LinkError::Refused`] if the controller rejects the command in its current state. Returns [`LinkError::NotConfirmed`],
+    /// [`LinkError::NoLink`] and [`LinkError::Port`] for communication errors.
     pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), LinkError> {
         self.command(&fixed::clear_current_errors(jtc, nodes))
     }
@@ -114,13 +114,13 @@ impl<P: Port> Session<P> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
-    /// Switches teaching on (only in HoldPos) or off. Teaching begins when the arm is at rest and the controller holds
-    /// it. This function waits until teaching begins.
+    /// Switches teaching on (only in HoldPos) or off. Teaching begins when the arm is at rest and the controller holds the arm. This
+    /// function waits until teaching begins.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::clear`]; [`StateError::Timeout`] if teaching does not begin because the arm does
-    /// not come to rest; [`StateError::Device`] if the controller reports an error instead.
+    /// Returns the errors of [`Session::clear`]. Returns [`StateError::Timeout`] if teaching does not begin because the arm does not come
+    /// to rest. Returns [`StateError::Device`] if the controller reports an error.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
         if on {
             return self.teach_until(|| false);
@@ -128,7 +128,7 @@ impl<P: Port> Session<P> {
         Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?)
     }
 
-    /// Ends teaching, even if another client has switched it on.
+    /// Ends teaching, even if another client has switched teaching on.
     ///
     /// # Errors
     ///
@@ -141,20 +141,19 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches teaching on and waits until it begins. If teaching does not begin in time, or `ended` returns `true`,
-    /// switches teaching off again. Otherwise the arm would become compliant as soon as it is at rest, at a time when
-    /// the operator no longer expects this.
+    /// Switches teaching on and waits until it begins. If teaching does not begin in time, or if `ended` returns `true`, the function
+    /// switches teaching off again. If teaching began later, the arm would become compliant when the operator no longer expects this.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::teach`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::teach`], and [`Error::Cancelled`] if the caller cancels.
     pub fn teach_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         self.introduce()?;
         self.read_host_timeout()?;
         self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
-            // The controller has rejected the request, or another client has switched teaching on. So this function does
-            // not switch teaching off.
+            // The controller has rejected the request, or another client has switched teaching on. Therefore this function does not switch
+            // teaching off.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),
             Ok(()) => {
@@ -165,8 +164,8 @@ impl<P: Port> Session<P> {
             }
         };
         if begun.is_err() {
-            // The caller gets the first error. The result of this command is ignored, because the controller accepts
-            // the command in every state.
+            // The caller receives the first error. The result of switching teaching off is ignored, because the controller accepts this
+            // command in every state.
             let _ = self.teach(false);
         }
         begun
@@ -189,8 +188,8 @@ impl<P: Port> Session<P> {
         self.command(&fixed::gripper_control(pump))
     }
 
-    /// Commands the controller to use its default for one parameter (J-54). The default is the value of the stored arm,
-    /// or, without a stored arm, the built-in value.
+    /// Commands the controller to use its default for one parameter (J-54). The default is the value of the stored arm. If no arm is
+    /// stored, the default is the built-in value.
     ///
     /// # Errors
     ///
@@ -199,8 +198,7 @@ impl<P: Port> Session<P> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
-    /// Commands the controller to use its defaults for the friction polynomial, the gains and the arm model, as
-    /// [`use_default`](Self::use_default) does for one parameter.
+    /// Like [`use_default`](Self::use_default), for the friction polynomial, the gains and the arm model together.
     ///
     /// # Errors
     ///
@@ -211,15 +209,15 @@ impl<P: Port> Session<P> {
             .try_for_each(|p| self.use_default(p))
     }
 
-    /// Starts the trajectory that was just uploaded, from its first point. After a pause, the trajectory continues at the
-    /// paused point. **The arm moves.**
+    /// Starts the trajectory that was just uploaded, from its first point. If the trajectory is paused, it continues at the point of the
+    /// pause. **The arm moves.**
     ///
     /// # Errors
     ///
-    /// [`MotionError::NotUploaded`], before anything is sent, if this session did not upload exactly this trajectory, or if
-    /// the controller no longer has it. [`LinkError::Refused`] if the controller does not start the trajectory because the
-    /// arm is not at the first point (J-34) or not in position hold. [`MotionError::LinkLost`] if no confirmation arrived.
-    /// In this case the arm may be moving.
+    /// Returns [`MotionError::NotUploaded`], before a frame is sent, if this session did not upload exactly this trajectory, or if the
+    /// controller no longer has the trajectory. Returns [`LinkError::Refused`] if the controller does not start the trajectory because the
+    /// arm is not at the first point (J-34) or not in position hold. Returns [`MotionError::LinkLost`] if no confirmation arrived; the arm
+    /// may then be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
         if self.uploaded.as_ref().map(CheckedTrajectory::number) != Some(checked.number()) {
@@ -233,15 +231,15 @@ impl<P: Port> Session<P> {
         self.exec(ExecCommand::Execute, Status::is_executing)
     }
 
-    /// Resumes after a pause. If settings or payload have changed since the check of a trajectory that this session
-    /// uploaded, checks the remainder again. This session cannot check the trajectory of another client.
+    /// Resumes after a pause. Checks the remainder of the trajectory again if settings or payload have changed since the first check. The
+    /// session can check only a trajectory that it uploaded itself.
     ///
     /// # Errors
     ///
-    /// [`MotionError::RestRefused`], before anything is sent, if the remainder no longer passes the check.
-    /// [`StateError::HeldStop`], before anything is sent, while the cause of a held stop is not cleared.
-    /// [`MotionError::NotPaused`], before anything is sent, if no motion is paused. [`LinkError::Refused`] if the arm was
-    /// moved after the pause. [`MotionError::LinkLost`] if no confirmation arrived.
+    /// Returns [`MotionError::RestRefused`], before Execute is sent, if the remainder of the trajectory no longer passes the check. Returns
+    /// [`StateError::HeldStop`], before Execute is sent, while the cause of a held stop is not cleared. Returns [`MotionError::NotPaused`],
+    /// before a frame is sent, if no motion is paused. Returns [`LinkError::Refused`] if the arm was moved after the pause. Returns
+    /// [`MotionError::LinkLost`] if no confirmation arrived.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.port.ask_to_resume().map_err(LinkError::Port)?;
         let status = self.fresh_status()?;
@@ -264,8 +262,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if no motion is in progress; [`MotionError::LinkLost`] if no confirmation arrived. In this
-    /// case the arm may be moving.
+    /// Returns [`LinkError::Refused`] if no motion is in progress. Returns [`MotionError::LinkLost`] if no confirmation arrived; the arm
+    /// may then be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
@@ -274,17 +272,16 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if no motion can be stopped; [`MotionError::LinkLost`] if no confirmation arrived. In this
-    /// case the arm may be moving.
+    /// Returns [`LinkError::Refused`] if no motion can be stopped. Returns [`MotionError::LinkLost`] if no confirmation arrived; the arm
+    /// may then be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
-    /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because in this
-    /// case the arm may be moving.
+    /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because the arm may then be moving.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
-        // No other frame is sent before a Stop or a Pause.
+        // The session sends no other frame before a Stop or a Pause.
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;
@@ -300,15 +297,15 @@ impl<P: Port> Session<P> {
             Err(error) => return Err(self.link_lost(error, command == ExecCommand::Stop)),
         };
         if stopping && record.data == DataStatus::IncorrectValue {
-            // Without a preceding extension request, the controller reports a general code (J-51). The controller rejects a
-            // Stop or a Pause only because of its state.
+            // Without an earlier extension request, the controller reports only a general code (J-51). The controller's state is the only
+            // reason why it rejects a Stop or a Pause.
             record.data = DataStatus::NotAllowed;
         }
         if accepted(&record) {
             return Ok(());
         }
-        // The confirmation of the first transmission was lost, so the command was sent again. The controller rejects the
-        // repetition, because the first command has already taken effect.
+        // The confirmation of the first transmission was lost, so the command was sent again. The controller rejects the repeated command,
+        // because the first command has already taken effect.
         if not_allowed(&record) && self.statistics.retries > retries && self.last.is_some_and(|s| reached(&s))
         {
             return Ok(());
@@ -329,8 +326,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop is
-    /// not cleared, [`StateError::Timeout`] if the controller is not in HoldPos within `timeout`; the errors of
+    /// Returns [`StateError::Device`] if the controller reports errors. Returns [`StateError::HeldStop`] while the cause of a held stop is
+    /// not cleared. Returns [`StateError::Timeout`] if the controller is not in HoldPos within `timeout`. Also returns the errors of
     /// [`Session::next_status`].
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| {
@@ -339,15 +336,15 @@ impl<P: Port> Session<P> {
         self.without_error(status)
     }
 
-    /// Waits until the controller holds the arm in HoldPos with all drives enabled. Drives of joints that are marked as
-    /// absent do not count. Returns an error at once if the controller reports errors. The positions in the returned
-    /// status are measured. A trajectory starts at these positions.
+    /// Waits until the controller holds the arm in HoldPos with all drives enabled. Drives of joints that are marked as absent need not be
+    /// enabled. Returns an error at once if the controller reports errors. The positions in the returned status are measured. A trajectory
+    /// starts at these positions.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop is
-    /// not cleared, [`StateError::Timeout`] if the arm is not held within `timeout`, for example because parameters are
-    /// missing; the errors of [`Session::next_status`].
+    /// Returns [`StateError::Device`] if the controller reports errors. Returns [`StateError::HeldStop`] while the cause of a held stop is
+    /// not cleared. Returns [`StateError::Timeout`] if the arm is not held within `timeout`, for example because parameters are missing.
+    /// Also returns the errors of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
         self.wait_ready_until(timeout, || false)
     }
@@ -356,7 +353,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::wait_ready`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::wait_ready`], and [`Error::Cancelled`] if the caller cancels.
     pub fn wait_ready_until(&mut self, timeout: Duration, ended: impl Fn() -> bool) -> Result<Status, Error> {
         let ready = |s: &Status| s.state == ControllerState::HoldPos && labels::is_held(s);
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {

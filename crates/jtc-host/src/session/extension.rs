@@ -15,13 +15,13 @@ use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError, StateError};
 use crate::port::Port;
 
-/// Age of the last extension request above which the session sends a new request. A device reports specific reasons for
-/// rejections only to a host that has sent an extension request within the last 2 s (J-51).
+/// Maximum age of the last extension request. If this request is older, the session sends a new request. A device reports specific reasons
+/// for rejections only to a host that has sent an extension request within the last 2 s (J-51).
 pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Maximum time that a device needs to store an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);
 
-/// Knowledge of the session about the extensions of the device.
+/// State of the session's knowledge about the extensions of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Extensions {
     /// The session has not sent an extension request yet.
@@ -35,11 +35,11 @@ pub(super) enum Extensions {
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the identity of the device. `None` if the device has no extensions.
+    /// Returns the identity of the device. Returns `None` if the device has no extensions.
     ///
     /// # Errors
     ///
-    /// Returns the errors of the line.
+    /// Returns communication errors.
     pub fn info(&mut self) -> Result<Option<Info>, LinkError> {
         let info = self.ask(&fixed::GET_INFO, |answer| match answer {
             Answer::Info(info) => Some(info),
@@ -52,14 +52,13 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the report of the device about its reactions to detected problems (J-69). `None` if the device has no
-    /// such report or does not answer.
+    /// Returns the device's report about its reactions to detected problems (J-69). Returns `None` if the device has no such report or does
+    /// not answer.
     pub fn reactions(&mut self) -> Option<Reactions> {
         self.info().ok().flatten()?.reactions
     }
 
-    /// Returns the cause of the last held stop of the device (J-69). `None` if the device has no such report or does
-    /// not answer.
+    /// Returns the cause of the device's last held stop (J-69). Returns `None` if the device does not report the cause or does not answer.
     pub fn stop_cause(&mut self) -> Option<StopCause> {
         self.reactions()?.stop.map(|(cause, _)| cause)
     }
@@ -72,8 +71,8 @@ impl<P: Port> Session<P> {
         Err(StateError::HeldStop { status: Box::new(*status), cause: self.stop_cause() }.into())
     }
 
-    /// Requests the identity of the device if the last extension request is more than 1 s old. The device then reports
-    /// specific reasons for rejections (J-51).
+    /// Requests the identity of the device if the last extension request is more than 1 s old. After a GetInfo, the device reports specific
+    /// reasons for rejections (J-51).
     pub(super) fn introduce(&mut self) -> Result<(), LinkError> {
         let due = match self.extensions {
             Extensions::Unknown => true,
@@ -84,7 +83,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.info() {
-            // Statuses still arrive, so the command that follows may succeed.
+            // The error is ignored. Statuses still arrive, so the next command may succeed.
             Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
@@ -128,7 +127,7 @@ impl<P: Port> Session<P> {
         for _ in 0..self.timeouts.tries {
             self.answers.clear();
             self.extension(frame)?;
-            // The answer arrives after the record.
+            // The answer arrives after the record of the request.
             let mut limit = Limit::new(self.confirmation_time(jtc_wire::ANSWER_MAX));
             loop {
                 while let Some(bytes) = self.answers.pop_front() {
@@ -146,8 +145,8 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request, tries: self.timeouts.tries, last: None })
     }
 
-    /// Requests data that are longer than a frame, page by page. `request` builds the request for the page that begins at
-    /// an index. `take` returns this page and the total length.
+    /// Requests data that are longer than a frame, page by page. `request` creates the request for the page that begins at an index. `take`
+    /// returns the page and the total length of the data.
     fn ask_pages<T, const N: usize>(
         &mut self,
         request: impl Fn(u16) -> [u8; N],
@@ -165,7 +164,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the identity of the device. The caller needs it for `request`.
+    /// Returns the identity of the device. If the device has no extensions, the error contains `request`.
     fn info_for(&mut self, request: FrameType) -> Result<Info, LinkError> {
         self.info()?.ok_or(LinkError::NoExtension { request })
     }
@@ -174,7 +173,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoExtension`], and the errors of the line.
+    /// Returns [`LinkError::NoExtension`] if the device has no extensions. Also returns communication errors.
     pub fn settings(&mut self) -> Result<Vec<SettingValue>, LinkError> {
         self.ask_pages(fixed::get_settings, |answer, from| match answer {
             Answer::Settings { first, total, values } if first == from => {
@@ -188,7 +187,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of the line, and [`ExtensionError::NoArm`] if the settings are not a valid arm.
+    /// Returns communication errors. Returns [`ExtensionError::NoArm`] if the settings are not a valid arm.
     pub fn device_config(&mut self) -> Result<Config, Error> {
         if !self.has_extensions() && self.info()?.is_none() {
             return Ok(Config::avena());
@@ -210,12 +209,12 @@ impl<P: Port> Session<P> {
         Ok(Arm::from_image(&image).map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
     }
 
-    /// Changes settings. The device changes either all of these settings or none.
+    /// Changes settings. The device accepts either all of these settings or none of them.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if a value is out of range, or if the device does not permit changes in its state;
-    /// [`LinkError::NoExtension`], and the errors of the line.
+    /// Returns [`LinkError::Refused`] if a value is out of range, or if the device does not permit changes in its state. Returns
+    /// [`LinkError::NoExtension`] if the device has no extensions. Also returns communication errors.
     pub fn set_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
         let mut frame = vec![0; 6 + jtc_wire::VALUE_LEN * values.len().min(SET_VALUES_MAX)];
         let n = set_settings(&mut frame, values.iter().copied())?;
@@ -234,7 +233,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of the line.
+    /// Returns communication errors.
     pub fn speed(&mut self) -> Result<f64, LinkError> {
         let config = Config::avena();
         let first = settings::values(&config, 0, false)
@@ -252,7 +251,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sets the speed override, from 0.05 to 1. A running motion changes its speed along a ramp. Later motions also use the
+    /// Sets the speed override, from 0.05 to 1. A running motion changes its speed along a ramp. Later motions also use the new speed
     /// override (J-57).
     ///
     /// # Errors
@@ -271,11 +270,11 @@ impl<P: Port> Session<P> {
         self.extension(&fixed::set_name(name))
     }
 
-    /// Returns the active arm as a whole, in the form of a [`jtc_wire::ArmImage`].
+    /// Returns the complete active arm as a [`jtc_wire::ArmImage`].
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Changed`] if the arm changed while it was read; the errors of [`Session::settings`].
+    /// Returns [`ExtensionError::Changed`] if the arm changed while it was read. Also returns the errors of [`Session::settings`].
     pub fn arm_image(&mut self) -> Result<Vec<u8>, Error> {
         let info = self.info_for(FrameType::GetArm)?;
         let image = self.ask_pages(fixed::get_arm, |answer, from| match answer {
@@ -295,7 +294,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::NotStored`] if the memory failed; the errors of [`Session::set_settings`].
+    /// Returns [`ExtensionError::NotStored`] if the memory failed. Also returns the errors of [`Session::set_settings`].
     pub fn store_arm(&mut self) -> Result<u32, Error> {
         self.extension(&fixed::STORE_ARM)?;
         let end = self.port.now() + STORING;
@@ -314,12 +313,12 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches the torque off and returns to Init. The arm must be at rest. Afterwards the parameters must be sent again
-    /// (J-53).
+    /// Switches the torque off and returns to Init. The arm must be at rest. The parameters must then be sent again (J-53).
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if the arm is not held at rest; [`LinkError::NoExtension`], and the errors of the line.
+    /// Returns [`LinkError::Refused`] if the arm is not held at rest. Returns [`LinkError::NoExtension`] if the device has no extensions.
+    /// Also returns communication errors.
     pub fn disable(&mut self) -> Result<(), LinkError> {
         self.extension(&fixed::DISABLE)
     }
@@ -329,15 +328,15 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] outside HoldPos, while a trajectory is paused, or if a velocity exceeds its limit;
-    /// [`LinkError::NoExtension`], and the errors of the line.
+    /// Returns [`LinkError::Refused`] if the controller is not in HoldPos, if a trajectory is paused, or if a velocity exceeds its limit.
+    /// Returns [`LinkError::NoExtension`] if the device has no extensions. Also returns communication errors.
     pub fn jog(&mut self, velocity: &[f64; JOINTS]) -> Result<(), Error> {
         let mut frame = [0; 30];
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
         let halts = self.port.halts();
         match self.extension(&frame) {
-            // Another program's Stop has overtaken the frame (J-04). If the frame is sent again, the port blocks it, and
-            // the error of the port names the program that stopped the arm.
+            // A Stop of another program was executed before this frame (J-04). The session sends the frame again only to get the reason.
+            // The port blocks the frame, and the error of the port contains the program that stopped the arm.
             Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
             done => Ok(done?),
         }

@@ -1,4 +1,4 @@
-//! Functions that follow an execution to its end.
+//! Functions that follow the execution of a trajectory to its end.
 
 use std::time::Duration;
 
@@ -21,9 +21,9 @@ pub enum Flow {
     Resume,
     /// Set the speed on the path (%), if the device supports it.
     Speed(u8),
-    /// Stop the motion and follow it until the arm is at rest.
+    /// Stop the motion, and follow the motion until the arm is at rest.
     Stop,
-    /// Return at once. No Stop is sent: the motion continues, and this session no longer follows it.
+    /// Return from the function at once. The session sends no Stop, so the motion continues, but the session no longer follows the motion.
     Cancel,
 }
 
@@ -42,20 +42,20 @@ const SETTLE: Duration = Duration::from_millis(300);
 impl<P: Port> Session<P> {
     /// Follows the execution that was just started. The callback `each` receives every status.
     ///
-    /// If the link is lost during the motion, sends a Stop, because the controller may still receive frames. The error
-    /// states that the arm may be moving.
+    /// If the link is lost during the motion, the function sends a Stop, because the controller may still receive frames. The returned
+    /// error states that the arm may be moving.
     ///
     /// # Errors
     ///
-    /// [`MotionError::RunFault`] if the controller ended the motion with an error, [`MotionError::HeldStop`] if it stopped
-    /// the motion and holds the arm, [`Error::Cancelled`] if `each` returned [`Flow::Cancel`], [`MotionError::LinkLost`] if
-    /// data no longer arrive. In this case the arm may be moving.
+    /// Returns [`MotionError::RunFault`] if the controller ended the motion with an error. Returns [`MotionError::HeldStop`] if the
+    /// controller stopped the motion and holds the arm. Returns [`Error::Cancelled`] if `each` returned [`Flow::Cancel`]. Returns
+    /// [`MotionError::LinkLost`] if data no longer arrive; the arm may then be moving.
     pub fn follow(&mut self, each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         self.follow_with(each, |_, _| {})
     }
 
-    /// Like [`Session::follow`]. Calls `done` with each action that `each` requested, and with its result. If a speed or a
-    /// resume is rejected, the motion is followed further.
+    /// Like [`Session::follow`]. Calls `done` with each action that `each` requested, and with its result. If the controller rejects a new
+    /// speed or a resume, the session continues to follow the motion.
     ///
     /// # Errors
     ///
@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
                 (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
-                // The trajectory was deleted, or nodes are no longer in operation.
+                // The controller has deleted the trajectory, or has returned to Start or Init.
                 (Some(TrajectoryState::Null), _)
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>
@@ -104,8 +104,7 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
-            // After a Stop was requested, the motion must not continue, even if the user presses a key or another client
-            // pauses it.
+            // After a requested Stop, the motion must not continue, even if the user presses a key or another client pauses the motion.
             let again = stopping && status.trajectory == TrajectoryState::Pause;
             let flow = match flow {
                 _ if again => Flow::Stop,
@@ -129,7 +128,8 @@ impl<P: Port> Session<P> {
             done(flow, &did);
             match (flow, did) {
                 (_, Ok(())) => {}
-                // The motion continues unchanged or stays paused, so the session continues to follow it.
+                // After a rejected resume or speed, the motion continues unchanged or stays paused. Therefore the session continues to
+                // follow the motion.
                 (
                     Flow::Resume,
                     Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }))),
@@ -156,14 +156,13 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the occurred errors of the joints. The result includes errors to which the controller reacts by itself
-/// (J-66).
+/// Returns the occurred errors of the joints. These errors include errors to which the controller itself reacts (J-66).
 fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// Ignores two errors that are not failures. Either a pause or stop was rejected because the motion has just ended, or
-/// a pause was sent at the same time as the Stop of another program.
+/// Ignores two errors of a Pause or Stop that are not failures. The controller may reject the command because the motion is already paused
+/// or has just ended. The port may block a Pause because another program has just sent a Stop.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
         Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),

@@ -15,12 +15,12 @@ pub const JOG_AGAIN: Duration = Duration::from_millis(50);
 const REST: Duration = Duration::from_secs(3);
 
 impl<P: Port> Session<P> {
-    /// Waits until joints may be jogged. A controller that has just begun to carry the load of a joint rejects jogging
-    /// for a short time. If the controller rejects jogging for another reason, returns an error at once.
+    /// Waits until joints may be jogged. For a short time after the controller begins to carry the load of a joint, it rejects jogging. If
+    /// the controller rejects jogging for another reason, returns an error at once.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] while the cause of a held stop is not cleared; the errors of [`Session::jog`].
+    /// Returns [`StateError::HeldStop`] while the cause of a held stop is not cleared. Also returns the errors of [`Session::jog`].
     pub fn settle_for_jog(&mut self) -> Result<(), Error> {
         self.settle_for_jog_until(|| false)
     }
@@ -29,7 +29,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::jog`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::jog`], and [`Error::Cancelled`] if the caller cancels.
     pub fn settle_for_jog_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         let end = self.now() + REST;
         loop {
@@ -78,10 +78,10 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] if the controller has switched the torque off, [`StateError::HeldStop`] if it is in a held
-    /// stop; the errors of the line.
+    /// Returns [`StateError::Device`] if the controller has switched the torque off. Returns [`StateError::HeldStop`] if the controller is
+    /// in a held stop. Also returns communication errors.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
-        // If the controller rejects this frame, no joint is being jogged.
+        // A rejection is ignored, because the controller rejects this frame only if no joint is being jogged.
         match self.jog(&[0.0; JOINTS]) {
             Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
             Err(error) => return Err(error),
@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
             standstill.see(self.now(), &status);
             let late = self.now() > end;
             if late || standstill.is_reached() {
-                // The controller may still be lowering a load after this time. The controller is then in a held stop.
+                // A controller that is still lowering a load after this time is in a held stop.
                 self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {
@@ -111,7 +111,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Port`] if the port fails.
+    /// Returns [`LinkError::Port`] if the port fails.
     pub fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
         let end = self.now() + time;
         while self.now() < end {

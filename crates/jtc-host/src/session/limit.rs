@@ -1,12 +1,12 @@
-//! Timeout for an answer of the controller; a busy host computer does not end it early.
+//! Timeout for an answer of the controller. If the host computer is busy, the timeout is extended.
 
 use std::time::Duration;
 
 /// Maximum duration of a single wait.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Remaining time for an answer. If a wait takes longer than planned, only the planned length is subtracted. If the
-/// computer wakes this program late, it may also have delayed the answer or the simulator that sends the answer.
+/// Remaining time for an answer. If a wait takes longer than planned, only the planned time is subtracted. A computer that wakes this
+/// program late may also have delayed the answer, or the simulator that sends the answer.
 #[derive(Debug)]
 pub(super) struct Limit {
     left: Duration,
@@ -18,7 +18,7 @@ impl Limit {
         Self { left: time }
     }
 
-    /// Returns the length of the next wait. `None` if no time is left.
+    /// Returns the length of the next wait. Returns `None` if no time is left.
     pub(super) fn next_wait(&self) -> Option<Duration> {
         (!self.left.is_zero()).then(|| self.left.min(STEP))
     }

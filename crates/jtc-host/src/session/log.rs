@@ -13,7 +13,7 @@ use crate::port::Port;
 pub struct LogStatus {
     /// Activity of the recorder, or the reason why it has stopped.
     pub state: LogState,
-    /// Number of the newest block plus 1.
+    /// Number of the newest block of the log, plus 1.
     pub end: u32,
 }
 
@@ -32,12 +32,13 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoExtension`]; [`LinkError::Refused`] if the device has no recorder; the errors of the line.
+    /// Returns [`LinkError::NoExtension`] if the device has no extensions. Returns [`LinkError::Refused`] if the device has no recorder.
+    /// Also returns communication errors.
     pub fn log_status(&mut self) -> Result<LogStatus, LinkError> {
         self.log_page(LOG_NO_BLOCK, 0).map(|page| page.status)
     }
 
-    /// Deletes the log. Starts a new log in the recorder.
+    /// Deletes the log of the device, and starts a new log.
     ///
     /// # Errors
     ///
@@ -60,9 +61,9 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// Reads the complete log, the active arm, and the points of the trajectory that the log needs. The recorder pauses
-    /// during the transfer. The arm may move during the transfer. Calls `done` after each part with the number of bytes
-    /// received and the total number of bytes.
+    /// Reads the complete log, the active arm, and the trajectory points that a replay of the log needs. The recorder pauses during the
+    /// transfer. The arm may move during the transfer. Calls `done` after each part with the number of bytes received and the total number
+    /// of bytes.
     ///
     /// # Errors
     ///
@@ -75,7 +76,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::fetch_log`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::fetch_log`], and [`Error::Cancelled`] if the caller cancels.
     pub fn fetch_log_until(
         &mut self,
         ended: impl Fn() -> bool,
@@ -94,8 +95,8 @@ impl<P: Port> Session<P> {
             let page = self.log_page(block, offset as u16)?;
             (log.state, log.points_hash) = (page.status.state, page.points_hash);
             if page.block != block || first.is_none() || usize::from(page.offset) != offset {
-                // The page belongs to the oldest block, or to the first block of a log that was cleared and started
-                // again.
+                // If the requested block no longer exists, for example because the log was cleared, the device sends its oldest block. The
+                // download then starts again at this block.
                 bytes.clear();
                 first = Some(page.block);
             }
@@ -119,8 +120,8 @@ impl<P: Port> Session<P> {
         Ok(log)
     }
 
-    /// Returns points of the trajectory in the device's memory. Returns `count` points from index `first` on, or fewer
-    /// if the trajectory ends before.
+    /// Returns points of the trajectory in the device's memory. The points begin at index `first`. The function returns `count` points, or
+    /// fewer points if the trajectory ends earlier.
     fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
         let mut all = Vec::new();
         while all.len() < count {

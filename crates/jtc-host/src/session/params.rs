@@ -11,11 +11,10 @@ use crate::error::{Error, LinkError, ParametersError, StateError};
 use crate::frame;
 use crate::port::Port;
 
-/// Time for which new gains are on trial while torque is on (J-71), plus the time until the controller has reported the
-/// result.
+/// Duration of the trial of new gains while torque is on (J-71), plus the time until the controller has reported the result.
 const TRIAL: Duration = Duration::from_millis(2_500);
 
-/// Parameter that the controller has confirmed.
+/// Transfer of one parameter that the controller has confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PushReport {
     /// Parameter.
@@ -31,15 +30,15 @@ pub struct PushReport {
 impl<P: Port> Session<P> {
     /// Checks `set`, and then sends the parameters in `set`. Calls `done` after each parameter.
     ///
-    /// If gains are set while the arm is held, they are on trial for two seconds. If the arm is not stable with the new
-    /// gains, the controller restores the old gains and goes into a held stop of the kind [`jtc_wire::StopKind::Gains`]
-    /// (J-71). [`Session::await_trial`] waits for the result.
+    /// New gains that are set while the controller holds the arm are on trial for two seconds. If the arm is not stable with the new gains,
+    /// the controller restores the old gains and goes into a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71).
+    /// [`Session::await_trial`] waits for the result.
     ///
     /// # Errors
     ///
-    /// [`ParametersError::Value`], before anything is sent, for values that do not fit into their frame or that are not
-    /// physical; [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller rejects a parameter and
-    /// keeps its old one; the other [`LinkError`]s of the line.
+    /// Returns [`ParametersError::Value`], before a frame is sent, for values that do not fit into their frame or that are not physical.
+    /// Returns [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller rejects a parameter and keeps its old
+    /// parameter. Also returns the other [`LinkError`]s of the communication.
     pub fn push(
         &mut self,
         set: &ParameterSet,
@@ -52,7 +51,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::push`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::push`], and [`Error::Cancelled`] if the caller cancels.
     pub fn push_until(
         &mut self,
         set: &ParameterSet,
@@ -62,8 +61,8 @@ impl<P: Port> Session<P> {
         set.check()?;
         let mut frames = Vec::new();
         if let Some(friction) = &set.friction {
-            // The table is too long for CRC-16 to detect every double bit error. So the table is sent twice, and the
-            // controller must confirm both transmissions.
+            // The table is too long for CRC-16 to detect every double bit error. Therefore the table is sent twice, and the controller must
+            // confirm both transmissions.
             let (parameter, times) = match friction {
                 jtc_core::Friction::Table(_) => (Parameter::FrictionTable, 2),
                 jtc_core::Friction::Polynomial(_) => (Parameter::FrictionPolynomial, 1),
@@ -76,7 +75,7 @@ impl<P: Port> Session<P> {
         if let Some(model) = &set.model {
             frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
         }
-        // A controller that has all parameters switches the torque on. So a Stop of another program ends the transfer.
+        // A controller that has all parameters switches the torque on. Therefore a Stop of another program ends the transfer.
         let stops = self.port.halts().stops;
         let mut all = Vec::new();
         for (parameter, frame, times) in frames {
@@ -95,21 +94,21 @@ impl<P: Port> Session<P> {
         Ok(all)
     }
 
-    /// Waits while new gains are on trial (J-71). If new gains are on trial, calls `begun` first. Call this function right
-    /// after [`Session::push`] or [`Session::push_arm`]. Returns `true` if gains were on trial. Returns `false` if the arm
-    /// has no torque or the device has no extensions.
+    /// Waits while new gains are on trial (J-71). If gains are on trial, calls `begun` before it waits. The caller must call this function
+    /// directly after [`Session::push`] or [`Session::push_arm`]. Returns `true` if gains were on trial. Returns `false` if the arm has no
+    /// torque or the device has no extensions.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] if the controller restored the old gains, or stopped the arm for another reason meanwhile;
-    /// [`StateError::Device`] if the arm lost its torque; the [`LinkError`]s of the line.
+    /// Returns [`StateError::HeldStop`] if the controller restored the old gains, or if it stopped the arm for another reason. Returns
+    /// [`StateError::Device`] if the arm lost its torque. Also returns the [`LinkError`]s of the communication.
     pub fn await_trial(&mut self, begun: impl FnOnce()) -> Result<bool, Error> {
         let age = |reactions: Reactions| reactions.stop.map(|(_, ms)| ms);
         let state = self.fresh_status()?.state;
         let under_torque = state.is_in(&[ControllerState::HoldPos, ControllerState::Teaching]);
         let Some(reactions) = self.reactions().filter(|_| under_torque) else { return Ok(false) };
         begun();
-        // The arm may still be in an earlier held stop.
+        // Age of an earlier held stop, if there is one. A held stop because of the trial has a smaller age.
         let before = age(reactions).unwrap_or(u32::MAX);
         let end = self.port.now() + TRIAL;
         while self.port.now() < end {
@@ -125,12 +124,12 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// If a value of the set is out of the bounds of known controllers, returns an error that contains this value.
+/// Adds the reason to an error. If a value of the set is outside the bounds of known controllers, the new error contains this value.
 fn explained(error: LinkError, set: &ParameterSet) -> Error {
     let LinkError::Refused { request, code: DataStatus::IncorrectValue, .. } = error else {
         return error.into();
     };
-    // Only a value in this frame can be the reason for the rejection.
+    // Only a value in the rejected frame can be the reason for the rejection.
     let part = match request {
         FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
         FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },

@@ -19,15 +19,15 @@ impl<P: Port> Session<P> {
         Ok(self.device_config()?.payload)
     }
 
-    /// Sets the payload. The controller takes half a second to include a new payload in the torque. Execute, teaching and
-    /// jogging wait until the payload is included.
+    /// Sets the payload. The controller changes its torque to a new payload within half a second. Execute, teaching and jogging wait until
+    /// this change is complete.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::NoBody`], before anything is sent, if the payload is not a physical body;
-    /// [`ExtensionError::TooHeavy`] if a joint could not hold it in the pose of the arm;
-    /// [`ExtensionError::PayloadInMotion`] during a commanded motion; the errors of [`Session::set_settings`]. After an
-    /// error the controller keeps its payload.
+    /// Returns [`ExtensionError::NoBody`], before a frame is sent, if the payload is not a physical body. Returns
+    /// [`ExtensionError::TooHeavy`] if a joint could not hold the payload in the present pose of the arm. Returns
+    /// [`ExtensionError::PayloadInMotion`] if a commanded motion is in progress. Also returns the errors of [`Session::set_settings`].
+    /// After an error the controller keeps its earlier payload.
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
         let values: Vec<_> = settings::payload_values(payload).collect();

@@ -1,7 +1,7 @@
-//! Host supervision (J-59). While the arm moves for this session, the session repeats GetInfo, so that the controller knows
-//! that its host is alive.
+//! Host supervision (J-59). While the arm follows a path or is in teaching because of a command of this session, the session repeats
+//! GetInfo. The controller then knows that its host is alive.
 //!
-//! A session that only observes sends nothing. A GetInfo also informs the controller that its host knows all data statuses
+//! A session that only observes the arm sends no frames. A GetInfo also shows the controller that its host supports all data status codes
 //! (J-51).
 
 use std::time::Duration;
@@ -14,7 +14,7 @@ use super::extension::{ASK_AGAIN, Extensions};
 use crate::error::LinkError;
 use crate::port::Port;
 
-/// Maximum time until a command has an effect in the statuses.
+/// Maximum time until the statuses show the effect of a command.
 const SHOWS: Duration = Duration::from_secs(1);
 /// Minimum time between two GetInfo requests. A status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
 const SHORTEST: Duration = Duration::from_millis(20);
@@ -28,8 +28,8 @@ pub(super) struct Presence {
     waits: bool,
     /// `true` if the last status shows that the arm moves or can be guided by hand.
     moves: bool,
-    /// Last known `host_timeout_ms` of the controller, ms. 0 means no supervision. The session discards the value while
-    /// the controller has no torque, because the setting may then be changed.
+    /// Last known `host_timeout_ms` of the controller, ms. 0 means no supervision. While the controller has no torque, the session discards
+    /// this value, because the setting may change.
     host_timeout_ms: Option<f64>,
     /// `true` if the controller has accepted an extension request.
     answered: bool,
@@ -71,8 +71,7 @@ impl Presence {
         self.commanded.is_some() && (self.moves || self.waits)
     }
 
-    /// Returns the time between two GetInfo requests. This time is short enough for at least three requests within the
-    /// controller's timeout.
+    /// Returns the time between two GetInfo requests. At least three requests fit into the controller's timeout.
     fn period(&self) -> Duration {
         match self.host_timeout_ms {
             Some(ms) if ms > 0.0 => Duration::from_secs_f64(ms / 3000.0).clamp(SHORTEST, ASK_AGAIN),
@@ -130,8 +129,8 @@ impl<P: Port> Session<P> {
         self.presence.take(values.iter().copied());
     }
 
-    /// Waits for the answers to the requests of [`show_presence`](Self::show_presence). Before these answers, the device
-    /// would reject another request (J-50).
+    /// Waits for the answers to the requests of [`show_presence`](Self::show_presence). Until these answers arrive, the device would reject
+    /// another request (J-50).
     pub(super) fn await_presence(&mut self) -> Result<(), LinkError> {
         let end = self.presence.asked_at + self.confirmation_time(jtc_wire::ANSWER_MAX);
         while self.presence.unanswered > 0 && self.port.now() < end {
@@ -147,8 +146,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.settings() {
-            // If the timeout cannot be read, the default period is used. If the line is lost, the next command returns
-            // that error.
+            // If the timeout cannot be read, the default period is used. If the line is lost, the next command returns the error of the
+            // line.
             Err(
                 LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::NoExtension { .. },
             ) => Ok(()),

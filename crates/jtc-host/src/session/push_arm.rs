@@ -18,26 +18,25 @@ pub enum ArmPart<'a> {
 }
 
 impl<P: Port> Session<P> {
-    /// Sends the complete arm to the device. Settings and name are sent first, if they differ from the device, and then
-    /// friction, gains and model. Then reads the arm back and compares it. If settings differ, the device must be in Init
-    /// or Error.
+    /// Sends the complete arm to the device. If the settings or the name differ from the device, the function sends these values first. The
+    /// function then sends friction, gains and model. Finally the function reads the arm back from the device and compares it with `arm`.
+    /// If settings of the device and the arm differ, the device must be in Init or Error.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Incomplete`] for an arm without gains or friction,
-    /// [`ParametersError::Unstable`](crate::ParametersError) if the arm is not stable with its gains,
-    /// [`ExtensionError::Differs`] if the arm that was read back differs; the errors of [`Session::set_settings`] and
-    /// [`Session::push`].
+    /// Returns [`ExtensionError::Incomplete`] for an arm without gains or friction. Returns
+    /// [`ParametersError::Unstable`](crate::ParametersError) if the arm is not stable with its gains. Returns [`ExtensionError::Differs`]
+    /// if the arm that was read back differs. Also returns the errors of [`Session::set_settings`] and [`Session::push`].
     pub fn push_arm(&mut self, arm: &Arm, done: impl FnMut(ArmPart<'_>)) -> Result<Vec<PushReport>, Error> {
         self.push_arm_until(arm, || false, done)
     }
 
-    /// Like [`Session::push_arm`], but stops once `ended` returns `true` because the user cancels. In this case the
-    /// device keeps the parts for which `done` was called.
+    /// Like [`Session::push_arm`], but stops once `ended` returns `true` because the user cancels. The device then keeps the parts for
+    /// which `done` was called.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::push_arm`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::push_arm`], and [`Error::Cancelled`] if the caller cancels.
     pub fn push_arm_until(
         &mut self,
         arm: &Arm,
@@ -52,15 +51,14 @@ impl<P: Port> Session<P> {
         Ok(pushed)
     }
 
-    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm. The
-    /// arm has no torque during the transfer. If the controller had friction, gains and model at the same time, it would
-    /// leave Init and hold the arm. So this function withdraws the parts already sent before it sends the last of these
-    /// three parameters.
+    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm. The arm has no torque
+    /// during the transfer. A controller with friction, gains and model leaves Init and holds the arm. Therefore this function withdraws
+    /// the parameters that it has already sent before it sends the last of the three parameters.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Powered`] outside Init and Error, before anything is sent; the errors of [`Session::push_arm`]
-    /// and [`Session::store_arm`].
+    /// Returns [`ExtensionError::Powered`], before a frame is sent, if the controller is neither in Init nor in Error. Also returns the
+    /// errors of [`Session::push_arm`] and [`Session::store_arm`].
     pub fn push_and_store_arm(
         &mut self,
         arm: &Arm,
@@ -69,12 +67,12 @@ impl<P: Port> Session<P> {
         self.push_and_store_arm_until(arm, || false, done)
     }
 
-    /// Like [`Session::push_and_store_arm`], but stops once `ended` returns `true` because the user cancels. In this
-    /// case the device keeps the parts for which `done` was called.
+    /// Like [`Session::push_and_store_arm`], but stops once `ended` returns `true` because the user cancels. The device then keeps the
+    /// parts for which `done` was called.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::push_and_store_arm`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::push_and_store_arm`], and [`Error::Cancelled`] if the caller cancels.
     pub fn push_and_store_arm_until(
         &mut self,
         arm: &Arm,
@@ -95,21 +93,20 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // After this, the device is in the state in which it starts. A later request of the host activates the complete
-        // stored arm.
+        // The device is then in the same state as after its start. A later request of the host activates the complete stored arm.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }
 
-    /// If the arm has no torque, commands the device to drop its active arm, so that parts of two arms are not combined
-    /// (J-71).
+    /// If the arm has no torque, commands the device to drop its active arm. A device without an active arm cannot combine parts of two
+    /// arms (J-71).
     fn withdraw_arm(&mut self) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if state == ControllerState::Init {
             self.disable()?;
         } else if state == ControllerState::Error {
             match self.disable() {
-                // In Error, older firmware rejects this command, but it accepts each part separately.
+                // In the state Error, older firmware rejects this command, but accepts each parameter separately.
                 Err(LinkError::Refused { .. }) => {}
                 done => done?,
             }
@@ -117,7 +114,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Sends the settings and the name, but only those that differ from the device.
+    /// Sends the settings and the name that differ from the values of the device.
     fn push_settings(
         &mut self,
         arm: &Arm,

@@ -1,4 +1,4 @@
-//! Waiting until an arm is ready to move.
+//! Function that waits until an arm is ready to move.
 
 use std::time::Duration;
 
@@ -13,15 +13,15 @@ use crate::{held_stop, labels};
 pub const BRING_UP: Duration = Duration::from_secs(15);
 
 impl<P: Port> Session<P> {
-    /// If the controller is starting up, waits until it holds the arm with all drives enabled. Returns the status that the
-    /// check of a motion needs. Calls `waits` with a description of the state for which the function waits.
+    /// If the controller is starting up, waits until it holds the arm with all drives enabled. Returns the status that the check of a
+    /// motion needs. Before each wait, the function calls `waits` with a description of the awaited state.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] if the cause of a held stop is not cleared, [`StateError::NotReady`] if the controller is
-    /// not starting up, [`StateError::Absent`] if joints are marked as absent, [`StateError::EncoderJumped`] if an encoder
-    /// has jumped, [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns `true`;
-    /// the errors of the line.
+    /// Returns [`StateError::HeldStop`] if the cause of a held stop is not cleared. Returns [`StateError::NotReady`] if the controller is
+    /// not starting up. Returns [`StateError::Absent`] if joints are marked as absent. Returns [`StateError::EncoderJumped`] if an encoder
+    /// has jumped. Returns [`StateError::Device`] if the controller reports an error. Returns [`StateError::Timeout`] if the arm is not
+    /// ready in time. Returns [`Error::Cancelled`] once `ended` returns `true`. Also returns communication errors.
     pub fn ready_to_move(
         &mut self,
         mut waits: impl FnMut(&'static str),

@@ -18,11 +18,11 @@ use crate::error::{Error, LinkError, StateError};
 use crate::labels;
 use crate::port::Port;
 
-/// Maximum time until a node is ready. The first enable of a drive takes 4 s. After a reset, the enable takes longer.
+/// Maximum time until a node is ready. The first enable of a drive takes 4 s, and longer after a reset.
 const NODE_TIME: Duration = Duration::from_secs(15);
-/// Maximum time from reset to Init.
+/// Maximum time from a reset of the nodes until the controller is in Init.
 const START_TIME: Duration = Duration::from_secs(3);
-/// Maximum time from a stop to standstill, with a reserve.
+/// Maximum time from a Stop to standstill, including a reserve.
 const STOP_TIME: Duration = Duration::from_secs(5);
 /// Time from the reset of a node until it answers.
 const BOOT: Duration = Duration::from_secs(1);
@@ -30,27 +30,28 @@ const BOOT: Duration = Duration::from_secs(1);
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
-/// Maximum number of times that a held stop is cleared. During these attempts, a compliant joint comes to rest, or an operator frees the joint.
+/// Maximum number of times that a held stop is cleared. Between these attempts, a compliant joint comes to rest, or an operator frees the
+/// joint.
 const HELD_CLEARS: u8 = 6;
 /// Maximum number of times that errors are cleared.
 const CLEARS_MAX: u8 = 6;
-/// Time until a command takes effect.
+/// Time after which a command has taken effect.
 const EFFECT: Duration = Duration::from_millis(500);
 /// Interval at which the recovery checks whether the user cancels.
 const LOOK: Duration = Duration::from_millis(100);
-/// Time that the operator has to release the emergency stop.
+/// Maximum time until the operator releases the emergency stop.
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
-    /// Brings the controller to HoldPos without errors. `parameters` is the source of friction, gains and arm model if the
-    /// controller lacks some of them. If this source is missing or incomplete, returns an error before anything is sent.
-    /// The recovery never resumes a trajectory.
+    /// Brings the controller to HoldPos without errors. If the controller lacks friction, gains or arm model, `parameters` supplies them.
+    /// If `parameters` is missing or incomplete, the function returns an error before it sends a frame. The recovery never resumes a
+    /// trajectory.
     ///
     /// # Errors
     ///
-    /// [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm), before
-    /// anything is sent, if parameters are not available; [`StateError::Device`] and [`StateError::Timeout`] if an error
-    /// persists; the errors of the line.
+    /// Returns [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm), before a frame
+    /// is sent, if parameters are not available. Returns [`StateError::Device`] and [`StateError::Timeout`] if an error persists. Also
+    /// returns communication errors.
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -59,8 +60,9 @@ impl<P: Port> Session<P> {
         self.recover_until(parameters, || false, report)
     }
 
-    /// Like [`Session::recover`], but ends once `ended` returns `true` because the user cancels. After that, it sends
-    /// nothing more and returns [`Error::Cancelled`]. A running motion is first stopped and followed to standstill.
+    /// Like [`Session::recover`], but ends once `ended` returns `true` because the user cancels. If the arm is in motion, the recovery
+    /// first stops the motion and follows the arm until it is at rest. The recovery then sends no more frames and returns
+    /// [`Error::Cancelled`].
     ///
     /// # Errors
     ///
@@ -151,8 +153,8 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         }
     }
 
-    /// Brings the controller from the state in `status` to HoldPos without errors. Executes one step for each state
-    /// that occurs.
+    /// Brings the controller from the state in `status` to HoldPos without errors. Executes one step for each state that the controller
+    /// reports.
     fn from(&mut self, mut status: Status) -> Result<Status, Error> {
         while self.acts_left > 0 {
             self.acts_left -= 1;
@@ -183,7 +185,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,
-                // This program does not know the state, so the recovery does nothing.
+                // This program does not know the state of the controller, so the recovery ends.
                 None => break,
             }
             status = self.session.fresh_status()?;
@@ -273,7 +275,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn clear(&mut self, nodes: u8) -> Result<(), Error> {
-        // If the fault persists, the next status shows it to the caller.
+        // If the fault persists, the next status shows the fault to the caller.
         self.session.clear_if_possible(true, nodes)?;
         self.session.pause_for(EFFECT, &self.ended)
     }
@@ -285,7 +287,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 }
 
-/// Returns the nodes that report a fault of their own.
+/// Returns the nodes that themselves report a fault.
 fn faulty(s: &Status) -> u8 {
     let joints = s
         .joints

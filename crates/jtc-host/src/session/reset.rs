@@ -1,4 +1,4 @@
-//! Resets of nodes, which can remove the torque that holds the arm.
+//! Resets of nodes. A reset can remove the torque that holds the arm.
 
 use jtc_bus::GRIPPER;
 use jtc_wire::{Code, ControllerState};
@@ -8,11 +8,11 @@ use crate::error::{Error, StateError};
 use crate::labels;
 use crate::port::Port;
 
-/// Returns `true` if the arm has torque in this state, and a reset of these nodes (bits 0..6) can remove it.
+/// Returns `true` if the arm has torque in this state, and if a reset of these nodes (bits 0..6) can remove the torque.
 ///
 /// # Errors
 ///
-/// [`StateError::WouldFall`] if the arm moves and a joint is among the nodes.
+/// Returns [`StateError::WouldFall`] if the arm moves and a joint is among the nodes.
 pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<bool, StateError> {
     let moves = state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
     if moves && nodes & !(1 << GRIPPER) != 0 {
@@ -26,7 +26,9 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`StateError::WouldFall`] and [`StateError::MayFall`], before anything is sent; the errors of [`Session::reset`].
+    /// Returns [`StateError::WouldFall`], before a frame is sent, if the arm moves and a joint is among the nodes. Returns
+    /// [`StateError::MayFall`], before a frame is sent, if the arm can lose its torque and `may_fall` is not set. Also returns the errors
+    /// of [`Session::reset`].
     pub fn reset_held(&mut self, nodes: u8, may_fall: bool) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if reset_takes_torque(nodes, state)? && !may_fall {

@@ -1,4 +1,4 @@
-//! Changes of settings by a user. All values are checked before the first value is sent (J-53).
+//! Changes of settings by a user. The session checks all values before it sends the first value (J-53).
 
 use jtc_core::settings;
 use jtc_wire::SettingValue;
@@ -8,12 +8,12 @@ use crate::error::{Error, ExtensionError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Changes settings like [`Session::set_settings`], either all settings or none. Before anything is sent, each value
-    /// is checked, and all values are checked together with the device's settings.
+    /// Changes settings like [`Session::set_settings`]: the device accepts either all of these settings or none of them. Before the
+    /// function sends a setting, it checks each value, and checks all values together with the device's other settings.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Setting`] with the value and its limit; the errors of [`Session::device_config`] and
+    /// Returns [`ExtensionError::Setting`] with the value and its limit. Also returns the errors of [`Session::device_config`] and
     /// [`Session::set_settings`].
     pub fn change_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
         let config = self.device_config()?;

@@ -20,7 +20,7 @@ use crate::trajectory::UploadOptions;
 const SEGMENT_TRIES: u32 = 16;
 /// Maximum number of restarts of the complete upload.
 const RESTARTS: u32 = 3;
-/// Number of records that the controller queues, minus one as a reserve.
+/// Maximum number of segments in flight. The controller can queue one more record than this number.
 const WINDOW_MAX: usize = 7;
 
 /// Progress of an upload.
@@ -64,8 +64,8 @@ pub struct UploadReport {
 }
 
 impl UploadReport {
-    /// Returns the share of the line capacity that the upload used, %. `None` for a pseudo-terminal that is faster than
-    /// its rate.
+    /// Returns the share of the line capacity that the upload used, %. Returns `None` for a pseudo-terminal that is faster than its bit
+    /// rate.
     pub fn line_share_percent(&self) -> Option<f64> {
         self.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
     }
@@ -85,7 +85,7 @@ struct Upload {
     /// Bytes of the current frame that are not yet written.
     writing: Option<(usize, usize)>,
     line_done: Duration,
-    /// `true` if segments are sent one at a time, until the state of the controller is known again.
+    /// `true` while segments are sent one at a time, because the state of the controller is unknown.
     probing: bool,
     tries: u32,
     retries: u32,
@@ -115,7 +115,8 @@ impl Upload {
             .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
             .collect::<Result<Vec<Vec<u8>>, _>>()?;
         let longest = frames.first().map_or(0, Vec::len);
-        // The window is large enough for 60 ms on the line, which covers the latency of USB adapters.
+        // Unless `WINDOW_MAX` limits the window, it contains at least 60 ms of data on the line. 60 ms is longer than the latency of USB
+        // adapters.
         let time = line_time(longest, baud).as_secs_f64();
         let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
         Ok(Self {
@@ -132,8 +133,8 @@ impl Upload {
             restarts: 0,
             halts: 0,
             window: window.clamp(3, WINDOW_MAX),
-            // Each write is limited to the bytes that the line transmits in 10 ms, so that statuses are received
-            // between two writes.
+            // Each write is limited to the bytes that the line transmits in 10 ms. Therefore the session receives statuses between two
+            // writes.
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
             start: now,
             bytes_done: 0,
@@ -162,7 +163,7 @@ impl Upload {
         self.tries = 0;
     }
 
-    /// Returns to the first unconfirmed segment. The next segments are sent one at a time.
+    /// Returns to the first unconfirmed segment. Afterwards, the upload sends segments one at a time.
     fn go_back(&mut self) {
         self.retries += (self.next - self.confirmed) as u32;
         self.next = self.confirmed;
@@ -194,9 +195,9 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`UploadError::SegmentRefused`] if the controller rejects a segment, for example because it does not hold the arm,
-    /// or because its own check (J-36) found a problem; [`UploadError::Incomplete`] if too many frames were lost;
-    /// [`Error::Cancelled`] if `progress` cancelled the upload; the errors of [`Session::next_status`] if the controller or
+    /// Returns [`UploadError::SegmentRefused`] if the controller rejects a segment, for example because the arm is not in position hold, or
+    /// because the controller's check (J-36) found a problem. Returns [`UploadError::Incomplete`] if too many frames were lost. Returns
+    /// [`Error::Cancelled`] if `progress` cancelled the upload. Also returns the errors of [`Session::next_status`] if the controller or
     /// the port is lost. After an error the controller has no complete trajectory and cannot execute a motion.
     pub fn upload(
         &mut self,
@@ -211,7 +212,7 @@ impl<P: Port> Session<P> {
         Ok(report)
     }
 
-    /// Sends points that are `step_ms` apart in time.
+    /// Sends points with the time step `step_ms`.
     fn send(
         &mut self,
         points: &[RawPoint],
@@ -285,7 +286,7 @@ impl<P: Port> Session<P> {
         Ok(false)
     }
 
-    /// Writes a part of a frame or waits for a record. Returns `true` if a segment was confirmed.
+    /// Writes the next part of a frame or waits for a record. Returns `true` if a segment was confirmed.
     fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
         if up.writing.is_none() && up.may_send() {
             if up.next == 0 {
@@ -344,8 +345,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match record.data {
-            // The controller rejects the only segment in flight because its number is out of order. So the segment had
-            // arrived earlier, and only the confirmation was lost.
+            // The controller rejects the only segment in flight because its number is out of order. Therefore the segment had arrived
+            // earlier, and only its confirmation was lost.
             DataStatus::IncorrectSegmentOrder if up.probing && up.confirmed > 0 => {
                 up.confirm();
                 Ok(())
@@ -356,8 +357,8 @@ impl<P: Port> Session<P> {
                     return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
                 }
                 if self.port.halts().all != up.halts {
-                    // The Stop of another program made the controller drop the upload. The segment was sent before the
-                    // port began to block segments.
+                    // The controller dropped the upload because of another program's Stop. The rejected segment was sent before the port
+                    // began to block segments.
                     return Err(LinkError::Port(PortError::Halted { by: None }).into());
                 }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
@@ -366,13 +367,13 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Handles the case that a record did not arrive in time.
+    /// Handles a record that did not arrive in time.
     fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
         if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
-        // All segments are sent, and the status shows that the trajectory is complete. So only confirmations were lost.
-        // (The status cannot be old, because the trajectory state has been Null since segment 0 was confirmed.)
+        // All segments are sent, and the status shows that the trajectory is complete. Therefore only confirmations were lost. The status
+        // cannot be old, because the trajectory state has been Null since segment 0 was confirmed.
         if up.next == up.frames.len()
             && up.confirmed > 0
             && self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop)
@@ -385,7 +386,7 @@ impl<P: Port> Session<P> {
         self.start_over(up)
     }
 
-    /// Waits for the frames in flight, then returns to the first segment that is not confirmed.
+    /// Waits for the records of the frames in flight. Then returns to the first segment that is not confirmed.
     fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
         if up.tries >= SEGMENT_TRIES {
             return Err(self.upload_failed(up).into());
@@ -395,7 +396,7 @@ impl<P: Port> Session<P> {
             self.statistics.bytes_sent += (up.frames[index].len() - at) as u64;
         }
         let quiet = up.line_done.max(self.port.now()) + line_time(2 * STATUS_LEN, self.port.baud());
-        // A record is sent right after its frame. A late record may take one more status period.
+        // The controller sends a record directly after it receives the frame. A late record may take one more status period.
         let end = quiet + Duration::from_millis(60);
         loop {
             let now = self.port.now();

@@ -1,4 +1,4 @@
-//! Tables of numbers, with a header line or in the format of existing programs, which is 19 columns of int16 or float
+//! Tables of numbers with a header line, and tables in the format of existing programs. Existing programs use 19 columns of int16 or float
 //! without a header.
 
 use std::fmt::Write as _;
@@ -164,8 +164,8 @@ fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Returns the column for a name in a header, and the factor from its unit. Column 0 is the time. Column 1 and the
-/// following columns are in the order of the formats without a header.
+/// Returns the number of the column for a name in a header, and the conversion factor of the unit in this name. Column 0 is the time. All
+/// other columns are in the order of the formats without a header.
 fn column_of(name: &str) -> Option<(usize, f64)> {
     let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
     if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
@@ -250,12 +250,12 @@ impl Trajectory {
 
     /// Like [`Trajectory::to_csv`], with 17 significant digits in each number.
     pub fn to_exact_csv(&self) -> String {
-        // Adding zero changes −0 to 0.
+        // The addition of zero changes −0 to 0.
         self.csv_with(|v| format!(",{:.16e}", v + 0.0))
     }
 
-    /// Returns the trajectory in the format of 19 columns of integers without a header. The values are exactly the
-    /// integers in the frames.
+    /// Returns the trajectory in the format of 19 columns of integers without a header. The values are exactly the integers that the
+    /// trajectory frames contain.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Fits a trajectory (points at a fixed step) to samples at any times, and derives missing velocities and accelerations.
+//! Fit of a trajectory (points at a fixed step) to samples at any times. The fit derives missing velocities and accelerations.
 //!
 //! The units are s, rad, rad/s and rad/s², as in a trajectory, and the joints are in order from base to wrist.
 //!
@@ -7,26 +7,25 @@
 //! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) supplies
 //!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration at these samples
 //!   is not 0, so the motion begins and ends with a step in acceleration.
-//! - **Positions and velocities**: for each joint, a cubic spline through the velocities supplies the accelerations. So
-//!   rounded positions have no effect on the accelerations. The spline is natural, so the jerk is 0 at the ends. The
-//!   velocities are used unchanged, also at the ends.
-//! - **All three channels**: nothing is derived.
+//! - **Positions and velocities**: for each joint, a cubic spline through the velocities supplies the accelerations. Therefore rounded
+//!   positions have no effect on the accelerations. The spline is natural, so the jerk is 0 at its ends. The velocities are used unchanged,
+//!   also at the ends.
+//! - **All three channels**: no values are derived.
 //!
 //! # Time
 //!
-//! If the times of the samples are on a grid of whole milliseconds (within 50 µs, steps of 1 to 1000 ms), the samples
-//! become the points unchanged. All other samples are resampled to a step of 10 ms. If the controller cannot store so many
-//! points, the step is longer. Between samples the trajectory follows a quintic with the position, velocity and
-//! acceleration of both samples. The last point is the last sample. If the duration is not a whole number of steps, the
-//! remainder of the motion is stretched to a whole step.
+//! If the times of the samples are on a grid of whole milliseconds, the samples become the points unchanged. The grid has a step of 1 to
+//! 1000 ms, and the times may deviate from the grid by up to 50 µs. All other samples are resampled to a step of 10 ms. If the controller
+//! cannot store the points of a 10 ms step, the step is longer. Between two samples, the trajectory follows a quintic with the positions,
+//! velocities and accelerations of these samples. The last point of the trajectory is the last sample. If the duration is not a whole
+//! number of steps, the last part of the motion is stretched to a whole step.
 //!
 //! # Overshoot
 //!
-//! A spline passes through every sample, but between two samples it may leave the interval between their positions. After a
-//! step in position, the spline overshoots by about 10 % of the step if the samples are equally spaced. The fit does not
-//! limit the overshoot. [`Fitted::overshoot`] reports the overshoot of each joint, and
-//! [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) checks the fitted trajectory, also between the points.
-//! With denser samples near a change of direction the overshoot is small.
+//! A spline passes through every sample. Between two samples, the spline may leave the interval between the positions of these samples.
+//! After a step in position, the spline overshoots by about 10 % of the step if the samples are equally spaced. The fit does not limit this
+//! overshoot. [`Fitted::overshoot`] reports the overshoot of each joint, and [`CheckedTrajectory::check`](crate::CheckedTrajectory::check)
+//! checks the fitted trajectory, also between the points. With denser samples near a change of direction the overshoot is small.
 //!
 //! # Example
 //!
@@ -61,8 +60,8 @@ pub struct Samples {
     pub position: Vec<[f64; JOINTS]>,
     /// Velocities in rad/s, one row for each time. If `None`, the velocities are derived.
     pub velocity: Option<Vec<[f64; JOINTS]>>,
-    /// Accelerations in rad/s², one row for each time. If `None`, the accelerations are derived. Accelerations without
-    /// velocities are ignored.
+    /// Accelerations in rad/s², one row for each time. If `None`, the accelerations are derived. If the velocities are `None`, the
+    /// accelerations are ignored.
     pub acceleration: Option<Vec<[f64; JOINTS]>>,
 }
 
@@ -71,9 +70,9 @@ pub struct Samples {
 pub struct Fitted {
     /// Points at a fixed step.
     pub trajectory: Trajectory,
-    /// Description of the derived and resampled values.
+    /// Messages about the derived and resampled values.
     pub notes: Vec<String>,
-    /// Overshoot of each joint whose spline leaves the interval between two samples. Empty if the samples have velocities.
+    /// Overshoot of each joint whose spline leaves the interval between two samples. The list is empty if the samples have velocities.
     pub overshoot: Vec<Overshoot>,
 }
 
@@ -81,8 +80,7 @@ pub struct Fitted {
 const STEP_MS: u16 = 10;
 /// Maximum deviation of a time from the grid, s.
 const REGULAR: f64 = 50e-6;
-/// Longest duration that is resampled, s. A longer trajectory does not fit into the memory of the controller at any
-/// useful step.
+/// Longest duration that is resampled, s. A longer trajectory needs more points than the controller can store, at any useful step.
 const DURATION_MAX: f64 = 86_400.0;
 
 /// Reason why no trajectory can be fitted to the samples.
@@ -102,21 +100,21 @@ pub enum FitError {
     /// A value of this sample (from 0) is not a finite number.
     #[error("sample {0}: a number is not finite")]
     NotFinite(usize),
-    /// The time of this sample (from 0) is not later than the time before it.
+    /// The time of this sample (from 0) is not later than the time of the previous sample.
     #[error("sample {0}: its time is not after the time of the previous sample")]
     Time(usize),
-    /// The samples last longer than a day. The value is the duration of the samples, s.
+    /// The samples last longer than one day. The value is the duration of the samples, s.
     #[error("the duration {0} s is longer than a day")]
     Duration(f64),
 }
 
 impl Samples {
-    /// Returns the trajectory through the samples. Without samples, the trajectory is empty and does not pass a check.
+    /// Returns the trajectory through the samples. If there are no samples, the trajectory is empty and does not pass a check.
     ///
     /// # Errors
     ///
-    /// [`FitError`] for channels of different length, values that are not finite, times that do not increase, or a duration
-    /// of more than a day.
+    /// Returns [`FitError`] for channels of different length, values that are not finite, times that do not increase, or a duration of more
+    /// than one day.
     pub fn fit(self) -> Result<Fitted, FitError> {
         self.whole()?;
         let mut notes = Vec::new();
@@ -232,7 +230,7 @@ fn resampled_step(duration: f64) -> u16 {
 mod tests {
     use super::*;
 
-    /// A smooth move from rest to rest.
+    /// Returns position, velocity and acceleration of a smooth move from rest to rest.
     fn shape(t: f64) -> (f64, f64, f64) {
         let (u, d) = (t / 2.0, 2.0);
         (
@@ -285,7 +283,7 @@ mod tests {
         assert_eq!(resampled_step(1200.0), 101);
     }
 
-    /// The documented overshoot. Joint 1 steps by 1 rad between two of ten equally spaced samples.
+    /// The overshoot has the documented size. Joint 1 steps by 1 rad between two of ten equally spaced samples.
     #[test]
     fn a_spline_swings_over_after_a_step() {
         let position: Vec<_> = (0..10).map(|i| [f64::from(u8::from(i >= 5)); 6]).collect();
@@ -297,7 +295,7 @@ mod tests {
         };
         let over = points.windows(2).map(between).fold(0.0, f64::max) - 1.0;
         assert!((0.08..0.12).contains(&over), "{over}");
-        // The velocity at the ends is 0, but the acceleration is not 0 if the path begins to bend at once.
+        // The velocity at both ends is 0. The acceleration at an end is not 0 if the position already changes at this end, as in `bent`.
         assert_eq!((points[0].velocity, points[9].velocity), ([0.0; 6], [0.0; 6]));
         let bent = Samples {
             times: vec![0.0, 0.5, 1.0],
@@ -322,7 +320,7 @@ mod tests {
         let never = Samples { times: vec![f64::NAN], position: vec![[0.0; 6]], ..Samples::default() };
         assert_eq!(never.fit(), Err(FitError::NotFinite(0)));
         assert_eq!(Samples::default().fit().unwrap().trajectory.points.len(), 0);
-        // Accelerations alone are ignored, because they would contradict the derived velocities.
+        // Accelerations without velocities are ignored, because they would contradict the derived velocities.
         let alone = Samples { velocity: None, acceleration: Some(vec![[9.0; 6]; 3]), ..good };
         assert!(alone.fit().unwrap().trajectory.points.iter().all(|p| p.acceleration[0] != 9.0));
     }

@@ -1,4 +1,4 @@
-//! Overshoot of a curve through waypoints.
+//! Overshoot of a curve beyond its waypoints.
 
 use jtc_wire::Joint;
 
@@ -45,11 +45,11 @@ fn outside(x: f64, low: f64, high: f64) -> f64 {
     (x - high).max(low - x)
 }
 
-/// Returns the extrema of a cubic in the unit interval. The value of the cubic goes from 0 to `d`, with the slopes `v0` and `v1`
-/// at the ends.
+/// Returns the extrema of a cubic in the unit interval. The cubic has the values 0 and `d` and the slopes `v0` and `v1` at the ends of the
+/// interval.
 fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
     let (c2, c3) = (3.0 * d - 2.0 * v0 - v1, v0 + v1 - 2.0 * d);
-    // v0 + 2·c2·u + 3·c3·u² = 0, solved in a form that avoids loss of digits.
+    // This form of the solution of v0 + 2·c2·u + 3·c3·u² = 0 avoids cancellation of digits.
     let root = (c2 * c2 - 3.0 * c3 * v0).sqrt();
     let q = -(c2 + root.copysign(c2));
     [q / (3.0 * c3), v0 / q].map(|u| (u > 0.0 && u < 1.0).then_some(u * (v0 + u * (c2 + u * c3))))

@@ -1,7 +1,7 @@
 //! Extraction of a trajectory from a recording.
 //!
-//! A sample of an execution contains the path time of the controller in milliseconds. So the path can be reconstructed even
-//! if the times of the samples are irregular because of the line, the host or pauses.
+//! A sample of an execution contains the path time of the controller in milliseconds. Therefore the path can be reconstructed even if the
+//! line, the host or pauses make the times of the samples irregular.
 
 use std::path::Path;
 
@@ -15,19 +15,20 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Minimum spacing of points, ms. If at least one pair of consecutive points is this far apart or more, all points are kept.
+/// Minimum spacing of the points of a path, ms. If two consecutive points of a path are this far apart or farther, all points of the path
+/// are kept.
 const GRID_MS: u32 = 10;
 
 /// Spacing of measured positions, s. With a smaller spacing, encoder noise would look like motion.
 const MEASURED_S: f64 = 0.04;
-/// Movement below which the arm is considered at rest, rad.
+/// Maximum movement of an arm that is considered at rest, rad.
 const STILL: f64 = 0.002;
 
 /// First columns in the header of a recording as CSV.
 const CSV_HEADER: &str = "time_s,state,tes,point,";
 
-/// Returns `true` if the file is a recording of an execution or a motion by hand. MCAP is recognised by the file name,
-/// and CSV by the header.
+/// Returns `true` if the file is a recording of an execution or a motion by hand. The function recognises MCAP by the file name and CSV by
+/// the header.
 pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
     let mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     mcap || text.is_some_and(|text| text.trim_start_matches('\u{feff}').starts_with(CSV_HEADER))
@@ -54,8 +55,7 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// Returns the trajectory that is stored in the recording of a run. The result is exactly the trajectory of the run, and
-/// complete even if the run was interrupted.
+/// Returns the trajectory that is stored in the recording of a run. The stored trajectory is complete, even if the run was interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.resume_point(whole) {
@@ -90,8 +90,8 @@ fn read(path: &Path) -> Result<Recording, FileError> {
     })
 }
 
-/// Reads a recording and extracts the measured motion. The result is the last teaching, or, without teaching, the last
-/// execution.
+/// Reads a recording and extracts the measured motion. The result is the last teaching. If the recording has no teaching, the result is the
+/// last execution.
 pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
     let mut loaded = measured(&recording.samples).map_err(|e| e.in_file(path))?;
@@ -101,8 +101,8 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last measured motion, without the standstill before and after the motion. The result is a motion by hand,
-/// or, without one, a motion along a trajectory.
+/// Returns the last measured motion, without the standstill before and after the motion. The result is a motion by hand, if there is one.
+/// If there is no motion by hand, the result is a motion along a trajectory.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
     let timed = if by_hand { led(samples) } else { followed(samples) };
@@ -122,7 +122,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
         let problem = "the recording contains no motion by hand and no execution in which the arm moves";
         return Err(FileError::at(Place::default(), problem));
     };
-    // One position at rest is kept at each end.
+    // One position at rest is kept at each end of the motion.
     let kept = first.saturating_sub(1)..(last + 2).min(path.times.len());
     let (times, position) = (path.times[kept.clone()].to_vec(), path.position[kept].to_vec());
     let start = times.first().copied().unwrap_or(0.0);
@@ -135,7 +135,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last motion by hand, at the times of the recording.
+/// Returns the last motion by hand. The times are the times of the recording.
 fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let taught = |s: &Sample| s.state == ControllerState::Teaching;
     let end = samples.iter().rposition(taught).map_or(0, |i| i + 1);
@@ -143,8 +143,8 @@ fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     samples[begin..end].iter().map(|s| (s.time_s, s)).collect()
 }
 
-/// Returns the last execution including its pauses, at the path times. The host times have jitter, and they have no
-/// meaning in a simulation with virtual time. The last sample is the pose in which the arm came to rest.
+/// Returns the last execution, including its pauses. The times are path times. The path times are used because the host times have jitter,
+/// and have no meaning in a simulation with virtual time. The last sample is the pose in which the arm came to rest.
 fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let on_path = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
     let end = samples.iter().rposition(on_path).map_or(0, |i| i + 1);
@@ -173,8 +173,8 @@ struct Seen {
 }
 
 impl Seen {
-    /// Returns every tenth millisecond of the path and both ends. A path with a point at each millisecond has more
-    /// points than the controller can store.
+    /// Returns the path with a point every 10 ms, and both ends of the path. A path with a point at each millisecond may have more points
+    /// than the controller can store.
     fn thinned(self) -> Self {
         let last = self.ms.len().saturating_sub(1);
         if self.ms.iter().zip(self.ms.iter().skip(1)).any(|(a, b)| b - a >= GRID_MS) {
@@ -213,8 +213,8 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
                 velocity: sample.joints.map(|joint| joint.set_velocity),
                 acceleration: sample.joints.map(|joint| joint.set_acceleration),
             },
-            // The recording contains commanded values only while the arm moves on the path. The path ends at rest,
-            // close to the previous sample.
+            // The recording contains commanded values only while the arm moves on the path. The end of the path is at rest, close to the
+            // previous sample.
             (Some(TrajectoryState::Finish), Some(place)) => {
                 Point { position: place.position, ..Point::default() }
             }
@@ -224,7 +224,7 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
             continue;
         }
         if path.ms.last().is_some_and(|point| sample.point < *point) {
-            // Another execution begins, for example after an approach.
+            // At this sample another execution begins, for example after an approach.
             path = Seen::default();
         }
         path.ms.push(sample.point);
@@ -295,8 +295,8 @@ mod tests {
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
     }
 
-    /// `jtc sim` records each millisecond, and one minute has more points than the controller can store. The replay
-    /// restores the commanded values, including velocities and accelerations.
+    /// `jtc sim` records each millisecond. One minute of these samples has more points than the controller can store. The replay restores
+    /// the commanded values, including velocities and accelerations.
     #[test]
     fn a_long_path_known_at_each_millisecond_can_be_run_again() {
         let at = |ms: u32| {
@@ -320,7 +320,7 @@ mod tests {
         }
     }
 
-    /// A motion by hand is found between standstills of any length, and after earlier executions.
+    /// The reader finds a motion by hand between standstills of any length, and after earlier executions.
     #[test]
     fn a_motion_by_hand_is_found_as_it_was_measured() {
         let at = |ms: u32| {
@@ -340,7 +340,7 @@ mod tests {
         let (first, last) = (led.points[0], led.points.last().unwrap());
         assert!(first.position[3].abs() < 2e-3 && (last.position[3] - 0.4).abs() < 2e-3);
         assert_eq!((first.velocity, last.velocity), ([0.0; JOINTS], [0.0; JOINTS]));
-        // Without a motion by hand, the last execution is used.
+        // If the recording has no motion by hand, the last execution is used.
         let run: Vec<Sample> = (0..50)
             .map(|k| Sample {
                 time_s: f64::from(k) * 0.04,

@@ -1,7 +1,7 @@
 //! Division of a trajectory into segments for the upload.
 //!
-//! Frames are short (113 points, 4,082 bytes). In frames above 4,095 bytes CRC-16 does not detect all double bit errors,
-//! because x has the order 32,767 modulo its polynomial.
+//! The upload uses short frames (113 points, 4,082 bytes). In a frame of more than 4,095 bytes, CRC-16 does not detect all double bit
+//! errors, because x has the order 32,767 modulo the CRC polynomial.
 
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
@@ -13,7 +13,7 @@ const SEGMENT_POINTS_LONG: usize = 120;
 /// Options for the upload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UploadOptions {
-    /// Points per segment. If it is `None`, the number is chosen automatically.
+    /// Points per segment. If the value is `None`, the upload chooses the number.
     pub points_per_segment: Option<usize>,
     /// Number of the trajectory.
     pub number: u16,

@@ -1,5 +1,4 @@
-//! Curves through points. The cubic spline is for a file with only positions, and the quintic connects two points of a
-//! trajectory.
+//! Curves through points. A cubic spline is used for a file with only positions. A quintic connects two points of a trajectory.
 
 use jtc_core::JOINTS;
 
@@ -9,8 +8,8 @@ pub(super) fn column(rows: &[[f64; JOINTS]], j: usize) -> Vec<f64> {
     rows.iter().map(|r| r[j]).collect()
 }
 
-/// Returns the first derivatives of a cubic spline through `y` at its knots. If `rest` is set, the slope at the ends is
-/// 0. Otherwise the curvature at the ends is 0.
+/// Returns the first derivatives of a cubic spline through `y` at its knots. If `rest` is set, the slope at both ends is 0. If `rest` is
+/// not set, the curvature at both ends is 0.
 pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     let n = y.len();
     if n < 2 {

@@ -117,7 +117,7 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // A single point keeps the step of the file, even if it is above 1 s. With several points, such times would be
+    // A single point keeps the step of the file, even if it is above 1 s. With several points, times with such a long step would be
     // considered irregular.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;
@@ -208,7 +208,7 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
     }
 }
 
-/// Returns, for each joint of the arm from base to wrist, its index in the file.
+/// Returns the index in the file of each joint of the arm, from base to wrist.
 fn joint_order(
     found: &[String],
     names: Option<&[String; JOINTS]>,
@@ -225,8 +225,7 @@ fn joint_order(
     if let Some(exact) = exact {
         order.copy_from_slice(&exact);
     } else {
-        // In different files for one arm, the names of the joints have different prefixes. The number at the end is the
-        // number of the joint.
+        // Different files for one arm may use different prefixes in the joint names. The number at the end of a name is the joint number.
         let mut ends: Vec<(u32, usize)> =
             found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
         ends.sort_unstable();

@@ -1,4 +1,4 @@
-//! All file forms, and the errors of invalid files.
+//! Tests of all file forms, and of the errors for invalid files.
 
 use proptest::prelude::*;
 
@@ -55,8 +55,7 @@ fn every_int16_value_round_trips() {
     }
 }
 
-/// An encoder rejects a value that is out of range (section 1 of the requirements). The encoder never wraps or clips
-/// the value.
+/// An encoder rejects a value that is out of range (section 1 of the requirements). The encoder does not wrap or clip the value.
 #[test]
 fn values_outside_the_scale_are_refused_by_name() {
     let mut point = Point::default();
@@ -133,7 +132,7 @@ fn a_unit_in_a_header_counts_in_letters_of_any_case() {
     assert!(both.contains("\"Q1_DEG\": this column occurs twice"), "{both}");
 }
 
-/// The reader recognises every column that occurs only in waypoint files.
+/// The reader recognises each column that only waypoint files have.
 #[test]
 fn columns_of_waypoints_are_known_as_such() {
     for name in "pose leg x y z qx qy qz qw roll pitch yaw x_m roll_deg".split(' ') {

@@ -23,7 +23,7 @@ pub(super) enum Column {
     Flange(usize),
 }
 
-/// Columns of the table, and the factor from the unit of each column to radians.
+/// Columns of the table, with the conversion factor from the unit of each column to radians.
 #[derive(Default)]
 struct Header {
     names: Vec<String>,
@@ -61,7 +61,7 @@ pub(super) fn names_unit(name: &str) -> bool {
     name.contains("_deg") || name.contains("_rad")
 }
 
-/// Returns the column of this name, in upper or lower case, and the factor from its unit to radians.
+/// Returns the column with this name, in upper or lower case, and the conversion factor from the unit of the column to s, m or rad.
 pub(super) fn column(name: &str) -> Option<(Column, f64)> {
     let name = name.trim_matches('"').to_ascii_lowercase();
     match name.as_str() {

@@ -1,4 +1,4 @@
-//! Flange poses in files. There are ten values: three for the position, and three or four for the orientation.
+//! Flange poses in files. Of the ten possible values, three are the position, four a quaternion, and three the angles roll, pitch and yaw.
 
 use jtc_plan::kinematics::Orientation;
 
@@ -6,15 +6,14 @@ use super::Target;
 
 /// Names of the values: a position (m), a quaternion, and roll, pitch and yaw (rad).
 pub(super) const NAMES: [&str; 10] = ["x", "y", "z", "qx", "qy", "qz", "qw", "roll", "pitch", "yaw"];
-/// Indices of the angles.
+/// Indices of the angles in [`NAMES`].
 pub(super) const ANGLES: std::ops::Range<usize> = 7..10;
 
-/// Returns the flange pose for these values. Returns `None` if all values are missing. If `point` is set, the orientation
-/// is not needed.
+/// Returns the flange pose for these values. Returns `None` if all values are missing. If `point` is set, the orientation may be missing.
 ///
 /// # Errors
 ///
-/// Returns a message about a missing or duplicate value.
+/// Returns an error message if a value is missing or occurs twice.
 pub(super) fn target(given: &[Option<f64>; NAMES.len()], point: bool) -> Result<Option<Target>, String> {
     let [x, y, z, qx, qy, qz, qw, roll, pitch, yaw] = *given;
     if given.iter().all(Option::is_none) {

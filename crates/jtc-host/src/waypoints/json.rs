@@ -1,5 +1,5 @@
-//! Waypoints as JSON, which is a list of objects whose keys are the names in the table's header. The list is either the
-//! whole file or the value of the key `waypoints`.
+//! Waypoints as a JSON list of objects. The keys of an object are the column names of the CSV table. The list is either the whole file or
+//! the value of the key `waypoints`.
 
 use std::fmt;
 
@@ -29,7 +29,7 @@ struct Entry {
     flange: [Option<f64>; NAMES.len()],
     /// `true` if a key contains a unit of angle.
     unit_named: bool,
-    /// Two keys for one value, if the file contains both keys.
+    /// Two keys for the same value, if the file contains both keys.
     twice: Option<(String, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! Waypoint files, and the errors of invalid files.
+//! Tests of waypoint files, and of the errors for invalid files.
 
 use proptest::prelude::*;
 
@@ -36,8 +36,8 @@ fn the_forms_say_the_same() {
     }
 }
 
-/// The flange pose of a joint position is written to a file with a quaternion or with angles. The pose is converted
-/// back to that position.
+/// The flange pose of a joint position is written to a file with a quaternion or with angles. The reader converts the pose back to this
+/// joint position.
 #[test]
 fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     let arm = arm();
@@ -82,7 +82,7 @@ fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     assert!(long.to_string().contains("the quaternion has the length 1.414"), "{long}");
 }
 
-/// Times begin at the first waypoint, and they are optional.
+/// The times in a file are counted from the first waypoint, and are optional.
 #[test]
 fn times_are_from_the_first_waypoint() {
     let times = |text: &str| read(text).iter().map(|w| w.time).collect::<Vec<_>>();
@@ -101,8 +101,8 @@ fn degrees_are_taken_only_where_the_file_names_no_unit() {
     assert!(named.in_degrees().unwrap_err().to_string().contains("states its units"));
 }
 
-/// A unit in the name of a column or key is recognised in upper and lower case. In this case an option cannot convert
-/// the numbers again.
+/// A unit in the name of a column or key is recognised in upper and lower case. If a name contains a unit, an option cannot convert the
+/// numbers again.
 #[test]
 fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     let joint_headers = [
@@ -157,7 +157,7 @@ fn header_keys(names: &str) -> String {
         .join(", ")
 }
 
-/// If a file contains a value twice, the reader rejects the file instead of choosing one value.
+/// If a file contains a value twice, the reader rejects the file and does not choose one of the values.
 #[test]
 fn two_names_for_one_number_are_refused() {
     let joints = "\"q2\":0,\"q3\":0,\"q4\":0,\"q5\":0,\"q6\":0";
@@ -226,7 +226,7 @@ fn a_broken_file_is_refused_with_its_place() {
 }
 
 proptest! {
-    /// Any file content is either read or rejected, without a panic.
+    /// The reader reads or rejects any file content without a panic.
     #[test]
     fn any_text_is_read_or_refused(text in "(q[1-6](_deg)?,|t,|pose,|[0-9.e-]{1,4},|\n|[{}\\[\\]\":a-z]){0,60}") {
         let _ = WaypointFile::parse(&text).map(|file| file.positions(&arm()));

@@ -1,4 +1,4 @@
-//! A session runs only a trajectory that passed the check and was uploaded.
+//! Tests that a session runs only a trajectory that passed the check and was uploaded.
 
 use jtc_core::{Config, Payload};
 use jtc_wire::{NodeState, Status, TrajectoryState};
@@ -38,7 +38,7 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     assert!(matches!(&error, CheckError::Refused(verdict) if !verdict.is_ok()), "{error}");
     let diagnosis = error.diagnosis();
     assert_eq!((diagnosis.code, diagnosis.kind), ("check", ErrorKind::Refused));
-    // This value does not fit into a frame.
+    // This value does not fit into a trajectory frame.
     let mut wild = motion(0.5);
     wild.points[3].velocity[2] = f64::NAN;
     assert!(matches!(check(&wild), Err(CheckError::Refused(_))));
@@ -62,8 +62,8 @@ fn j34_an_arm_that_stands_elsewhere_is_refused_by_the_check() {
     assert!(error.contains("joint 2: +0.0210 rad away from the first point"), "{error}");
 }
 
-/// J-55: if the limits of arm and controller differ, the caller must accept this explicitly. If the caller accepts it, the
-/// tighter limits apply.
+/// J-55: if the limits of arm and controller differ, the caller must accept the differences explicitly. If the caller accepts the
+/// differences, the tighter limits apply.
 #[test]
 fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     let mut arm = Arm::avena();
@@ -78,7 +78,8 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     assert_eq!((diagnosis.code, diagnosis.kind), ("device-limits", ErrorKind::Refused));
     assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
     assert!(check(&arm, &motion(0.5), true).is_ok());
-    // The gravity of the controller is used instead of the gravity in the file. Otherwise an arm without weight would pass.
+    // The check uses the gravity of the controller instead of the gravity in the file. With the gravity of the file, an arm without weight
+    // would pass the check.
     let weightless = Arm { gravity: Some([0.0; 3]), ..Arm::avena() };
     let mut weak = weightless.clone();
     weak.joints[1].torque_max = 60.0;
@@ -86,7 +87,7 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     assert!(check(&weightless, &bend, true).is_ok());
     let error = check(&weak, &bend, true).unwrap_err().to_string();
     assert!(error.contains("torque over its limit: joint 2"), "{error}");
-    // The limit of the arm is used if it is tighter.
+    // The check uses the limit of the arm if this limit is tighter than the controller's limit.
     arm.joints[0].velocity_max = 0.1;
     let error = check(&arm, &motion(0.5), true).unwrap_err().to_string();
     assert!(error.contains("velocity over its limit: joint 1") && error.contains("(limit 0.1)"), "{error}");
@@ -122,7 +123,7 @@ fn only_what_was_uploaded_is_executed() {
     assert!(matches!(s.upload(&first, |_| Flow::Cancel), Err(Error::Cancelled)));
     refused(&mut s, &first);
     refused(&mut s, &second);
-    // After an error the controller deletes its trajectory, so there is nothing to execute.
+    // After an error the controller deletes its trajectory, so the session has no trajectory to execute.
     s.upload(&first, |_| Flow::Continue).unwrap();
     fail(&mut s, FaultKind::SafetyInput, 200);
     refused(&mut s, &first);
@@ -142,13 +143,13 @@ fn a_run_has_an_outcome_and_its_figures() {
     let error = summary.joints[0].max_error_mrad.unwrap();
     assert!(error > 0.0 && error < 20.0, "{error} mrad");
     assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
-    // The second execution would start where the first execution ended. The controller rejects it (J-34), and the
-    // second execution returns this error.
+    // The second execution would start where the first execution ended. The controller rejects the second execution (J-34), and `run`
+    // returns this error.
     let run = s.run(&checked, |_| Flow::Continue);
     assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
 }
 
-/// J-60: if the payload is changed while a motion is paused, it may be too heavy for the remainder.
+/// J-60: a payload that is set while a motion is paused may be too heavy for the remainder of the motion.
 #[test]
 fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
     let mut session = ready();
@@ -162,7 +163,7 @@ fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
     session.pause().unwrap();
     let paused = |s: &Status| s.trajectory == TrajectoryState::Pause;
     session.wait_for("pause", Duration::from_secs(5), paused).unwrap();
-    // The first payload is too heavy for the remainder, and the second payload is light enough.
+    // The first payload is too heavy for the remainder of the motion. The second payload is light enough.
     for (mass, goes_on) in [(6.0, false), (0.1, true)] {
         session.set_payload(&Payload { mass, com: [0.0, 0.0, 0.1], ..Payload::NONE }).unwrap();
         match session.resume() {

@@ -1,4 +1,4 @@
-//! Session on a shared line. The session must distinguish rejections by the device from denials by the agent.
+//! Tests of a session on a shared line. The session must distinguish rejections by the device from denials by the agent.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,7 +11,7 @@ use jtc_host::{
 };
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
-/// Denial that arrives with the next bytes that are read. The denial may belong to the last frame or to an earlier one.
+/// Denial that arrives with the next bytes that are read. The denial may belong to the last frame or to an earlier frame.
 #[derive(Clone, Default)]
 struct Denials(Rc<RefCell<Option<&'static str>>>);
 
@@ -75,7 +75,7 @@ fn a_late_denial_is_not_that_of_the_next_frame() {
     assert!(matches!(error, Error::Upload(UploadError::SegmentRefused { segment: 0, .. })), "{error}");
 }
 
-/// A denial that arrives together with the rejection is used as its reason.
+/// A denial that arrives together with a rejection is the reason for this rejection.
 #[test]
 fn a_denial_is_that_of_the_frame_before_it() {
     let (mut s, _) = session(Some("another one commands"));

@@ -1,5 +1,5 @@
-//! An arm without brakes has fallen to an end stop, slightly outside a position limit. Motions back into the limits are
-//! permitted from this position (J-36, J-58).
+//! Tests with an arm without brakes that has fallen to an end stop, slightly outside a position limit. From this position, motions back
+//! into the limits are permitted (J-36, J-58).
 
 use std::time::Duration;
 
@@ -73,7 +73,7 @@ fn j58_an_arm_outside_a_limit_approaches_a_trajectory() {
     finishes(&mut session, &start.checked);
 }
 
-/// The file begins at the position of the fallen arm. Hosts of existing systems write such files.
+/// The trajectory file begins at the position of the fallen arm. Hosts of existing systems write such files.
 #[test]
 fn j36_a_file_that_begins_outside_a_limit_and_goes_inwards_is_run() {
     let arm = Arm::avena();
@@ -89,7 +89,7 @@ fn j36_a_file_that_begins_outside_a_limit_and_goes_inwards_is_run() {
     assert!((inwards.points[0].position[2] - here[2]).abs() < 1e-9);
     let checked = CheckedTrajectory::check(&inwards, &arm, &here, &CheckOptions::default()).unwrap();
     finishes(&mut session, &checked);
-    // The reverse motion, which would exceed the limits, is rejected.
+    // The reverse motion would exceed the limits and is rejected.
     let mut points = inwards.points.clone();
     points.reverse();
     points.iter_mut().for_each(|point| point.velocity = point.velocity.map(|v| -v));

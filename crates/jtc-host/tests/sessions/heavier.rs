@@ -9,7 +9,7 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session};
 use jtc_sim::{ModelError, SimConfig, World};
 
-/// Returns the joint positions with this number. The positions for different numbers are different.
+/// Returns the joint positions for this number. Different numbers give different positions.
 fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     let config = arm.config();
     std::array::from_fn(|j| {
@@ -18,9 +18,9 @@ fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     })
 }
 
-/// Moves an arm that has the default parameters with all masses × 1.1 and all friction × 1.2. The motions are planned
-/// with this margin and at full speed. Returns the largest share of a torque limit that the controller commanded, or the
-/// reason why a motion did not finish.
+/// Moves an arm with the default parameters, but with all masses × 1.1 and all friction × 1.2. The motions are planned with the torque
+/// margin `margin_pct` (%) and at full speed. Returns the largest share of a torque limit that the controller commanded, or the reason why
+/// a motion did not finish.
 fn moved(margin_pct: f64, seed: u64) -> Result<f64, String> {
     let arm = Arm::avena();
     let model_error = ModelError {
@@ -55,7 +55,8 @@ fn moved(margin_pct: f64, seed: u64) -> Result<f64, String> {
     Ok(most)
 }
 
-/// On this arm, moves with the default margin do not reach a torque limit, but moves without a margin do.
+/// On a heavier arm, moves with the default margin do not reach a torque limit, but some moves without a margin reach
+/// it.
 #[test]
 fn a_heavier_arm_follows_plans_with_the_default_margin_below_its_torque_limits() {
     let mut reached = 0;

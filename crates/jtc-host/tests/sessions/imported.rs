@@ -1,4 +1,4 @@
-//! An arm that was imported from a robot description runs in the simulator with its proposed parameters.
+//! Tests of arms that are imported from a robot description and run in the simulator with the proposed parameters.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -41,7 +41,7 @@ fn description(scale: f64) -> String {
     text + "</robot>"
 }
 
-/// Sends the parameters of `arm` to a controller whose real arm is `plant`. Moves the arm, and then holds it for 5 s.
+/// Sends the parameters of `arm` to a controller whose real arm is `plant`. The controller moves the arm, and then holds the arm for 5 s.
 /// Returns the largest position error of each joint during the motion, mrad.
 fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     let config = SimConfig {
@@ -73,8 +73,8 @@ fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     Ok(joints.iter().map(|joint| joint.max_error_mrad.unwrap_or_default()).collect())
 }
 
-/// The rotors of the real arm are lighter or heavier than in the proposed parameters. The controller does not know this.
-/// The controller can still hold and move the arm.
+/// The rotors of the real arm are lighter or heavier than in the proposed parameters. The controller does not know the real inertia, but
+/// can still hold and move the arm.
 #[test]
 fn j41_j71_the_gains_that_are_proposed_move_an_arm_with_other_rotors() {
     let plain = include_str!("plain.urdf");

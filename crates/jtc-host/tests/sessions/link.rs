@@ -18,7 +18,7 @@ use jtc_sim::{Fault, FaultKind, Trigger};
 
 use super::{Sim, inject, motion, ready, session};
 
-/// Returns a motion to a pose and back, followed by rest, with `points` points in total.
+/// Returns a motion to a pose and back, followed by a standstill, with `points` points in total.
 fn trajectory(points: usize) -> Trajectory {
     let config = Config::avena();
     let there = plan::joint_move(&[0.0; 6], &[0.6, -0.5, 0.4, 0.8, -0.3, 0.9], &config, 60.0).unwrap();
@@ -30,7 +30,7 @@ fn trajectory(points: usize) -> Trajectory {
     Trajectory { step_ms: there.step_ms, points: all }
 }
 
-/// Checks a trajectory for the default arm at its first point.
+/// Checks a trajectory for the default arm, which is at the first point of the trajectory.
 fn checked(t: &Trajectory, upload: UploadOptions) -> CheckedTrajectory {
     let options = CheckOptions { upload, ..CheckOptions::default() };
     CheckedTrajectory::check(t, &Arm::avena(), &t.points[0].position, &options).unwrap()
@@ -126,7 +126,7 @@ fn j04_lost_confirmations_are_survived() {
     }
 }
 
-/// J-04, J-30: despite any losses on the line, the controller has every point at the end.
+/// J-04, J-30: after an upload over a line with any losses, the controller has every point.
 #[test]
 fn uploads_survive_a_bad_line() {
     for (seed, kind) in [
@@ -163,7 +163,7 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
     let Outcome::Finished(status) = outcome else { panic!("{outcome:?}") };
     assert_eq!(status.point, (t.trajectory().duration_s() * 1e3).round() as u32);
     assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
-    // A second execution from Finish is rejected, because the arm is at the end of the path (J-34).
+    // The controller rejects a second execution from Finish, because the arm is at the end of the path (J-34).
     let error = s.execute(&t).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Device);
     assert!(error.hint().contains("--approach"), "{error}");
@@ -203,7 +203,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
-    // The reported point is from the last status on the path, up to 40 ms before the fault.
+    // The reported point is from the last status of the motion, up to 40 ms before the fault.
     assert!((459..600).contains(point), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
     assert!(error.to_string().contains("joint 3"), "{error}");
@@ -213,7 +213,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
         .unwrap_or_else(|e| panic!("{e}: {steps:?}"));
     assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0), "{steps:?}");
     assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
-    // J-24: the arm never moves without a command.
+    // J-24: the arm does not move without a command.
     assert_ne!(status.trajectory, TrajectoryState::Execute);
 }
 
@@ -237,7 +237,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// If a person pushes the arm, the motion ends. The arm yields, and then the controller holds it. After the error is
+/// If a person pushes the arm, the motion ends. The arm yields to the push, and then the controller holds the arm. After the error is
 /// cleared, the client can resume the motion.
 #[test]
 fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
@@ -264,7 +264,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
         jtc_host::labels::errors_line(&held)
     );
     assert!(jtc_host::labels::next_step(&held).to_string().contains("jtc clear"));
-    // The client does not send a frame that moves the arm, and its error contains the cause.
+    // The client sends no frame that moves the arm, and the error of the client contains the cause.
     assert_eq!(s.resume().unwrap_err().code(), "held-stop");
     let error = s.ready_to_move(|_| (), || false).unwrap_err();
     assert!(error.code() == "held-stop" && error.to_string().contains("joint 5"), "{error}");
@@ -274,8 +274,8 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     assert!(!cleared.is_held_stop() && cleared.errors == 0);
 }
 
-/// After a jump of the encoder position, the controller holds the arm. The controller executes no motion until the
-/// drive is reset, and the error message states this.
+/// After a jump of the encoder position, the controller holds the arm. The controller executes no motion until the drive is reset, and the
+/// error message contains this remedy.
 #[test]
 fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     let mut s = ready(None);
@@ -291,7 +291,7 @@ fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     assert!(error.hint().contains("jtc reset --joints JOINT"), "{}", error.hint());
 }
 
-/// If the client no longer waits for teaching, the arm must not become compliant.
+/// If the client no longer waits for the start of teaching, the arm must not become compliant.
 #[test]
 fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     let mut s = ready(None);

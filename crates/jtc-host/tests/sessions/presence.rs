@@ -1,5 +1,5 @@
-//! Host supervision (J-59). The controller detects whether the session that commands the motion is alive. A session that
-//! only observes has no effect on this detection.
+//! Tests of host supervision (J-59). The controller detects if the session that commands the motion is alive. A session that only observes
+//! has no effect on this detection.
 
 use std::cell::RefCell;
 use std::rc::Rc;

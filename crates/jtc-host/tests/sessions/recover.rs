@@ -24,7 +24,7 @@ fn move_arm(s: &mut Sim) {
         .unwrap();
 }
 
-/// The user is shown each step of a recovery, from each state.
+/// The recovery reports each of its steps to the user, from each state.
 #[test]
 fn recover_says_each_step_of_each_state() {
     fn words(s: &mut Sim, source: ParameterSource<'_>) -> Vec<String> {
@@ -78,7 +78,7 @@ fn recover_says_each_step_of_each_state() {
     assert!(faulty.iter().any(|s| s == "clearing the errors of the controller and of joint 3"), "{faulty:?}");
 }
 
-/// A recovery that is cancelled during a motion stops the motion and sends nothing else.
+/// A recovery that is cancelled during a motion stops the motion and sends no other frame.
 #[test]
 fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
     let mut s = session(None);
@@ -115,8 +115,8 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
 }
 
-/// J-55: a controller without parameters does not receive the parameters of an arm that the user did not select.
-/// Missing parameters of an incomplete arm are not added.
+/// J-55: a controller without parameters does not receive the parameters of an arm that the user did not select. The recovery does not add
+/// the missing parameters of an incomplete arm.
 #[test]
 fn j55_recover_gives_no_numbers_that_nobody_named() {
     let mut s = session(Some(921_600));
@@ -136,7 +136,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
     assert_eq!(s.statistics().frames_sent, sent);
 
-    // The controller has a parameter of another arm. In this case, all parameters of the file are sent.
+    // The controller has a parameter of another arm. The recovery then sends all parameters of the file.
     s.use_default(jtc_host::session::Parameter::Pid).unwrap();
     let set = Arm::avena().parameter_set();
     let before = s.statistics().frames_sent;
@@ -150,8 +150,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // The controller holds the weight of the arm with the present parameters, so the recovery sends no other
-    // parameters. A step of the recovery reports this.
+    // The controller holds the weight of the arm with the present parameters, so the recovery sends no other parameters. A step of the
+    // recovery reports that the recovery sends no parameters.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -171,15 +171,16 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
-    // If the user selects no arm, the controller keeps its parameters. A step of the recovery reports this.
+    // If the user selects no arm, the controller keeps its parameters. A step of the recovery reports that the recovery sends no
+    // parameters.
     fail(&mut s, FaultKind::SafetyInput, 500);
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
 }
 
-/// J-55: gains that do not keep the arm stable, and limits that differ from the limits of the controller, are rejected
-/// before anything is sent.
+/// J-55: before the recovery sends a parameter, it rejects gains that do not keep the arm stable, and limits that differ from the
+/// controller's limits.
 #[test]
 fn j55_recover_checks_the_arm_before_anything_is_sent() {
     let mut s = session(Some(921_600));

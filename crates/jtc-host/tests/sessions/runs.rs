@@ -1,4 +1,4 @@
-//! Tests of the procedure for runs that all front ends share (J-55).
+//! Tests of the procedure of a run, which all front ends share (J-55).
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -23,7 +23,7 @@ struct Diary {
     stops_at: Option<u32>,
     /// If `true`, the front end requests full speed at each status during the motion.
     speeds: bool,
-    /// Number of statuses during the motion, and number of flows that were applied.
+    /// Number of statuses during the motion, and number of requested actions that were applied.
     statuses: usize,
     applied: usize,
 }
@@ -145,8 +145,8 @@ fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     }
 }
 
-/// The last status of a motion shows its end. The flow for this status is not applied, and the front end must report
-/// this to its client.
+/// The last status of a motion shows its end. The action that the front end requests for this status is not applied. The front end must
+/// report to its client that the action was not applied.
 #[test]
 fn j57_a_flow_for_the_last_status_of_a_motion_is_not_applied() {
     let mut diary = Diary { speeds: true, ..Diary::default() };

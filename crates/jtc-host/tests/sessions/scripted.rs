@@ -1,5 +1,4 @@
-//! Tests of a session with a scripted controller, for the frames that the session sends and for the error when the link
-//! is lost.
+//! Tests of a session with a scripted controller. The tests check the frames that the session sends, and the error when the link is lost.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -7,7 +6,7 @@ use std::time::Duration;
 use jtc_host::session::Flow;
 use jtc_host::{Diagnose, Error, ErrorKind, MotionError};
 
-/// Bytes that the session wrote, while a scripted controller sends nothing or repeats one status.
+/// Bytes that the session wrote. The scripted controller sends nothing or repeats one status.
 mod answers {
     use std::cell::RefCell;
     use std::rc::Rc;
@@ -51,7 +50,7 @@ mod answers {
     }
 }
 
-/// J-34: resume continues a paused motion. Resume does not start another motion.
+/// J-34: resume continues a paused motion, and does not start another motion.
 #[test]
 fn j34_resume_only_after_a_pause() {
     use TrajectoryState::{Execute, Finish, Null, Stop};
@@ -94,8 +93,8 @@ fn j34_resume_only_after_a_pause() {
     }
 }
 
-/// The link is lost during a motion. The error states that the arm may be moving. The session sends a Stop, because the
-/// controller may still receive it.
+/// If the link is lost during a motion, the error states that the arm may be moving. The session sends a Stop, because the controller may
+/// still receive it.
 #[test]
 fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     let moving = jtc_wire::Status {
@@ -129,8 +128,8 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!(written.borrow().len(), 0);
 }
 
-/// A frame without a record may have arrived, and a Stop from another line may have stopped the arm after that. So a
-/// frame that moves or releases the arm is sent again only if the record of the frame reports damage.
+/// A frame without a record may have arrived, and a Stop from another line may then have stopped the arm. Therefore a frame that moves or
+/// releases the arm is sent again only if the record of the frame reports damage.
 #[test]
 fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
@@ -139,8 +138,8 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // `records` contains the records for this frame, in order. Later frames receive no record. `done` selects whether
-    // the controller executes the frame.
+    // `records` contains the records for this frame, in order. Later frames receive no record. `done` is `true` if the controller executes
+    // the frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);

@@ -1,4 +1,4 @@
-// The arm as a drawing: forward kinematics of the joint origins, seen by a camera that can be turned.
+// Drawing of the arm. The forward kinematics use the joint origins, and the user can turn the camera.
 "use strict";
 
 const Arm = (() => {
@@ -22,7 +22,7 @@ const Arm = (() => {
   };
   const turn = (q) => [Math.cos(q), -Math.sin(q), 0, 0, Math.sin(q), Math.cos(q), 0, 0, 0, 0, 1, 0];
 
-  // Positions of the base, the six joints and the flange, m.
+  // Returns the positions of the base, the six joints and the flange, m.
   const chain = (origins, flange) => {
     const fixed = origins.map(origin);
     const last = origin(flange);
@@ -56,7 +56,7 @@ const Arm = (() => {
       canvas.addEventListener("pointerup", () => { from = null; });
     }
 
-    // Where a point in space lands on the canvas.
+    // Returns the position on the canvas of a point in space.
     project([x, y, z]) {
       const [ca, sa, ce, se] = [Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation)];
       const right = x * ca - y * sa;
@@ -91,7 +91,7 @@ const Arm = (() => {
       Object.assign(this, { w, h, ground: h - this.reach * 0.37 * this.scale - 8 });
       const { colour } = this;
 
-      // Floor: rings every quarter of the reach, and a cross.
+      // Floor with a cross, and with rings at each quarter of the arm's reach.
       for (let ring = 1; ring <= 4; ring++) {
         const r = (this.reach * ring) / 4;
         const circle = Array.from({ length: 73 }, (_, i) => this.project([r * Math.cos((i * Math.PI) / 36), r * Math.sin((i * Math.PI) / 36), 0]));
@@ -100,13 +100,13 @@ const Arm = (() => {
       this.line([this.project([-this.reach, 0, 0]), this.project([this.reach, 0, 0])], colour("--line"), 1);
       this.line([this.project([0, -this.reach, 0]), this.project([0, this.reach, 0])], colour("--line"), 1);
 
-      // The flange's path: what was, strong; what comes, faint.
+      // Path of the flange: the past part has a strong colour, and the future part has a faint colour.
       const path = this.path.map((p) => this.project(p));
       const here = Math.max(1, Math.round(this.share * (path.length - 1)));
       this.line(path, colour("--accent"), 1.5, 0.28);
       this.line(path.slice(0, here + 1), colour("--accent"), 2.2, 0.9);
 
-      // Shadow, links, joints.
+      // Shadow of the arm, links and joints.
       const points = this.forward(this.pose);
       this.line(points.map(([x, y]) => this.project([x, y, 0])), colour("--ink"), 9, 0.07);
       const screen = points.map((p) => this.project(p));

@@ -1,4 +1,5 @@
-// The page: unpacks the data, draws the plots, keeps their time axes and cursors together.
+// Script of the page. The script unpacks the data, draws the plots, and synchronises the time axes and cursors of the
+// plots.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const $ = (id) => document.getElementById(id);
@@ -38,7 +39,7 @@
   const has = (name) => column[name] && column[name].some(Boolean);
   const names = data.joints.map((j, i) => j.name.replace(/^joint_(\d)$/, "Joint $1") || `Joint ${i + 1}`);
   const shown = J.map(() => true);
-  // Planned and not run: nothing is measured, and what binds when is known.
+  // Binding limits of a motion that was planned but not executed. Such a motion has no measured values.
   const plan = data.plan;
 
   // --- heading -------------------------------------------------------------------------------------------------------
@@ -53,7 +54,7 @@
   const [rms, rmsJoint] = best("rms_error_mrad");
   const [max, maxJoint] = best("max_error_mrad");
   const [share, shareJoint] = best("torque_share");
-  // Figures of a run that failed are no measure of how well it went: they are only in the table below.
+  // The figures of a failed run do not show the quality of its tracking, so the page shows them only in the table below.
   const failed = known(data.failure_s);
   if (!failed && known(rms)) tile(round(rms, 2), "mrad", `worst RMS error, ${names[rmsJoint].toLowerCase()}`);
   if (!failed && known(max)) tile(round(max, 2), "mrad", `largest error, ${names[maxJoint].toLowerCase()}`);
@@ -80,13 +81,13 @@
     grid: { stroke: () => colour("--grid"), width: 1 }, ticks: { show: false }, ...more,
   });
 
-  // A number on an axis, with enough digits that numbers a step apart differ.
+  // Returns a number on an axis as text. The number has enough digits to differ from the next number on the axis.
   const label = (v, step, digits) => {
     const needed = Math.ceil(-Math.log10(step || 1));
     return String(+v.toFixed(Math.min(Math.max(digits, needed), 20))).replace("-", "−");
   };
 
-  // Where the run failed, in every plot.
+  // Draws a line at the time of the failure in a plot.
   const failureLine = (u) => {
     const { ctx, bbox } = u;
     const x = u.valToPos(data.failure_s, "x", true);
@@ -101,7 +102,7 @@
     ctx.restore();
   };
 
-  // One plot. `lines`: {y, joint, kind, stroke, width, dash}; a line shows when its joint and its kind do.
+  // Creates a plot. Each of the `lines` is {y, joint, kind, stroke, width, dash}. A line is visible if its joint and its kind are visible.
   const plot = (host, lines, { height = 250, unit = "", draw, range, digits = 3, axisless = false, onCursor } = {}) => {
     const kinds = {};
     lines = lines.filter((l) => l.y);
@@ -138,7 +139,7 @@
     }));
   });
 
-  // A card with a heading, keys that toggle kinds of lines, and values at the cursor.
+  // Creates a card with a heading, with keys that show or hide kinds of lines, and with the values at the cursor.
   const card = (parent, heading, small) => {
     const keys = make("div", { class: "keys" });
     const readout = make("div", { class: "readout" });
@@ -166,7 +167,7 @@
   const stateNames = ["Start", "Init", "HoldPos", "Operate", "Teaching", "Error"];
   const tesNames = ["no trajectory", "Stop", "Pause", "Execute", "Finish"];
 
-  // A band with its name on it, where that fits.
+  // Draws a band. If the text fits into the band, the text is drawn on the band.
   const band = (u, from, to, y, h, fill, alpha, text, ink) => {
     const { ctx } = u;
     const { left, width } = u.bbox;
@@ -190,7 +191,7 @@
     }
   };
 
-  // What binds a plan: a row a joint on the same time axis.
+  // Binding limits of a plan. Each joint has a row on the common time axis.
   const limitColours = { velocity: "--st3", acceleration: "--st2", jerk: "--st4", torque: "--st5", stop: "--friction", friction: "--friction", "given time": "--st1" };
   if (plan && time.length) {
     const c = card(main, "Limits over time", "the joint that is at a limit, and the kind of limit");
@@ -236,7 +237,7 @@
     if (!plan.length) c.keys.append(make("span", { class: "key" }, "no joint is at a limit"));
   }
 
-  // Timeline of states: two rows of bands on the same time axis.
+  // Timeline of states, with two rows of bands on the common time axis.
   if (time.length && !plan) {
     const c = card(main, "States", "controller, trajectory");
     const start = data.time_start_s;
@@ -263,7 +264,7 @@
     c.readout.textContent = data.errors.some((r) => r[2]) ? "errors occurred" : "";
   }
 
-  // The limits of the joints that are shown, where the plot reaches them; a limit of several is drawn once, in a colour of its own.
+  // Draws the limits of the visible joints that are inside the plot. A limit that several joints have is drawn once, in a separate colour.
   const limits = (of) => (u) => {
     if (!of) return;
     const { ctx, bbox } = u;
@@ -287,7 +288,7 @@
     if (!has(measured) && !(set && has(set))) return;
     const c = card(main, heading, small);
     const both = has(measured) && set && has(set);
-    // Commanded as a broad pale band, measured as a fine line on it: both are seen where they agree.
+    // Commanded values are broad pale bands, and measured values are fine lines on these bands. Equal values are therefore both visible.
     const lines = set && has(set) ? J.map((j) => ({ y: column[set][j], joint: j, kind: "set", stroke: `--j${j}`, ...(both ? { width: 5, alpha: 0.26 } : { width: 1.6 }) })) : [];
     if (has(measured)) lines.push(...J.map((j) => ({ y: column[measured][j], joint: j, kind: "measured", stroke: `--j${j}`, width: 1.4 })));
     const item = plot(c.body, lines, { ...options, draw: limits(options.limits), onCursor: readouts(c.readout, column[has(measured) ? measured : set], options.digits) });
@@ -305,11 +306,11 @@
   jointPlot("Velocity", "rad/s", "velocity_rad_s", "set_velocity_rad_s", { digits: 3, height: 260, limits: (j) => [j.velocity_max_rad_s, -j.velocity_max_rad_s] });
   jointPlot("Acceleration", "rad/s²", "acceleration_rad_s2", "set_acceleration_rad_s2", { digits: 2, height: 240 });
 
-  // Torque split: one small plot a joint.
+  // Parts of the torque, with one small plot for each joint.
   if (has("torque_nm")) {
     const split = has("torque_model_nm");
     const parts = [
-      // The total, with the feedback's noise on it, lies below its parts.
+      // The total torque contains the noise of the feedback, so it is drawn behind its parts.
       [split ? "total" : "torque", "torque_nm", "--total", 1, split && !plan ? 0.4 : 1], ["feedback (PID)", "torque_pid_nm", "--pid", 1, 0.8],
       ["friction", "torque_friction_nm", "--friction", 1.5, 1], ["model", "torque_model_nm", "--model", 1.5, 1],
     ].filter(([, name]) => has(name));
@@ -371,7 +372,7 @@
   const table = (heading, head, rows) => make("section", { class: "card" }, make("header", {}, make("h2", {}, heading)),
     make("div", { class: "scroll" }, make("table", {}, ...(head ? [make("tr", {}, ...head.map((h) => make("th", {}, h)))] : []),
       ...rows.map((r) => make("tr", {}, ...r.map((cell) => (cell instanceof Node ? cell : make("td", {}, cell))))))));
-  // What no joint has has no column.
+  // A figure that no joint has does not get a column.
   const figures = [
     ["RMS error, mrad", "rms_error_mrad", 3], ["max error, mrad", "max_error_mrad", 3], ["peak speed, rad/s", "peak_velocity_rad_s", 3],
     ["peak torque, N·m", "peak_torque_nm", 2], ["limit, N·m", "torque_limit_nm", 1], ["share of limit", "torque_share"], ["hottest, °C", "peak_temperature_c", 0],
@@ -423,7 +424,7 @@
 
   // --- the arm -------------------------------------------------------------------------------------------------------
   let view = null;
-  // A joint that is not measured any more is shown where it was seen last.
+  // A joint that is no longer measured is drawn at its last measured position.
   const held = (y) => { let seen = 0; return y && y.map((v) => (known(v) ? (seen = v) : seen)); };
   const poses = (has("position_rad") ? column.position_rad : column.set_position_rad)?.map(held);
   const origins = data.joints.map((j) => j.origin);

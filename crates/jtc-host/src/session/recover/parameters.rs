@@ -13,7 +13,7 @@ use crate::session::Session;
 /// Parameters that a recovery sends to a controller without torque (J-55).
 #[derive(Clone, Debug, Default)]
 pub enum RecoverParameters {
-    /// No parameters. No source: a controller that lacks parameters is rejected.
+    /// No parameters. If the controller lacks parameters, the recovery fails.
     #[default]
     None,
     /// Default parameters of the controller, built in or stored.
@@ -22,8 +22,8 @@ pub enum RecoverParameters {
     Arm {
         /// Arm with friction, gains and model.
         arm: Arc<Arm>,
-        /// `true` if the caller accepts that the controller has other values for settings that are not sent with
-        /// friction, gains and model.
+        /// `true` if the caller accepts that settings of the controller differ from the settings of the arm. The recovery sends only
+        /// friction, gains and model, and does not send settings.
         accept_device_limits: bool,
     },
 }
@@ -33,7 +33,8 @@ impl RecoverParameters {
     ///
     /// # Errors
     ///
-    /// [`ParametersError::IncompleteArm`], [`ParametersError::Unstable`].
+    /// Returns [`ParametersError::IncompleteArm`] if a parameter is missing. Returns [`ParametersError::Unstable`] if the arm is not stable
+    /// with its gains.
     pub fn check(&self) -> Result<(), ParametersError> {
         let Self::Arm { arm, .. } = self else { return Ok(()) };
         ParameterSource::Arm { name: &arm.name, set: &arm.parameter_set() }.check()?;
@@ -47,8 +48,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if
-    /// controller and arm have different limits, and the caller does not accept this. If one of these checks fails, the
+    /// Returns the errors of [`RecoverParameters::check`] and [`Session::recover_until`]. Returns [`CheckError::DeviceLimits`] if
+    /// controller and arm have different limits, and the caller does not accept the differences. If one of these checks fails, the
     /// controller is unchanged.
     pub fn recover_with(
         &mut self,

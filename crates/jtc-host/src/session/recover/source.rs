@@ -7,10 +7,10 @@ use crate::arm::ParameterSet;
 use crate::error::ParametersError;
 use crate::labels;
 
-/// Source of friction, gains and arm model for a controller that lacks some of them (J-55).
+/// Source of friction, gains and arm model for a controller that lacks some of these parameters (J-55).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ParameterSource<'a> {
-    /// No source: a controller that lacks parameters is rejected.
+    /// No source. If the controller lacks parameters, the recovery fails.
     #[default]
     None,
     /// Default parameters of the controller, built in or stored.
@@ -29,7 +29,7 @@ impl ParameterSource<'_> {
     ///
     /// # Errors
     ///
-    /// [`ParametersError::IncompleteArm`] if the set is not complete.
+    /// Returns [`ParametersError::IncompleteArm`] if the set is not complete.
     pub fn check(&self) -> Result<(), ParametersError> {
         match self {
             ParameterSource::Arm { name, set } if !set.missing().is_empty() => {
@@ -49,8 +49,9 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns `true` if parameters must be sent. Every controller receives the parameters of an arm once. Only a controller that lacks some
-    /// parameters is commanded to use its defaults. All three parameters are always sent, so that the parameters of two arms are never mixed.
+    /// Returns `true` if parameters must be sent. Every controller receives the parameters of an arm once. A controller is commanded to use
+    /// its defaults only if it lacks some parameters. Friction, gains and model are always sent together, so that the parameters of two
+    /// arms are never mixed.
     pub(super) fn due(&self, status: &Status, given: bool) -> bool {
         match self {
             ParameterSource::None => false,

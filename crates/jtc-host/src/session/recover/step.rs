@@ -20,8 +20,7 @@ pub enum RecoverStep {
     Clear(Vec<String>),
     /// Nodes are reset.
     Reset(Vec<String>),
-    /// Friction, gains and arm model are set, to the defaults of the controller or to the parameters of the arm with this
-    /// name.
+    /// Friction, gains and arm model are set. The values are the parameters of the arm with this name, or the defaults of the controller.
     Give(Option<String>),
     /// No parameters are sent, so the controller keeps its parameters.
     Keep,

@@ -2,7 +2,7 @@
 //!
 //!     cargo run --profile dist -p jtc-plan --example campaign -- [CASES [SEED]]
 //!
-//! Prints the seed of every failed case. Ends with exit code 1 if a case failed.
+//! The program prints the seed of every failed case. The program ends with exit code 1 if a case failed.
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;

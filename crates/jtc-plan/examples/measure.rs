@@ -3,10 +3,11 @@
 //!     cargo run --profile dist -p jtc-plan --example measure -- speed
 //!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED]]
 //!
-//! `speed` prints the processor time in ms, the shortest of several runs. `quality` prints a line for each kind of
-//! path. The line contains the sum and the maximum of the durations, each divided by the duration without a jerk limit.
-//! After these, it contains the number of motions that became slower when all limits were doubled. If a file name
-//! follows the seed, the duration of each motion is written to that file.
+//! `speed` prints the processor time in ms, which is the shortest time of several runs. `quality` prints a line for
+//! each kind of path. The line contains the sum of the durations and its ratio to the sum without a jerk limit, and the
+//! largest such ratio of a motion. The line then contains the number of motions that became slower when all limits were
+//! doubled. The number of motions that could not be planned and the processor time follow. If a file name follows the
+//! seed, the durations of each motion are written to this file.
 use std::fmt::Write as _;
 
 use jtc_core::{Config, Parameters};

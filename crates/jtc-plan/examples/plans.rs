@@ -1,10 +1,10 @@
 //! Plans the motions that the lines of standard input describe, for comparison with other implementations.
 //!
-//! Each input line is a list of words. Numbers are written with all digits. The arm is the default one, without
-//! friction and payload:
+//! Each input line is a list of words. Numbers are written with all digits. The arm is the default arm without friction
+//! and payload:
 //!
 //! - `limits`, then velocity, acceleration, jerk (`inf`: no limit) and torque of six joints: sets the limits for the
-//!   lines that follow.
+//!   next lines.
 //! - `move`, then start and end positions of six joints: prints the duration in s.
 //! - `path`, then the blend (rad), 1 with torque or 0 without, the number of points, and waypoints of six joints:
 //!   prints a line with duration (s), planning time (s) and the number of points. A line for each point follows, with

@@ -1,4 +1,4 @@
-//! Time laws for paths.
+//! Computation of time laws for paths.
 use jtc_wire::Joint;
 
 use crate::cells::{Cell, cells};
@@ -8,17 +8,17 @@ use crate::motion::Motion;
 use crate::path::Path;
 use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
-/// Plans the fastest motion from rest to rest along a path within the limits of velocity, acceleration and torque. The method is
-/// time-optimal path parameterisation by reachability analysis (Pham and Pham 2018). If the limits include a jerk limit, an interior-point
-/// method shortens the time law. The method starts from a law that is averaged over a window. This method evaluates velocity,
-/// acceleration, jerk and torque at points along the path. The motion is also verified between its samples, and slowed down until it keeps
-/// all limits.
+/// Plans the fastest motion from rest to rest along a path within the limits of velocity, acceleration and torque. The
+/// method is time-optimal path parameterisation by reachability analysis (Pham and Pham 2018). If the limits include a
+/// jerk limit, the law is averaged over a time window, and then an interior-point method shortens it. The
+/// interior-point method evaluates velocity, acceleration, jerk and torque at points along the path. Every motion is
+/// also verified between its samples, and is slowed down until it keeps all limits.
 ///
 /// # Errors
 ///
-/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion, [`PlanError::Position`] and
-/// [`PlanError::Path`] if the path is partly outside the limits or has no direction, [`PlanError::Torque`] if the torque is
-/// too small at every speed.
+/// Returns [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion. Returns
+/// [`PlanError::Position`] and [`PlanError::Path`] if the path is partly outside the limits or has no direction.
+/// Returns [`PlanError::Torque`] if the torque is too small at every speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
     unexplained(path, limits, arm).map(|motion| reasons::explained(motion, limits, arm))
 }
@@ -32,8 +32,8 @@ pub(crate) fn unexplained(
     along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
-/// Choices made for each section of a path. If a path is planned again, the planner reuses these choices, so that the
-/// time law changes continuously with the path.
+/// Planning method that was chosen for each section of a path. If a path is planned again, the planner reuses these methods. With equal
+/// methods, the time law changes continuously with the path.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<Choice>>);
 
@@ -41,7 +41,7 @@ pub(crate) struct Choices(Vec<Option<Choice>>);
 #[derive(Clone, Copy, Debug)]
 enum Choice {
     InteriorPoint,
-    /// Law without a jerk limit, or law averaged over a window with these shares.
+    /// Law without a jerk limit, or law averaged over a time window with these shares of the limits.
     Other(Option<jerk::Shares>),
 }
 
@@ -82,7 +82,7 @@ fn first_waypoint(path: &dyn Path, s: f64) -> usize {
     passed(s).min(passed(s.next_down()) + 1)
 }
 
-/// Returns the sections of the path between the stops.
+/// Returns the sections of the path. A section goes from one stop to the next.
 fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let end = path.end();
     if !(end.is_finite() && end > 0.0) {
@@ -106,7 +106,7 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let sections = ends.windows(2).map(|pair| {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
-        // If a waypoint is repeated, the path passes it once for each repetition.
+        // Several waypoints may be at the same parameter of the path. Each waypoint at this parameter is counted.
         let at = |place: f64| {
             waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
         };
@@ -162,7 +162,8 @@ fn of_section(
     }
 }
 
-/// Returns the motion of a law without a jerk limit, or of a law averaged over a window with the chosen shares.
+/// Returns the motion of a law without a jerk limit, or of a law averaged over a time window with the chosen shares of
+/// the limits.
 fn without_interior(
     mut plan: Plan,
     shares: Option<jerk::Shares>,
@@ -219,7 +220,7 @@ pub(crate) struct Plan<'a> {
     pub caps: Vec<f64>,
     /// Squared speed in each cell up to which friction is evaluated.
     pub reached: Vec<f64>,
-    /// Factor that reduces the speed in each cell.
+    /// Factor that reduces the speed in each cell of the path.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
@@ -229,26 +230,26 @@ pub(crate) struct Plan<'a> {
 pub(crate) struct Made {
     pub law: Law,
     pub motion: Motion,
-    /// Shares of the limits that a jerk-limited law uses.
+    /// Shares of the limits that a jerk-limited law uses; `None` for a law without a jerk limit.
     pub shares: Option<jerk::Shares>,
 }
 
-/// Number of times that an interior-point law is repaired. A repair slows down the cells in which a limit is violated
+/// Number of times that an interior-point law is repaired. A repair slows down each cell in which a limit is violated
 /// between samples.
 const INTERIOR_REPAIRS: usize = 1;
-/// Largest number of cells for which laws averaged over a window are also tried.
+/// Largest number of cells for which laws averaged over a time window are also tried.
 const FEW: usize = 200;
 /// Number of times that a section is planned with torque limits.
 const TORQUE_ROUNDS: usize = 4;
-/// Minimum share of the duration that a round must save; otherwise no further round follows.
+/// Minimum share of the duration that a round must save. If a round saves less, it is the last round.
 const WORTH: f64 = 0.004;
 /// Largest factor between a cell's speeds in two consecutive rounds.
 const FASTER: f64 = 1.1;
 
-/// Number of times that single cells are slowed down because a limit is violated between samples. After that, the whole
-/// motion is slowed down.
+/// Number of times that single cells are slowed down because a limit is violated between samples. If a limit is still
+/// violated, the whole motion is slowed down.
 const REPAIRS: usize = 4;
-/// Maximum time factor for which the whole motion is slowed down instead of repairing it again.
+/// Time factor up to which no further cells are slowed down. If all cells need at most this factor, the whole motion is slowed down.
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
@@ -258,7 +259,8 @@ impl Plan<'_> {
         if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
-    /// Returns squared speeds of the cells that are slightly higher than the speeds of a law.
+    /// Returns a squared speed for each cell, slightly above the highest squared speed of a law in this cell, but at
+    /// most the cap of the cell.
     fn reached_by(&self, law: &Law) -> Vec<f64> {
         let speed = |s: f64| law.at(law.time_of(s)).1;
         let mut before = 0.0;
@@ -296,7 +298,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns, for each cell, the factor on the time with which the motion keeps all limits.
+    /// Returns, for each cell, the time factor with which the motion keeps all limits.
     pub(crate) fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

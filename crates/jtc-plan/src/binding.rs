@@ -1,4 +1,4 @@
-//! Binding limits over time.
+//! Binding limits of a motion over time.
 use std::fmt;
 
 use jtc_wire::Joint;
@@ -15,7 +15,7 @@ pub enum LimitKind {
     Jerk,
     /// Joint torque, N·m.
     Torque,
-    /// A time that the request specifies for a waypoint. The limits permit a faster motion.
+    /// A time that the request specifies for a waypoint. The other limits permit a faster motion.
     GivenTime,
 }
 
@@ -49,8 +49,8 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// Time interval with its binding limit. The motion reaches or nearly reaches this limit, so that a faster motion would
-/// exceed it.
+/// Time interval with its binding limit. The motion reaches or nearly reaches this limit, so a faster motion would
+/// exceed the limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
     /// Start of the interval, in seconds after the start of the motion.

@@ -5,29 +5,29 @@ use crate::distance::distance;
 use crate::path::{Path, PathPoint, Waypointed};
 use crate::{JOINTS, JointVec, PlanError, thin};
 
-/// Distance below which waypoints are considered equal, rad.
+/// Maximum distance between waypoints that are considered equal, rad.
 const SAME: f64 = 1e-9;
 /// Smallest difference of directions that is treated as a corner.
 const STRAIGHT: f64 = 1e-9;
-/// Length of the sum of the two directions below which the path turns back (within about 3°). The path then stops
-/// instead of rounding the corner.
+/// If every component of the sum of the directions of two consecutive legs is below this value, the path turns back
+/// (within about 3°). At such a corner the path stops instead of rounding the corner.
 const BACK: f64 = 0.05;
 
-/// Straight legs in joint space between waypoints, with rounded corners. The path leaves a leg and reaches the next one
-/// within `blend` rad of the waypoint between the two legs. This distance is measured on the joint that moves most.
+/// Straight legs in joint space between waypoints, with rounded corners. The path leaves a leg and reaches the next leg within `blend` rad
+/// of the waypoint between the two legs. The joint that moves most determines this distance.
 ///
-/// In a corner, the direction changes from one leg to the next as a smooth step. The slope of the step rises, stays
-/// constant and falls. The curvature is therefore continuous, the path stays in the triangle of the corner, and no
+/// In a corner, the direction changes from one leg to the next as a smooth step. The slope of this step rises, stays
+/// constant and falls. Therefore the curvature is continuous, the path stays in the triangle of the corner, and no
 /// joint overshoots. A rounded corner uses at most half of each adjacent leg. Two collinear legs have no corner. The
-/// path stops at a waypoint if it turns back there, or if the waypoint is repeated. If the blend is 0, the path stops
-/// at every waypoint.
+/// path stops at a waypoint if it turns back at this waypoint, or if the waypoint is repeated. If the blend is 0, the
+/// path stops at every waypoint.
 ///
 /// The path parameter is the distance in rad that the joint with the largest movement covers along the straight legs.
 #[derive(Clone, Debug)]
 pub struct BlendedPath {
     /// Corners without repetitions.
     corners: Vec<Corner>,
-    /// List with an entry for each waypoint of the request.
+    /// Location on the path of each waypoint of the request.
     given: Vec<Given>,
 }
 
@@ -58,8 +58,8 @@ impl BlendedPath {
     ///
     /// # Errors
     ///
-    /// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`], [`PlanError::Blend`] for a
-    /// negative or invalid blend, [`PlanError::Path`] if all waypoints are equal.
+    /// Returns [`PlanError::TooFew`] for fewer than two waypoints. Returns [`PlanError::NotFinite`] for a position that is not a finite
+    /// number. Returns [`PlanError::Blend`] for a negative or invalid blend. Returns [`PlanError::Path`] if all waypoints are equal.
     pub fn new(waypoints: &[JointVec], blend: f64) -> Result<Self, PlanError> {
         if waypoints.len() < 2 {
             return Err(PlanError::TooFew { count: waypoints.len() });
@@ -98,10 +98,10 @@ impl BlendedPath {
         }
     }
 
-    /// Returns the path without the corners that are close to the straight line between the remaining corners. Such a
-    /// corner is at most `share` of the blend from the line, and the corners are in order along the line. Waypoints are
-    /// removed only if they are so dense that the whole line stays within the blend of the removed waypoints. Waypoints
-    /// for which `keep` returns `true` are not removed. Returns `None` if no corner can be removed.
+    /// Returns the path without the corners that are close to the straight line between the remaining corners. A
+    /// removed corner is at most `share` of the blend from this line, and the removed corners are in order along the
+    /// line. The removed waypoints are so dense that the whole line stays within their blends. Waypoints for which
+    /// `keep` returns `true` are not removed. Returns `None` if no corner can be removed.
     pub(crate) fn thinned(&self, blend: f64, share: f64, keep: &dyn Fn(usize) -> bool) -> Option<Self> {
         let mut stays: Vec<bool> = self.corners.iter().map(|c| c.stop && !c.leads_back).collect();
         for (i, given) in self.given.iter().enumerate() {
@@ -163,12 +163,12 @@ impl BlendedPath {
         path
     }
 
-    /// Returns `true` if two waypoints are so close that there is no leg between the two.
+    /// Returns `true` if two waypoints are so close that there is no leg between them.
     pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
         distance(a, b) <= SAME
     }
 
-    /// Returns the index of the leg at `s`. At a corner, this is the next leg.
+    /// Returns the index of the leg at `s`. At a corner, the result is the next leg.
     fn leg(&self, s: f64) -> usize {
         let after = self.corners.partition_point(|c| c.parameter <= s);
         after.saturating_sub(1).min(self.corners.len() - 2)
@@ -206,9 +206,9 @@ impl BlendedPath {
     }
 }
 
-/// Evaluates a step function from 0 (at 0) to 1 (at 1). Its slope rises, stays constant and falls, each for a third of the interval. Of
-/// all steps with a slope of at most 3/2, this step has the smallest second derivative. Returns the integral, the value and the slope
-/// of the step at `u`.
+/// Evaluates a step function from 0 (at 0) to 1 (at 1). The slope of the step rises, stays constant and falls, each for
+/// a third of the interval. Of all steps with a slope of at most 3/2, this step has the smallest second derivative.
+/// Returns the integral, the value and the slope of the step at `u`.
 fn step(u: f64) -> (f64, f64, f64) {
     const THIRD: f64 = 1.0 / 3.0;
     if u < THIRD {
@@ -264,12 +264,12 @@ impl Path for BlendedPath {
         let mut breaks = Vec::with_capacity(4 * inner.len());
         for corner in inner {
             if corner.half > 0.0 {
-                // Two adjacent rounded corners share one break.
+                // If two adjacent rounded corners touch, they share one break.
                 let begin = corner.parameter - corner.half;
                 if breaks.last().is_none_or(|last| begin > last + 0.01 * corner.half) {
                     breaks.push(begin);
                 }
-                // The step changes its form at each third.
+                // The step of a corner changes its form at each third.
                 let third = corner.half / 3.0;
                 breaks.extend([-third, third, corner.half].map(|d| corner.parameter + d));
             } else {
@@ -303,8 +303,8 @@ impl Waypointed for BlendedPath {
     }
 }
 
-/// Returns the waypoints without consecutive duplicates, and, for each waypoint of the request, its index in the
-/// shorter list.
+/// Returns the waypoints without consecutive duplicates, and the index of each waypoint of the request in this shorter
+/// list.
 fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanError> {
     let mut corners: Vec<Corner> = Vec::with_capacity(waypoints.len());
     let mut given = Vec::with_capacity(waypoints.len());

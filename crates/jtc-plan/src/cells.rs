@@ -10,12 +10,12 @@ use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 struct Division {
     straight: usize,
     curved: usize,
-    /// Smallest number of cells, for a path of few parts.
+    /// Smallest number of cells of a path that has few parts.
     least: usize,
 }
 
 const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
-/// Number of cells for a law whose acceleration changes only at the ends of cells.
+/// Division for a law whose acceleration changes only at the ends of cells.
 const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
 /// Share of the torque available for motion that the path speed may use.
@@ -23,9 +23,10 @@ const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
 /// Minimum share of the torque limit that must be available for motion when friction increases with the speed. If less
-/// torque is available, the speed is reduced.
+/// torque is available for motion, the speed is reduced.
 const MOTION_SHARE: f64 = 0.05;
-/// Share of the torque above the holding torque that must remain available for motion, if this is the smaller value.
+/// Share of the torque above the holding torque that must remain available for motion, if this torque is smaller than
+/// [`MOTION_SHARE`] of the limit.
 const STANDING_SHARE: f64 = 0.5;
 /// Share of the torque limit that is sufficient for a slow motion.
 const CREEP_SHARE: f64 = 0.002;
@@ -58,7 +59,7 @@ pub(crate) struct End {
     pub loads: Option<Loads>,
 }
 
-/// A part of a section with a single smooth curve.
+/// Part of a section on which the path is a single smooth curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
     /// Range of the parameter, from the start of the section.
@@ -133,9 +134,9 @@ fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// Torque available for motion up (`high`) and down (`low`) at one end of a cell, N·m. The available torque is the
-/// usable torque minus the holding torque, and minus the highest friction torque up to the speed in the direction of
-/// the path.
+/// Torque available for motion in the positive (`high`) and negative (`low`) direction at one end of a cell, N·m. The
+/// available torque is the usable torque minus the holding torque and the highest friction torque. The friction is
+/// evaluated up to the cell's speed in the direction of the path.
 pub(crate) struct Room {
     pub high: JointVec,
     pub low: JointVec,
@@ -163,8 +164,8 @@ impl Room {
         room
     }
 
-    /// Returns the joint whose available torque exceeds `needed` by the smallest amount. Also returns this torque as a
-    /// share of the joint's torque limit.
+    /// Returns the joint whose available torque exceeds `needed` by the smallest amount. Also returns the available
+    /// torque as a share of the joint's torque limit.
     fn least(&self, limits: &Limits, needed: &JointVec) -> (f64, usize) {
         let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
         let over = |j: &usize| share(*j) - needed[*j];
@@ -191,11 +192,11 @@ impl Cell {
         cap
     }
 
-    /// Returns the squared speed, at most `cap`, at which torque remains for motion after friction.
+    /// Returns the squared speed, at most `cap`, at which enough torque remains for motion after friction.
     ///
     /// # Errors
     ///
-    /// Returns the joint without available torque at any speed, with the required torque and its limit.
+    /// Returns the joint, the required torque and the usable torque if a joint has no torque for motion at any speed.
     pub(crate) fn friction_cap(
         &self,
         mut cap: f64,
@@ -218,7 +219,7 @@ impl Cell {
                     break;
                 }
                 if cap <= SLOWEST * fastest {
-                    // The torque is sufficient for a slow motion.
+                    // The torque is sufficient for a slow motion, so the speed is not reduced further.
                     if share > CREEP_SHARE {
                         break;
                     }

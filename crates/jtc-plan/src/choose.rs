@@ -8,12 +8,12 @@ use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanErro
 
 /// Maximum distances of dropped waypoints from the straight line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// Minimum ratio of the number of corners of a path to the number of corners of its thinned version, for which the path
-/// itself is not planned (with a jerk limit).
+/// If thinning divides the number of corners by this factor or more, and there is a jerk limit, only the thinned paths
+/// are planned.
 const DENSE: usize = 8;
 /// Number of rounds in which rounded corners are replaced by stops.
 const ROUNDS: usize = 5;
-/// Time with a stop, as a share of the time with the rounded corner, below which the corner is replaced by a stop.
+/// A stop replaces a rounded corner if the time with the stop is below this share of the time with the rounded corner.
 const WORTH: f64 = 0.99;
 
 /// Fastest motion found so far, without its limiting constraints, and the path of this motion.
@@ -23,8 +23,8 @@ pub(crate) struct Chosen {
 }
 
 /// Plans several motions through the waypoints of `path` and returns the fastest motion. The options are the path
-/// itself, a path without some waypoints or with stops at some corners, and a path with a stop at each waypoint.
-/// Waypoints for which `keep` returns `true` are not dropped.
+/// itself, paths without some of the waypoints, paths with stops at some corners, and a path with a stop at each
+/// waypoint. Waypoints for which `keep` returns `true` are not dropped.
 pub(crate) fn fastest(
     path: BlendedPath,
     blend: f64,
@@ -68,7 +68,7 @@ pub(crate) fn fastest(
                 _ => break,
             }
         }
-        // A further plan would result in an identical motion.
+        // If the best path already stops at all corners, another plan with these stops would give the same motion.
         let is_planned =
             |best: &Timed| best.path.corners() == all_stops.corners() && best.path.stops_everywhere();
         let with_stops: f64 = all_stops.legs().map(|(a, b)| rest_to_rest(&a, &b, &line_limits)).sum();
@@ -109,8 +109,8 @@ impl Timed {
         Ok(Self { path, motion, middles })
     }
 
-    /// Returns the rounded corners that take longer than a stop at that corner. The time with a stop is half the
-    /// rest-to-rest time of each adjacent leg.
+    /// Returns the rounded corners at which a stop would take less time. The time with a stop is half of the
+    /// rest-to-rest times of the two adjacent legs.
     fn slow_corners(&self, limits: &Limits) -> Vec<usize> {
         let at_rest: Vec<f64> = self.path.legs().map(|(a, b)| rest_to_rest(&a, &b, limits)).collect();
         let is_slow = |&i: &usize| {
@@ -165,7 +165,7 @@ impl Path for WithMiddles<'_> {
 }
 
 /// Returns the time of the fastest motion on a straight line from rest to rest, s, ignoring torque. Speed, acceleration
-/// and jerk on the line are the highest that the joint limits permit.
+/// and jerk on the line are the highest values that the joint limits permit.
 fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     let least = |limit: &JointVec| {
         let of = |j: usize| limit[j] / (to[j] - from[j]).abs();
@@ -173,8 +173,8 @@ fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     };
     let (speed, acceleration, jerk) =
         (least(&limits.velocity), least(&limits.acceleration), least(&limits.jerk));
-    // Positions are fractions of the line. The acceleration phase lasts `ramp` seconds, and its distance is half of
-    // `ramp` times the speed.
+    // Positions are fractions of the line. The acceleration phase lasts `ramp` seconds. The distance of this phase is
+    // half of `ramp` times the speed.
     let ramp = |speed: f64| {
         if speed * jerk < acceleration * acceleration {
             2.0 * (speed / jerk).sqrt()

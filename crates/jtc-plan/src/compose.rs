@@ -9,14 +9,14 @@ const SHORTEST: f64 = 2e-4;
 /// Minimum duration of a piece without a jerk limit, s. In a shorter piece, rounding errors dominate the second
 /// derivative.
 const SHORTEST_WITHOUT_JERK: f64 = 1e-5;
-/// Largest distance of the middle of a piece from the path, rad.
+/// Largest distance between the middle of a piece and the path, rad.
 const AWAY: f64 = 1e-9;
 /// Largest error of the acceleration in the middle of a piece, as a share of the acceleration limit.
 const ACCELERATION_AWAY: f64 = 1e-3;
 /// Maximum number of times that a piece is halved to stay within the two error limits above.
 const HALVINGS: u8 = 7;
 
-/// Section of a path from one stop to the next, with the points at which the path changes its form (breaks).
+/// Section of a path from one stop to the next. The path changes its form at the breaks of the section.
 pub(crate) struct Section<'a> {
     pub path: &'a dyn Path,
     pub from: f64,
@@ -71,7 +71,7 @@ impl Section<'_> {
         Motion::new(pieces, self.path.at(self.to).position, times)
     }
 
-    /// Returns the start and end time of each part. Each part is at least as long as the minimum duration of a piece.
+    /// Returns the start and end time of each part between two breaks.
     fn times(&self, law: &Law) -> Vec<(f64, f64)> {
         let mut times: Vec<f64> = vec![0.0];
         times.extend(self.breaks.iter().map(|s| law.time_of(s - self.from)));
@@ -91,7 +91,7 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// Adds as many pieces as the motion needs to stay on the path.
+    /// Adds the pieces of the motion in this part. If the motion of one piece leaves the path, the piece is halved.
     fn pieces(&self, pieces: &mut Vec<Piece>, halvings: u8) {
         let (from, to) = (self.from, self.to);
         if to <= from {

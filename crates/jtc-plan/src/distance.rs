@@ -4,7 +4,7 @@ use jtc_wire::Joint;
 use crate::JointVec;
 
 /// Returns the joint whose position differs most between `a` and `b`, and the difference, rad. If the difference of a
-/// joint is NaN, returns that joint.
+/// joint is NaN, returns this joint.
 pub fn furthest_joint(a: &JointVec, b: &JointVec) -> (Joint, f64) {
     let apart = |joint: Joint| (joint, (b[joint.index()] - a[joint.index()]).abs());
     let [first, others @ ..] = Joint::ALL;

@@ -10,7 +10,7 @@ use crate::limits::MARGIN_MAX;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// Fewer than two waypoints.
+    /// A request with fewer than two waypoints.
     #[error("too few waypoints: {count}, expected at least 2")]
     TooFew {
         /// Number of waypoints.
@@ -103,11 +103,11 @@ pub enum PlanError {
         limit: LimitKind,
         /// Specified time from waypoint `from` to this waypoint, s.
         given: f64,
-        /// Shortest possible time, s. If only the adjacent legs cause the error, it is 5 % longer than the specified
-        /// time.
+        /// Shortest possible time, s. If only the adjacent legs make the specified time impossible, this field is 5 % longer than the
+        /// specified time.
         shortest: f64,
     },
-    /// The torque is not sufficient at any speed.
+    /// The torque of a joint is not sufficient at any speed.
     #[error("waypoint {waypoint}, {}", self.what())]
     Torque {
         /// Number (from 1) of the waypoint with the failure, or of the last waypoint before the failure.
@@ -118,12 +118,13 @@ pub enum PlanError {
         torque: f64,
         /// Torque available for this joint, N·m.
         limit: f64,
-        /// Torque limit of the joint, N·m; `limit` is a share of this torque.
+        /// Torque limit of the joint, N·m; the field `limit` is a share of this torque limit.
         whole: f64,
-        /// `true` if the torque is too small even to hold the arm at rest (at the start, at a stop or at the end).
+        /// `true` if the torque is too small even to hold the arm at rest, at the start, at a stop or at the end of the
+        /// motion.
         holding: bool,
     },
-    /// A path with NaN or infinite positions or derivatives, or without a length.
+    /// A path whose positions or derivatives are NaN or infinite, or whose length is 0.
     #[error("leg {leg}: the path has no direction or no finite derivatives at parameter {parameter}")]
     Path {
         /// Leg, from 1.
@@ -145,8 +146,8 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the number (from 1) of the waypoint in the message, if the message contains one. Of two waypoints,
-    /// returns the invalid one.
+    /// Returns the number (from 1) of the waypoint in the message, if the message contains a waypoint. If the message
+    /// contains two waypoints, returns the invalid waypoint.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::NotFinite { waypoint, .. }
@@ -165,8 +166,8 @@ impl PlanError {
         }
     }
 
-    /// Returns the message without the waypoint at its beginning, if the error concerns a joint or the flange at a
-    /// waypoint.
+    /// Returns the message. If the error concerns a joint or the flange at a waypoint, the message does not begin with
+    /// the waypoint.
     pub fn what(&self) -> String {
         match self {
             Self::NotFinite { joint, value, .. } => format!("{joint}: {value} is not a valid position"),

@@ -1,12 +1,13 @@
 //! Time laws with limited jerk, by an interior-point method (Boyd and Vandenberghe 2004).
 //!
 //! The squared speed of the path parameter is a quadratic spline of the parameter, with a knot at the end of each cell.
-//! The acceleration is half the slope of the spline. The jerk is half its second derivative times the speed. Squared
-//! velocity, acceleration and torque are therefore linear in the coefficients. The jerk is linear except for the root
-//! of the squared speed. Newton's method minimises the sum of the time and the barriers of all limits, without the
-//! second derivatives of the limits. Only neighbouring coefficients are coupled, so the time of a step is proportional
-//! to the length of the path. In the first and the last cell the jerk is constant. Near rest the squared speed rises
-//! with the power 4/3, which a spline cannot represent.
+//! The acceleration of the parameter is half the slope of the spline. The jerk of the parameter is half the second
+//! derivative of the spline times the speed. Therefore squared velocity, acceleration and torque are linear in the
+//! coefficients of the spline. The jerk is linear except for the root of the squared speed. Newton's method minimises
+//! the sum of the time and the barriers of all limits, without the second derivatives of the limits. Only neighbouring
+//! coefficients are coupled, so the computing time of a step is proportional to the number of cells. In the first and
+//! the last cell the jerk is constant. Near rest the squared speed rises with the power 4/3, which a spline cannot
+//! represent.
 mod place;
 mod problem;
 mod spline;
@@ -17,26 +18,27 @@ use spline::knot;
 use crate::along::Plan;
 use crate::law::Law;
 
-/// Shares of the total time that the barriers may cost, one for each round.
+/// Share of the total time that the barriers may cost, for each round.
 const GAPS: [f64; 3] = [0.2, 0.04, 0.008];
 /// Maximum number of steps in each round.
 const STEPS: usize = 12;
-/// Predicted gain of a step, as a share of the allowed barrier cost, below which Newton's method ends.
+/// Minimum predicted gain of a Newton step, as a share of the allowed barrier cost. Newton's method ends if the gain is
+/// smaller.
 const WORTH: f64 = 0.25;
 /// Smallest fraction of a Newton step that the line search tries.
 const SHORTEST: f64 = 1e-3;
-/// Factors that lower squared speeds outside the limits, and the largest number of reductions.
+/// Factors for reducing squared speeds that are outside the limits, and maximum number of reductions.
 const LOWER: f64 = 0.85;
 const LOWER_AGAIN: f64 = 0.97;
 const LOWER_MAX: usize = 100;
 
-/// Minimisation problem.
+/// Problem of minimising the time and the barriers.
 struct Problem<'a> {
     plan: &'a Plan<'a>,
     places: Vec<Place>,
     /// Knots of the spline, between the first and the last cell.
     knots: Vec<f64>,
-    /// First and last coefficient, each divided by its neighbour.
+    /// Ratio of the first and of the last coefficient to its neighbouring coefficient.
     ties: (f64, f64),
     /// Number of limits.
     limits: f64,
@@ -49,7 +51,7 @@ impl<'a> Problem<'a> {
         (c[0], c[n - 1]) = (self.ties.0 * c[1], self.ties.1 * c[n - 2]);
     }
 
-    /// Returns the time plus `barrier` times the barriers. The result is infinite outside the limits.
+    /// Returns the time plus `barrier` times the barriers. The result is infinite if a limit is exceeded.
     fn value(&self, c: &[f64], barrier: f64) -> f64 {
         let mut sum = 0.0;
         for place in &self.places {
@@ -104,7 +106,7 @@ impl<'a> Problem<'a> {
         None
     }
 
-    /// Shortens the time. In each round the barriers cost one of the shares `gaps` of the time.
+    /// Shortens the time. In each round, the barriers cost one of the shares in `gaps` of the time.
     fn improve(&self, c: &mut Vec<f64>, gaps: &[f64]) {
         for gap in gaps {
             let time = self.value(c, 0.0);
@@ -189,7 +191,7 @@ impl<'a> Search<'a> {
     pub(crate) fn fastest(&mut self, slower: &[f64]) -> Option<Law> {
         let problem = Problem::new(self.plan, slower)?;
         if self.found {
-            // Scales the previous solution down in the cells that `slower` slows down.
+            // The previous solution is scaled down in the cells that `slower` slows down.
             for (i, c) in self.c.iter_mut().enumerate() {
                 let near = slower[i.saturating_sub(2)..slower.len().min(i + 3)].iter();
                 let most = near.fold(1.0f64, |most, s| most.max(*s));

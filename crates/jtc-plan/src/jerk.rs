@@ -1,9 +1,9 @@
 //! Time laws with limited jerk.
 //!
-//! The fastest law under limits of the parameter's speed and acceleration is averaged over a time window. The averaging
-//! changes a jump of the acceleration to a ramp that is as long as the window. If the length of the window is the
-//! acceleration divided by the jerk, the law keeps the jerk limit. [`crate::profile`] ensures that the averaged law
-//! keeps the limits of the cells around it.
+//! The fastest law with limited speed and acceleration of the parameter is averaged over a time window. The averaging
+//! changes each jump of the acceleration into a ramp as long as the window. If the window is as long as the
+//! acceleration divided by the jerk limit, the law keeps the jerk limit. [`crate::profile`] ensures that the averaged
+//! law keeps the limits of the cells around it.
 use crate::along::{Made, Plan};
 use crate::cells::Cell;
 use crate::interior::Search;
@@ -12,18 +12,19 @@ use crate::motion::Motion;
 use crate::profile::{self, Bounds};
 use crate::{JOINTS, Limits};
 
-/// Factor of the acceleration from one attempt to the next. A lower acceleration has shorter ramps.
+/// Factor of the acceleration from one attempt to the next. With a lower acceleration, the ramps are shorter.
 const LOWER: f64 = 0.7;
 /// Maximum number of attempts.
 const ATTEMPTS: usize = 24;
-/// Shares of acceleration and jerk that the curvature may use, in the order of the attempts. Nearly all may be used if
-/// the speed is constant in curves, and less if the speed must change there.
+/// Shares of acceleration and jerk that the curvature may use, in the order of the attempts. If the speed is constant
+/// in curves, the curvature may use nearly the whole limit. If the speed must change in curves, the curvature may use
+/// less.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// Maximum time factor for which the whole motion is slowed down instead of repairing it again.
+/// Time factor up to which no further cells are slowed down. If all cells need at most this factor, the whole motion is slowed down.
 const LEFT_OVER: f64 = 1.002;
 /// Like [`LEFT_OVER`], for an interior-point law.
 const LITTLE: f64 = 1.005;
-/// Share of the jerk limit for which the window is computed.
+/// Share of the jerk limit from which the length of the window is computed.
 const JERK_SHARE: f64 = 0.995;
 
 /// Shares of the limits that a law uses.
@@ -109,7 +110,8 @@ fn best_shares(plan: &Plan) -> Option<Shares> {
 fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     let of_cell = |(i, cell): (usize, &Cell)| {
         let bounds = cell.bounds(plan.caps[i], plan.reached[i], shares.curvature, plan.limits, plan.arm);
-        // The limit is reduced by the speed factor of the cell.
+        // The limits of the squared speed and of the acceleration in a cell are reduced by the squared speed factor of
+        // the cell.
         let slow = plan.shares[i] * plan.shares[i];
         let (up, down) = (bounds.up * slow * shares.acceleration, bounds.down * slow * shares.acceleration);
         Bounds { cap: bounds.cap * slow, up, down, ..bounds }
@@ -133,13 +135,13 @@ impl Attempt {
         Self { law, motion, slower }
     }
 
-    /// Returns the duration (s) that results if the whole motion is slowed down.
+    /// Returns the duration (s) of the motion after the whole motion is slowed down.
     fn duration(&self) -> f64 {
         self.motion.duration() * self.slower.iter().copied().fold(1.0, f64::max)
     }
 
-    /// Slows down the cells in which a limit is violated, as long as the result is faster than slowing down the whole
-    /// motion.
+    /// Slows down the cells in which a limit is violated, up to `repairs` times. Keeps the motion that is shortest
+    /// after the whole motion is slowed down.
     fn repair(&mut self, plan: &Plan, mut bounds: Vec<Bounds>, repairs: usize) {
         let mut slower = self.slower.clone();
         for _ in 0..repairs {
@@ -160,7 +162,7 @@ impl Attempt {
     }
 }
 
-/// Returns the length of the window (s) with which each joint keeps its jerk limit along a straight line.
+/// Returns the length of the time window (s) with which each joint keeps its jerk limit along a straight line.
 fn window(cells: &[Cell], bounds: &[Bounds], limits: &Limits) -> f64 {
     let mut longest = 0.0f64;
     for (cell, bounds) in cells.iter().zip(bounds) {

@@ -1,4 +1,5 @@
-//! Inverse kinematics, which computes joint positions for flange poses, and straight flange paths.
+//! Inverse kinematics, and paths on which the flange follows lines and arcs. The inverse kinematics compute joint
+//! positions for flange poses.
 mod chain;
 mod closed_form;
 mod error;
@@ -37,15 +38,16 @@ const REFINE: usize = 25;
 /// Maximum number of iterations of a search.
 const SEARCH: usize = 60;
 
-/// Kinematics of an arm within its position limits, which converts joint positions to flange poses and back.
+/// Kinematics of an arm within its position limits. The kinematics convert joint positions to flange poses and flange
+/// poses to joint positions.
 ///
-/// Poses are flange poses in the base frame, with positions in m. Joint positions are in rad. With a solution,
-/// the flange is within 1 nm and 1 nrad of the pose.
+/// Poses are flange poses in the base frame, with positions in m. Joint positions are in rad. At a solution, the flange
+/// is within 1 nm and 1 nrad of the pose.
 ///
 /// All solutions are computed in closed form for arms with a spherical wrist or with three parallel axes. Examples of
-/// three parallel axes are the default arm and the arms of Universal Robots. The kind of an arm is determined from the
-/// parameters of the model. For any other arm the solutions are found by iteration from many fixed starting values,
-/// which may miss a solution in rare cases.
+/// three parallel axes are the default arm and the arms of Universal Robots. The parameters of the model determine the
+/// geometry of the arm. For an arm with any other geometry, the solutions are found by iteration from many fixed
+/// starting values. In rare cases, the iteration misses a solution.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     chain: Chain,
@@ -57,8 +59,8 @@ pub struct Kinematics {
 }
 
 impl Kinematics {
-    /// Creates the kinematics of `model`, which must have passed [`ArmModel::check`], with the lowest and the highest
-    /// position of each joint, rad.
+    /// Creates the kinematics of `model`. The model must have passed [`ArmModel::check`]. `position_limits` contains
+    /// the lowest and the highest position of each joint, rad.
     pub fn new(model: &ArmModel, position_limits: &[(f64, f64); JOINTS]) -> Self {
         let chain = Chain::new(model);
         let exact = Geometry::of(&chain.zero, EXACT);
@@ -82,30 +84,31 @@ impl Kinematics {
     }
 
     /// Returns the geometric Jacobian of the flange at the joint positions `q`, row major, with one column per joint.
-    /// Rows 0..3 are the velocity of the flange in the base frame (m/rad), and rows 3..6 are its angular velocity
-    /// (rad/rad).
+    /// Rows 0..3 are the velocity of the flange in the base frame (m/rad). Rows 3..6 are the angular velocity of the
+    /// flange (rad/rad).
     pub fn jacobian(&self, q: &JointVec) -> [[f64; JOINTS]; 6] {
         let jacobian = self.chain.at(q).jacobian();
         std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
     }
 
     /// Returns the joint positions within the limits at which the flange is at `target`. If there are several
-    /// solutions, returns the solution nearest to `near`, which has the smallest sum of squared joint motions.
+    /// solutions, returns the solution nearest to `near`. The nearest solution has the smallest sum of squared joint
+    /// motions.
     ///
-    /// A singular target has infinitely many solutions. In this case returns a solution near `near`.
+    /// A singular target has infinitely many solutions. For such a target, the function returns a solution near `near`.
     ///
     /// # Errors
     ///
-    /// [`PoseError`] if the target is not a valid pose, is out of reach in this orientation or in every orientation, or
-    /// can only be reached outside the limits.
+    /// Returns [`PoseError`] if the target is not a valid pose, is out of reach in this orientation or in every
+    /// orientation, or can only be reached outside the limits.
     pub fn solve(&self, target: &Pose, near: &JointVec) -> Result<JointVec, PoseError> {
         let goal = orientation::checked(target)?;
         if let Some(&bad) = near.iter().find(|q| !q.is_finite()) {
             return Err(PoseError::NotFinite { what: "a nearby joint position", value: bad });
         }
         let mut found = self.solutions(&goal, near);
-        // In a singular pose this solution may be nearer than the solution in closed form. Full turns of a joint are
-        // handled below.
+        // In a singular pose, a solution by iteration may be nearer to `near` than the solutions in closed form. Full
+        // turns of a joint are handled below.
         found.extend(search::converge(&self.chain, &goal, near, SEARCH));
         let distance = |q: &JointVec| q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         let within = found.iter().filter_map(|q| turns::nearest(q, near, &self.limits));
@@ -113,8 +116,8 @@ impl Kinematics {
     }
 
     /// Returns all joint positions within the limits at which the flange is at `target`, without duplicates. The list
-    /// contains each solution with every joint within (−π, π]. If the limits permit, it also contains the solution with
-    /// joints turned by ±2π. Returns an empty list for an invalid pose.
+    /// contains each solution with every joint within (−π, π]. If the limits permit, the list also contains each
+    /// solution with joints turned by ±2π. Returns an empty list for an invalid pose.
     ///
     /// A singular target has infinitely many solutions, of which the list contains some.
     pub fn all(&self, target: &Pose) -> Vec<JointVec> {
@@ -123,8 +126,8 @@ impl Kinematics {
         found.iter().flat_map(|q| turns::variants(q, &self.limits)).collect()
     }
 
-    /// Returns the singular pose at or near `q`. A smaller value of [`Singularity::smallest`] means that the pose is
-    /// nearer.
+    /// Returns the singular pose at or near `q`. A smaller value of [`Singularity::smallest`] means that the singular
+    /// pose is nearer.
     pub fn singularity(&self, q: &JointVec) -> Singularity {
         let geometry = self.exact.as_ref().or(self.near.as_ref());
         singular::nearest(&self.chain, geometry, &self.chain.at(q))
@@ -173,7 +176,7 @@ impl Kinematics {
         if place > 1e-6 {
             return PoseError::OutOfReach { distance, missing: place };
         }
-        // The position has priority, so that the remaining residual is in the orientation.
+        // The position has a high weight, so that the remaining residual is in the orientation.
         let turn = best([1e3, 1e3, 1e3, 1.0, 1.0, 1.0]).map_or(0.0, |r| r.residual.fixed_rows::<3>(3).norm());
         PoseError::Orientation { distance, missing: turn }
     }

@@ -1,13 +1,13 @@
-//! Time laws, which are the position on a section of a path as a function of time.
+//! Time laws. A time law is the parameter of a path section as a function of time.
 
 /// Part of a time law in which the third derivative of the parameter is constant.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Phase {
-    /// Start, s.
+    /// Start of the phase, s.
     pub start: f64,
-    /// Length, s.
+    /// Length of the phase, s.
     pub length: f64,
-    /// Parameter and its first three time derivatives, at the start.
+    /// Parameter and its first three time derivatives, at the start of the phase.
     pub s: f64,
     pub speed: f64,
     pub acceleration: f64,
@@ -15,7 +15,7 @@ pub(crate) struct Phase {
 }
 
 impl Phase {
-    /// Returns the parameter and its first two derivatives, `t` seconds after the start.
+    /// Returns the parameter and its first two derivatives, `t` seconds after the start of the phase.
     pub(crate) fn at(&self, t: f64) -> (f64, f64, f64) {
         let (v, a, j) = (self.speed, self.acceleration, self.jerk);
         (self.s + t * (v + t * (0.5 * a + t * j / 6.0)), v + t * (a + 0.5 * t * j), a + t * j)
@@ -26,7 +26,7 @@ impl Phase {
 #[derive(Clone, Debug)]
 pub(crate) struct Law {
     pub phases: Vec<Phase>,
-    /// Value of the path parameter at the end.
+    /// Value of the path parameter at the end of the law.
     pub end: f64,
     /// `true` if the law begins and ends at rest.
     pub rests: bool,
@@ -91,7 +91,7 @@ impl Law {
         let phase = &self.phases[self.phases.partition_point(|p| p.s <= s).saturating_sub(1)];
         let (mut low, mut high) = (0.0, phase.length);
         let mut t = 0.5 * high;
-        // The root is found by Newton's method within two bounds.
+        // Newton's method finds the time between two bounds.
         for _ in 0..60 {
             let (at, speed, _) = phase.at(t);
             if at < s {
@@ -110,8 +110,8 @@ impl Law {
     }
 
     /// Returns the law averaged over a window of `window` seconds. Each jump of the acceleration becomes a ramp as long
-    /// as the window, and the duration of the law increases by `window` seconds. This function is only for laws without
-    /// a jerk limit.
+    /// as the window, and the duration of the law increases by `window` seconds. The law must be a law without a jerk
+    /// limit.
     pub(crate) fn averaged(&self, window: f64) -> Self {
         let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
         let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();
@@ -134,7 +134,7 @@ impl Law {
             s = phase.at(length).0;
             phases.push(phase);
         }
-        // Distributes the remaining rounding error over all phases.
+        // The remaining rounding error is distributed over all phases.
         let factor = if s > 0.0 { self.end / s } else { 1.0 };
         for phase in &mut phases {
             phase.s *= factor;

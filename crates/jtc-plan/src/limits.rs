@@ -45,13 +45,13 @@ impl Limits {
         }
     }
 
-    /// Reserves this share of each torque limit as a margin.
+    /// Returns the limits with this share of each torque limit reserved as a margin.
     pub fn with_margin(self, share: f64) -> Self {
         Self { margin: [share; JOINTS], ..self }
     }
 
     /// Returns the limits for a share of the speed. The velocity is multiplied by `share`, the acceleration by its
-    /// square, and the jerk by its cube. If these three limits determine the duration of a motion, its duration is
+    /// square, and the jerk by its cube. If these three limits determine the duration of a motion, the duration is
     /// multiplied by 1/`share`. Positions, torques and the torque margin stay unchanged.
     pub fn at_speed(&self, share: f64) -> Self {
         Self {
@@ -76,8 +76,8 @@ impl Limits {
     ///
     /// # Errors
     ///
-    /// [`PlanError::Limit`] for the first limit that is not a positive number (only the jerk limit may be infinite),
-    /// [`PlanError::Range`] for an empty position range, and [`PlanError::Margin`].
+    /// Returns [`PlanError::Limit`] for the first limit that is not a positive number (only the jerk limit may be infinite). Returns
+    /// [`PlanError::Range`] for an empty position range. Returns [`PlanError::Margin`] for a torque margin that is out of range.
     pub fn check(&self) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let j = joint.index();
@@ -92,7 +92,7 @@ impl Limits {
                 (LimitKind::Torque, self.torque[j], true),
             ] {
                 let positive = value > 0.0 && (value.is_finite() || !finite);
-                // Squares and cubes of smaller values would disappear in rounding errors.
+                // The squares and cubes of smaller limits would be lost in rounding errors.
                 if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
                     return Err(PlanError::Limit { joint, limit, value });
                 }

@@ -1,4 +1,4 @@
-//! Motions in time.
+//! Motions as functions of time.
 use jtc_wire::Joint;
 
 use crate::binding::{Binding, LimitKind};
@@ -34,12 +34,12 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
-    /// Returns the piece that begins in one state and ends in another (Hermite interpolation).
+    /// Returns the piece that begins in the state `a` and ends in the state `b` (Hermite interpolation).
     pub(crate) fn between(start: f64, length: f64, a: &State, b: &State) -> Self {
         let h = length;
         let coefficients = std::array::from_fn(|j| {
             let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
-            // Residual at the end of the piece. Time is measured in durations of the piece.
+            // Residual at the end of the piece. The unit of time is the duration of the piece.
             let dp = b.position[j] - (p + h * (v + h * c));
             let dv = (b.velocity[j] - (v + 2.0 * h * c)) * h;
             let da = (b.acceleration[j] - 2.0 * c) * h * h;
@@ -69,7 +69,7 @@ impl Piece {
         self.coefficients.map(|[_, _, _, c3, c4, c5]| 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
     }
 
-    /// Returns the piece on an identical path, with `factor` times the duration.
+    /// Returns a piece on the same path, with `factor` times the duration.
     pub(crate) fn stretched(&self, factor: f64) -> Self {
         let mut coefficients = self.coefficients;
         for c in &mut coefficients {
@@ -89,7 +89,7 @@ pub struct Motion {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) end: State,
     pub(crate) binding: Vec<Binding>,
-    /// Joint whose torque required slowing down the whole motion.
+    /// Joint whose torque limit is the reason why the whole motion was slowed down.
     pub(crate) slowed: Option<Joint>,
     pub(crate) waypoint_times: Vec<f64>,
 }
@@ -106,9 +106,8 @@ impl Motion {
         self.pieces.last().map_or(0.0, |p| p.start + p.length)
     }
 
-    /// Returns the state at `t` seconds after the start. Before the start and after the end the arm rests exactly at
-    /// the first and the last waypoint. Without a jerk limit, the acceleration may jump at `t`. In this case returns
-    /// the value after the jump.
+    /// Returns the state at `t` seconds after the start. Before the start and after the end the arm rests exactly at the first and the last
+    /// waypoint. Without a jerk limit, the acceleration may jump at `t`. At a jump, the function returns the acceleration after the jump.
     pub fn at(&self, t: f64) -> State {
         match self.piece(t) {
             None => self.end,
@@ -128,8 +127,8 @@ impl Motion {
         self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
     }
 
-    /// Returns the binding limits in chronological order. If no limit is reached in an interval, its binding limit is
-    /// the one that is nearest to being reached. The binding limit may also be the limit because of which the whole
+    /// Returns the binding limits in chronological order. If no limit is reached in an interval, the binding limit is
+    /// the limit to which the motion is closest. The binding limit may also be the limit because of which the whole
     /// motion was slowed down.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
@@ -149,7 +148,7 @@ impl Motion {
         self.pieces.get(after.saturating_sub(1))
     }
 
-    /// Returns the motion on an identical path, with `factor` times the duration.
+    /// Returns a motion on the same path, with `factor` times the duration.
     pub(crate) fn stretched(&self, factor: f64) -> Self {
         Self {
             pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
@@ -160,8 +159,8 @@ impl Motion {
         }
     }
 
-    /// Inserts a rest of `length` seconds at the waypoint with this index, if the motion is at rest there. Later
-    /// waypoints are delayed by this rest.
+    /// Inserts a standstill of `length` seconds at the waypoint with this index, if the motion is at rest at this
+    /// waypoint. The standstill delays all later waypoints.
     pub(crate) fn rest_at(&mut self, waypoint: usize, length: f64) {
         let Some(&time) = self.waypoint_times.get(waypoint) else { return };
         let at = self.pieces.partition_point(|p| p.start + 0.5 * p.length < time);
@@ -178,15 +177,15 @@ impl Motion {
         let joint = self.binding.get(after.saturating_sub(1)).map_or(Joint::ALL[0], |b| b.joint);
         binding.extend(self.binding[..after].iter().map(|b| Binding { to: b.to.min(time), ..*b }));
         binding.push(Binding { from: time, to: time + length, joint, limit: LimitKind::GivenTime });
-        // A binding interval that continues after the rest is split in two.
+        // A binding interval that continues after the standstill is split into two intervals.
         let both = self.binding[..after].last().filter(|b| b.to > time).map(|b| Binding { from: time, ..*b });
         let later = both.into_iter().chain(self.binding[after..].iter().copied());
         binding.extend(later.map(|b| Binding { from: b.from + length, to: b.to + length, ..b }));
         self.binding = binding;
     }
 
-    /// Appends another motion that begins at the end of this one. The first waypoint of `next` is the last waypoint of
-    /// this motion.
+    /// Appends another motion that begins at the end of this motion. The first waypoint of `next` is the last waypoint
+    /// of this motion.
     pub(crate) fn append(&mut self, next: &Self) {
         let start = self.duration();
         self.pieces.extend(next.pieces.iter().map(|p| Piece { start: p.start + start, ..*p }));

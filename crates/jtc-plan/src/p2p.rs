@@ -6,22 +6,21 @@ use rsruckig::prelude::{
 use crate::motion::{Motion, Piece};
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, reasons, trapezoid, verify};
 
-/// Duration of a motion in which the arm does not move, s. A trajectory needs two points, and therefore a duration
-/// above 0.
+/// Duration of a motion between two equal positions, s. A trajectory needs two points, so its duration must be above 0.
 const STANDING: f64 = 0.01;
 
 /// Plans the fastest motion from rest to rest within velocity, acceleration and jerk limits. All joints start and stop
-/// together (Ruckig, by Berscheid and Kröger 2021). The motion follows a straight line in joint space if this does not
-/// increase the duration. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed is
+/// together (Ruckig, by Berscheid and Kröger 2021). The motion is a straight line in joint space if a straight line
+/// does not take longer. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed is
 /// limited to the range of the friction table.
 ///
 /// If `from` and `to` are equal, the arm stays at rest for 10 ms.
 ///
 /// # Errors
 ///
-/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion, [`PlanError::NotFinite`] and
-/// [`PlanError::Position`] for waypoint 1 (`from`) or 2 (`to`), [`PlanError::Torque`] if the torque is too small at
-/// every speed.
+/// Returns [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion. Returns
+/// [`PlanError::NotFinite`] and [`PlanError::Position`] for waypoint 1 (`from`) or 2 (`to`). Returns
+/// [`PlanError::Torque`] if the torque is too small at every speed.
 pub fn point_to_point(
     from: &JointVec,
     to: &JointVec,
@@ -58,7 +57,8 @@ pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Moti
     Motion::new(vec![piece], *to, times)
 }
 
-/// Plans with Ruckig. The motion is a straight line if the other joints can follow the joint with the longest distance.
+/// Plans a motion with Ruckig. The motion is a straight line if all other joints can follow the joint with the longest
+/// distance.
 fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
     let mut input = InputParameter::<JOINTS>::new(None);
     input.current_position = DataArrayOrVec::Stack(*from);
@@ -91,8 +91,8 @@ fn constant_jerk(trajectory: &Trajectory<JOINTS>, start: f64, length: f64) -> Pi
     let zeros = || DataArrayOrVec::Stack([0.0; JOINTS]);
     let (mut p, mut v, mut a, mut jerk) = (zeros(), zeros(), zeros(), zeros());
     trajectory.at_time(start, &mut Some(&mut p), &mut Some(&mut v), &mut Some(&mut a), &mut None, &mut None);
-    // The jerk is evaluated in the middle of the part, because at the start it may still be the jerk of the previous
-    // part.
+    // The jerk is evaluated in the middle of the part. At the start of the part, the value may still be the jerk of the
+    // previous part.
     let middle = start + 0.5 * length;
     trajectory.at_time(middle, &mut None, &mut None, &mut None, &mut Some(&mut jerk), &mut None);
     let coefficients = std::array::from_fn(|j| [p[j], v[j], 0.5 * a[j], jerk[j] / 6.0, 0.0, 0.0]);

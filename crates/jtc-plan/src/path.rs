@@ -16,29 +16,30 @@ pub struct PathPoint {
 /// [`end`](Path::end).
 ///
 /// The first derivative is continuous except at [`stops`](Path::stops), and between two [`breaks`](Path::breaks) the
-/// position is three times differentiable. Any parameter is possible. The time laws are best if the parameter is
+/// position is three times differentiable. Any parameter is permitted. Time laws are best if the parameter is
 /// proportional to the joint movements.
 pub trait Path {
     /// Returns the last value of the parameter, which is greater than 0.
     fn end(&self) -> f64;
 
-    /// Returns position and derivatives at `s`, with `s` between 0 and the end. At a break, the derivatives of either
-    /// side are permitted.
+    /// Returns position and derivatives at `s`, with `s` between 0 and the end. At a break, the path may return the
+    /// derivatives of either side.
     fn at(&self, s: f64) -> PathPoint;
 
-    /// Returns the number (from 1) of the last waypoint at or before `s`, for errors.
+    /// Returns the number (from 1) of the last waypoint at or before `s`. Errors contain this number.
     fn waypoint(&self, _s: f64) -> Option<usize> {
         None
     }
 
-    /// Parameters in ascending order, between 0 and the end, at which a derivative jumps or the path changes its form.
-    /// Between two breaks, the path should be one simple curve, because it is sampled at a fixed number of points.
+    /// Returns the breaks in ascending order. A break is a parameter between 0 and the end at which a derivative jumps
+    /// or the path changes its form. Between two breaks, the path should be one simple curve, because the planner
+    /// samples it at a fixed number of points.
     fn breaks(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Parameters in ascending order, between 0 and the end, at which a motion must come to rest. Each stop is also a
-    /// break.
+    /// Returns the stops in ascending order. A stop is a parameter between 0 and the end at which a motion must come to
+    /// rest. Each stop is also a break.
     fn stops(&self) -> Vec<f64> {
         Vec::new()
     }

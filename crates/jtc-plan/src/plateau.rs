@@ -1,9 +1,9 @@
-//! Plateaus at the maxima of the speed. Between speeding up and slowing down, the parameter's acceleration is 0 for one
-//! window, so that one averaging window never contains both changes of the acceleration.
+//! Plateaus at the maxima of the speed. Between acceleration and deceleration, the parameter's acceleration is 0 for
+//! one averaging window. Therefore an averaging window never contains both changes of the acceleration.
 use crate::profile::simplified;
 
-/// Lowers every maximum of a law's `vertices` (parameter, squared speed) until the maximum lasts for `window` seconds
-/// or is as low as the lowest adjacent speed.
+/// Lowers every speed maximum of a law's `vertices` (parameter, squared speed). A lowered maximum lasts for `window` seconds, or is as low
+/// as the lowest adjacent speed.
 pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)> {
     let mut walk = Walk { done: Vec::with_capacity(vertices.len()), ahead: vertices, next: 0 };
     while walk.next < vertices.len() {
@@ -87,7 +87,7 @@ impl Walk<'_> {
     }
 }
 
-/// Returns the plateau with the highest level, between the level of `top` and `lowest`, that lasts for the window.
+/// Returns the highest plateau between the levels of `top` and `lowest` that lasts for the window.
 fn enough(top: &Top, lowest: f64, left: (f64, f64), right: (f64, f64), window: f64) -> Top {
     let (mut low, mut high) = (lowest, top.level);
     for _ in 0..60 {

@@ -1,8 +1,8 @@
-//! The fastest time law under limits of only the speed and acceleration of the path parameter. Each limit is constant
-//! in each cell of the path.
+//! Fastest time law with limited speed and acceleration of the path parameter, but without a jerk limit. Each limit is
+//! constant in each cell of the path.
 //!
-//! The law may be averaged over a window afterwards. To keep the limits of a cell after averaging, the law must also
-//! keep these limits half a window before and after the cell. Cells are therefore extended at both ends.
+//! The law may later be averaged over a time window. The averaged law keeps the limits of a cell only if the law also
+//! keeps these limits for half a window before and after the cell. Cells are therefore extended at both ends.
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -39,7 +39,7 @@ pub(crate) fn fastest(cells: &[Bounds], window: f64) -> Vec<(f64, f64)> {
     if window > 0.0 { crate::plateau::flattened(&vertices, window) } else { vertices }
 }
 
-/// Non-negative floating-point numbers can be sorted by their bits.
+/// Returns a sorting key. The bits of non-negative floating-point numbers have the same order as the numbers.
 fn key(x: f64) -> u64 {
     x.max(0.0).to_bits()
 }
@@ -77,8 +77,8 @@ fn lowest(bounds: &[Bounds]) -> Vec<Bounds> {
     parts
 }
 
-/// Returns the highest squared speeds at the ends of the parts. Each speed can be reached from the start, and a stop at
-/// the end of the path is possible from it.
+/// Returns the highest squared speeds at the ends of the parts. Each of these speeds can be reached from the start, and
+/// permits a stop at the end of the path.
 fn speeds(parts: &[Bounds]) -> Vec<f64> {
     let mut nodes = vec![0.0; parts.len() + 1];
     for (i, part) in parts.iter().enumerate() {

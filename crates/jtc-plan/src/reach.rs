@@ -8,7 +8,7 @@ const ROWS: usize = 4 * JOINTS;
 /// Largest share of a limit that may be neglected.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// Limits at one point of the path. Each row is by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
+/// Limits at one point of the path. Each row means by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
 struct Rows {
     by_speed: [f64; ROWS],
     by_acceleration: [f64; ROWS],
@@ -29,7 +29,7 @@ pub(crate) fn fastest(
 ) -> Result<Vec<(f64, f64)>, String> {
     let places: Vec<f64> = cells.iter().map(|c| c.from).chain(cells.last().map(|c| c.to)).collect();
     let count = places.len();
-    // Lower of the two caps on both sides of a point.
+    // Lower one of the caps before and after a point.
     let cap = |i: usize| {
         let (left, right) = (caps[i.saturating_sub(1)], caps[i.min(count - 2)]);
         left.min(right).clamp(1e-18, 1e18)
@@ -48,8 +48,9 @@ pub(crate) fn fastest(
 
 /// Returns the largest squared speeds at the ends of the steps, from rest to rest.
 fn along_the_steps(steps: &[Step]) -> Vec<f64> {
-    // The backward pass computes the largest squared speed at each point from which the remainder of the path is possible. Each
-    // smaller squared speed is also possible, because rest is possible everywhere and the limits are linear in ṡ² and s̈.
+    // The backward pass computes the largest squared speed at each point from which the remainder of the path is
+    // possible. A smaller squared speed is also possible, because the arm can be at rest at each point and the limits
+    // are linear in ṡ² and s̈.
     let mut highest = vec![0.0; steps.len() + 1];
     for (i, step) in steps.iter().enumerate().rev() {
         highest[i] = step.highest(highest[i + 1]);
@@ -103,12 +104,13 @@ impl Step {
                     continue;
                 }
                 let size = by_acceleration.abs();
-                // The row is a cap of ṡ² if the part of s̈ is negligible. This part is negligible in comparison with the limit, or
-                // because it shifts the point by a negligible part of the step (x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x).
+                // A row with a negligible coefficient of s̈ limits only ṡ². The coefficient is negligible if its term
+                // is much smaller than the limit. The coefficient u is also negligible if it shifts the point only by a
+                // small part of the step: x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x.
                 let negligible = size * highest <= NEGLIGIBLE * length * limit
                     || size <= NEGLIGIBLE * length * by_speed.abs();
-                // The row is also a cap of ṡ² if, at the first point, it permits a higher ṡ² only for an arm that comes to rest
-                // within the step.
+                // A row may permit a higher ṡ² at the first point only to an arm that comes to rest within the step. Such a row is also
+                // used as a limit of ṡ² alone.
                 let rests =
                     added == 0.0 && by_acceleration > 0.0 && by_acceleration <= 2.0 * length * by_speed;
                 if (negligible || rests) && by_speed > 0.0 {
@@ -123,18 +125,18 @@ impl Step {
         Self { length, cap, upper, lower }
     }
 
-    /// Returns the upper bound that is lowest at this ṡ². `None` if s̈ has no upper bound.
+    /// Returns the upper bound of s̈ that is lowest at this ṡ². Returns `None` if s̈ has no upper bound.
     fn most(&self, square: f64) -> Option<Line> {
         self.upper.iter().copied().reduce(|a, b| if b.at(square) < a.at(square) { b } else { a })
     }
 
-    /// Returns the lower bound that is highest at this ṡ². `None` if s̈ has no lower bound.
+    /// Returns the lower bound of s̈ that is highest at this ṡ². Returns `None` if s̈ has no lower bound.
     fn least(&self, square: f64) -> Option<Line> {
         self.lower.iter().copied().reduce(|a, b| if b.at(square) > a.at(square) { b } else { a })
     }
 
-    /// Returns the largest possible s̈ at this ṡ². If rounding has made it smaller than the smallest s̈, the bound with less rounding
-    /// error has priority. The bound with less rounding error is the bound that depends less on ṡ².
+    /// Returns the largest possible s̈ at this ṡ². If, because of rounding, the largest s̈ is smaller than the smallest s̈, the bound with
+    /// the smaller rounding error is used. The bound that depends less on ṡ² has the smaller rounding error.
     fn fastest(&self, square: f64) -> f64 {
         let Some(most) = self.most(square) else { return f64::INFINITY };
         let crossed =
@@ -144,8 +146,8 @@ impl Step {
 
     /// Returns the largest ṡ² from which a possible s̈ results in a squared speed between 0 and `next` at the next point.
     ///
-    /// The difference of the largest and the smallest s̈ is a concave function of ṡ², and not negative at 0. So Newton's method, which
-    /// starts at the cap, finds the zero of this function after at most one iteration per bound.
+    /// The difference of the largest and the smallest s̈ is a concave function of ṡ², and not negative at 0. Therefore
+    /// Newton's method from the cap finds the zero of this function after at most one iteration per bound.
     fn highest(&self, next: f64) -> f64 {
         if self.length <= 0.0 {
             return self.cap.min(next);
@@ -163,7 +165,7 @@ impl Step {
             }
             let crossing = (most.start - least.start) / (least.slope - most.slope);
             if crossing >= square {
-                // The rounding error is larger than the remaining difference.
+                // The remaining difference is smaller than the rounding error.
                 break;
             }
             square = crossing.max(0.0);
@@ -205,7 +207,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns rows (coefficient of ṡ², coefficient of s̈, limit). The remaining rows have no limit.
+    /// Returns rows with these values (coefficient of ṡ², coefficient of s̈, limit). The remaining rows have no limit.
     fn rows(given: &[(f64, f64, f64)]) -> Rows {
         let mut rows =
             Rows { by_speed: [0.0; ROWS], by_acceleration: [0.0; ROWS], limit: [f64::INFINITY; ROWS] };
@@ -292,7 +294,7 @@ mod tests {
                 list.iter().map(|(a, b, up, c)| (*a, if *up { *b } else { -b }, *c)).collect()
             };
             let (start, end) = (signed(&start), signed(&end));
-            // For this kind of row, the implementation intentionally uses a lower cap.
+            // The test excludes rows for which the implementation intentionally uses a lower cap.
             prop_assume!(start.iter().all(|(a, b, _)| !(*b > 0.0 && *b <= 2.0 * length * a)));
             let step = Step::new([rows(&start), rows(&end)], [cap; 2], length);
             let mut all = start;

@@ -5,28 +5,29 @@ use crate::binding::{Binding, LimitKind};
 use crate::motion::Motion;
 use crate::{ArmDynamics, JOINTS, Limits, verify};
 
-/// Share of a limit from which the limit is considered binding.
+/// Share of a limit above which the limit is considered binding.
 const BINDS: f64 = 0.985;
 /// Time between samples, s, and maximum number of samples.
 const STEP: f64 = 0.002;
 const SAMPLES_MAX: f64 = 4000.0;
-/// Maximum time between a point in time and the time at which its binding limit is reached, s. Acceleration ramps can
-/// last this long. Before a corner, the motion is slow because of a limit that is reached later.
+/// A limit that is reached within this time before or after an instant may be the binding limit of this instant, s. Acceleration ramps can
+/// last as long as this time. For example, a motion is slow before a corner because of a limit that is reached in the corner.
 const NEAR: f64 = 0.05;
-/// Share of the torque limit below which the torque counts as holding torque, which does not depend on the speed.
+/// Share of the torque limit below which the torque is considered holding torque. Holding torque does not depend on the
+/// speed.
 const TORQUE: f64 = 0.9;
 /// Minimum duration of an interval, s. Shorter intervals are merged into the previous interval.
 const SHORT: f64 = 0.004;
 
-/// A limit and its use. The use is the speed as a share of the speed at which the limit would be reached.
+/// A limit and its use. The use is the ratio of the motion's speed to the speed at which the limit would be reached.
 type Use = (f64, Joint, LimitKind);
 
 /// Binding limits of a motion.
 pub(crate) struct Reasons {
     /// Limits that the motion reaches.
     pub used_up: Vec<Binding>,
-    /// Reason in the remaining time. The reason is the limit because of which the whole motion was slowed down, or else
-    /// the limit that is nearest to being reached around that time.
+    /// Binding limits for the times at which no limit is reached. If the whole motion was slowed down because of a torque limit, this limit
+    /// is the binding limit. If the whole motion was not slowed down, the binding limit is the limit with the highest use around this time.
     otherwise: Vec<Binding>,
 }
 
@@ -93,7 +94,7 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
 
 /// Returns the highest use within `reach` samples of each sample.
 fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
-    // Indices in descending order of the use. The first index has the highest use within reach.
+    // Indices of samples in descending order of the use. The first index has the highest use within `reach` samples.
     let mut falling: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
     let mut next = 0;
     let at = |i: usize| {
@@ -130,7 +131,7 @@ fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) ->
 
 impl Reasons {
     /// Returns one list for a motion of `duration` s. The list contains the limits that are reached, and the other
-    /// binding limits between these.
+    /// binding limits for the times between them.
     pub(crate) fn joined(&self, duration: f64) -> Vec<Binding> {
         let mut all: Vec<Binding> = Vec::new();
         let mut take = |next: Binding| match all.last_mut() {

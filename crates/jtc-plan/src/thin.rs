@@ -2,15 +2,15 @@
 use crate::JointVec;
 use crate::distance::distance;
 
-/// Maximum distance between consecutive dropped waypoints, as a share of the blend. With this distance, a line between
-/// two dropped waypoints is always within the blend of one of the two.
+/// Maximum distance between consecutive dropped waypoints, as a share of the blend. With this distance, every point of
+/// a line between two dropped waypoints is within the blend of one of the two waypoints.
 const GAP_SHARE: f64 = 0.9;
 /// Maximum number of consecutive dropped waypoints.
 const ROW_MAX: usize = 256;
 
-/// Returns the indices of the kept positions in ascending order. Both ends and the positions that must stay (`stays`)
-/// are kept, and as many further positions as needed. Every dropped position is within `share` of the blend from the
-/// straight line between its kept neighbours. The dropped positions are in order along this line.
+/// Returns the indices of the kept positions in ascending order. The function keeps both ends, the positions that
+/// `stays` marks, and as many other positions as necessary. Every dropped position is within `share` of the blend from
+/// the straight line between its kept neighbours. The dropped positions are in order along this line.
 pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f64) -> Vec<usize> {
     let last = positions.len() - 1;
     let dense = |i: usize| distance(&positions[i - 1], &positions[i]) <= GAP_SHARE * blend;
@@ -33,8 +33,8 @@ pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f6
     kept
 }
 
-/// Returns `true` if all positions between two positions are at most `most` from the line between the two, and in order
-/// along it.
+/// Returns `true` if all positions between the indices `from` and `to` are close to the line between these two positions, and in order
+/// along this line. `most` is the largest permitted distance from the line.
 fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
     let (a, b) = (&positions[from], &positions[to]);
     let mut before = 0.0;

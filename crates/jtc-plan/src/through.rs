@@ -1,4 +1,4 @@
-//! Motions through waypoints, with specified times.
+//! Motions through waypoints. Waypoints may have specified times.
 use jtc_wire::Joint;
 
 use crate::along::{Choices, along_at};
@@ -13,13 +13,14 @@ use crate::{
 const ON_TIME: f64 = 5e-4;
 /// Maximum number of corrections of the speeds between specified times.
 const CORRECTIONS: usize = 60;
-/// Target duration, as a share of the requested time, when the speed is reduced. Slowing the part down uniformly adds
-/// the remaining time.
+/// Target duration, as a share of the requested time, when the speed is reduced. A uniform slowdown then adds the
+/// missing time.
 const AIM: f64 = 0.98;
 /// Factor for the shortest time in an error, if only the adjacent legs prevent the specified time. With this factor,
-/// the time is always possible.
+/// the reported time is always possible.
 const SURE: f64 = 1.05;
-/// Speed factor for parts without a specified time: the factor for each failed attempt, and the lowest value.
+/// After each failed attempt, the speed factor of parts without a specified time is multiplied by `ROOM`. The lowest
+/// value of this speed factor is `ROOM_MIN`.
 const ROOM: f64 = 0.97;
 const ROOM_MIN: f64 = 0.8;
 /// Maximum number of consecutive attempts in which a part takes too long at full speed. The speeds of the adjacent
@@ -33,7 +34,8 @@ const SLOWEST: f64 = 1e-4;
 pub struct Waypoint {
     /// Position, rad.
     pub position: JointVec,
-    /// Time at which the motion is nearest to the waypoint, in seconds after the start; `None` for as soon as possible.
+    /// Time at which the motion is nearest to the waypoint, in seconds after the start. If the value is `None`, the motion passes the
+    /// waypoint as soon as possible.
     pub time: Option<f64>,
 }
 
@@ -45,20 +47,20 @@ impl From<JointVec> for Waypoint {
 
 /// Plans a motion from the first waypoint to the last, as fast as the limits permit, on straight legs. Corners are
 /// rounded within `blend` rad (see [`BlendedPath`]). If `blend` is 0, the arm stops at each waypoint. If a stop at a
-/// corner is faster than rounding it, the arm stops. If it is faster, the arm passes waypoints that are closer to each
-/// other than the blend on a straighter line. This line is within the blend of each waypoint. If all waypoints are
-/// equal, the arm stays at rest for 10 ms.
+/// corner takes less time than a rounded corner, the arm stops. Waypoints that are closer to each other than the blend
+/// may be passed on a straighter line, if this is faster. This line is within the blend of each waypoint. If all
+/// waypoints are equal, the arm stays at rest for 10 ms.
 ///
-/// The motion passes a waypoint with a time at this time, within half a millisecond. If an earlier time is possible,
-/// the motion between the previous waypoint with a time and this waypoint is slowed down. If these two waypoints are at
-/// the same position, the arm stays at rest between the two times. Legs after the last specified time are as fast as
-/// possible.
+/// The motion passes a waypoint that has a specified time within half a millisecond of this time. If an earlier time is
+/// possible, the motion between the previous waypoint with a time and this waypoint is slowed down. If these two
+/// waypoints are at the same position, the arm stays at rest between the two times. Legs after the last specified time
+/// are as fast as possible.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`] and [`PlanError::Position`] for a
-/// waypoint that is invalid or outside the limits, [`PlanError::Blend`]; [`PlanError::Time`] for times that do not
-/// increase from 0, [`PlanError::TooEarly`] for a time that the limits do not permit, and the errors of
+/// Returns [`PlanError::TooFew`] for fewer than two waypoints. Returns [`PlanError::NotFinite`] and [`PlanError::Position`] for a waypoint
+/// that is invalid or outside the limits. Returns [`PlanError::Blend`] for an invalid blend. Returns [`PlanError::Time`] for times that do
+/// not increase from 0. Returns [`PlanError::TooEarly`] for a time that the limits do not permit. Also returns the errors of
 /// [`along`](crate::along).
 pub fn through(
     waypoints: &[Waypoint],
@@ -88,7 +90,7 @@ pub fn through(
         return Ok(reasons::explained(chosen.motion, limits, arm));
     }
     match on_time(&path, &given, limits, arm) {
-        // A different path may be faster.
+        // A different path may be fast enough.
         Err(PlanError::TooEarly { .. }) if blend > 0.0 => {
             let chosen = choose::fastest(path, blend, &keep, limits, arm)?;
             on_time(&chosen.path, &given, limits, arm)
@@ -102,7 +104,7 @@ pub fn through(
 ///
 /// # Errors
 ///
-/// Same as [`through`].
+/// Returns the errors of [`through`].
 pub fn on_route(
     route: &Route,
     times: &[Option<f64>],
@@ -150,12 +152,12 @@ fn given_times(waypoints: &[Waypoint]) -> Result<Vec<(usize, f64)>, PlanError> {
     Ok(given)
 }
 
-/// A part of a motion between two waypoints with times.
+/// Part of a motion between two waypoints with specified times.
 struct Stretch {
-    /// Indices of these two waypoints.
+    /// Indices of the two waypoints.
     from: usize,
     to: usize,
-    /// Wanted time, s.
+    /// Specified duration, s.
     wanted: f64,
     /// Speed factor.
     share: f64,
@@ -183,7 +185,7 @@ fn on_time(
         share: 1.0,
         late: 0,
     };
-    // Between waypoints at one position, the arm is at rest.
+    // Between two waypoints at the same position, the arm is at rest.
     let (rests, mut stretches): (Vec<Stretch>, Vec<Stretch>) =
         given.windows(2).map(between).partition(|s| path.is_one_place(s.from, s.to));
     let motion = moving_on_time(path, &mut stretches, limits, arm)?;
@@ -197,8 +199,8 @@ fn on_time(
     Ok(motion)
 }
 
-/// Corrects the times of stretches in which the arm moves. Reduces the speed of each stretch until its duration is
-/// close to the requested duration. Then corrects the remaining difference by a change of rate.
+/// Corrects the times of stretches in which the arm moves. Reduces the speed of each stretch until the duration of the stretch is close to
+/// its specified duration. A change of rate then corrects the remaining difference.
 fn moving_on_time(
     path: &impl Waypointed,
     stretches: &mut [Stretch],
@@ -206,8 +208,8 @@ fn moving_on_time(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let mut choices = Choices::default();
-    // Speed factor for parts without a specified time. The factor is reduced if no margin remains for the changes of
-    // rate.
+    // Speed factor for parts without a specified time. The factor is reduced if the limits leave no margin for the
+    // changes of rate.
     let mut room = 1.0f64;
     for attempt in 0..CORRECTIONS {
         let share_of = |waypoint: usize| {
@@ -219,7 +221,8 @@ fn moving_on_time(
             let is_late = s.share >= 1.0 && s.takes(&motion) > s.wanted + ON_TIME;
             s.late = if is_late { s.late + 1 } else { 0 };
         }
-        // The adjacent stretches may still become faster, except in the first attempt, which is the fastest motion.
+        // A stretch that takes too long may still become faster if the adjacent stretches become faster. The motion of
+        // the first attempt is the fastest motion, so none of its stretches can become faster.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
             return Err(too_early(late, motion, limits, arm));
@@ -229,7 +232,7 @@ fn moving_on_time(
         if stretches.iter().all(|s| is_near(s) || between_rests(s)) {
             let warped = warp::warped(&motion, &parts(stretches, &motion), limits);
             let warped = verify::finished(warped, limits, arm)?;
-            // Timing errors of the stretches add up.
+            // The timing errors of all stretches add up.
             let mut off = 0.0;
             let on_time = stretches.iter().all(|s| {
                 off += s.takes(&warped) - s.wanted;
@@ -246,7 +249,7 @@ fn moving_on_time(
             s.share = (s.share * damped).clamp(SLOWEST, 1.0);
         }
     }
-    // In a stretch at full speed, no margin remains for a change from one rate to the next.
+    // In a stretch at full speed, the limits leave no margin for a change from one rate to the next.
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {

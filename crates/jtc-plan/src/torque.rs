@@ -1,18 +1,19 @@
-//! Torque of a motion, as the controller commands it.
+//! Torque that the controller commands during a motion.
 use jtc_core::{Config, Friction, friction};
 use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Maximum holding torque of a joint without friction, as a share of the torque limit. At a share of 98 %, joints have been observed to fall.
+/// Maximum holding torque of a joint without friction, as a share of the torque limit. At a share of 98 %, joints were
+/// observed to fall.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Share of the torque above the holding torque that a motion may use with any margin, and the minimum of this torque
-/// as a share of the limit.
+/// Share of the torque above the holding torque that a motion may always use, with any margin. The second constant is
+/// the minimum of this torque, as a share of the limit.
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;
 
-/// Model for the torque of a motion (J-40, J-42, J-60). It includes the arm with its payload, the inertia of the
+/// Model for the torque of a motion (J-40, J-42, J-60). The model includes the arm with its payload, the inertia of the
 /// rotors, and the friction compensation that the controller adds.
 #[derive(Clone, Debug)]
 pub struct ArmDynamics<'a> {
@@ -38,7 +39,7 @@ struct FrictionRanges {
 
 impl<'a> ArmDynamics<'a> {
     /// Creates the model for a bearing temperature of 30 °C from the arm `model`, and from the payload, gravity and
-    /// rotors of `config`. `friction` is set if the controller compensates for friction.
+    /// rotors of `config`. `friction` is `Some` if the controller compensates for friction.
     pub fn new(config: &Config, model: &ArmModel, friction: Option<&'a Friction>) -> Self {
         let step = config.joints.each_ref().map(|j| j.velocity_max / STEPS as f64);
         let arm = Self {
@@ -68,7 +69,8 @@ impl<'a> ArmDynamics<'a> {
         self.friction.is_some()
     }
 
-    /// Returns the speed at which the sign of the friction polynomial reaches ±1, rad/s; `None` without a polynomial.
+    /// Returns the speed at which the sign of the friction polynomial reaches ±1, rad/s; `None` if the friction is not
+    /// a polynomial.
     pub(crate) fn sign_width(&self) -> Option<f64> {
         matches!(self.friction, Some(Friction::Polynomial(_))).then_some(self.sign_width)
     }
@@ -98,13 +100,13 @@ impl<'a> ArmDynamics<'a> {
         if step <= STEPS {
             return (low, high);
         }
-        // This speed is above the highest speed of the arm.
+        // The requested speed is above the stored range of speeds, which ends at the highest speed of the arm.
         let friction = self.frictions(j, fastest);
         (low.min(friction.0), high.max(friction.1))
     }
 
-    /// Returns the lowest and highest friction up to a speed, and the slopes of both with respect to the speed. The
-    /// values are interpolated linearly between two steps, so that they are continuous.
+    /// Returns the lowest and highest friction up to a speed, and the slopes of these two frictions with respect to the
+    /// speed. The values are interpolated linearly between two steps, so that they are continuous.
     pub(crate) fn friction_line(&self, j: usize, fastest: f64) -> (f64, f64, f64, f64) {
         if self.friction.is_none() {
             return (0.0, 0.0, 0.0, 0.0);
@@ -116,7 +118,7 @@ impl<'a> ArmDynamics<'a> {
         let (u, (low, high), (low_after, high_after)) = if at < STEPS {
             (steps + 1.0 - at as f64, ranges[at], ranges[at + 1])
         } else {
-            // This speed is above the highest speed of the arm.
+            // The requested speed is above the stored range of speeds, which ends at the highest speed of the arm.
             let (u, step) = (steps.fract(), self.ranges.step[j].copysign(fastest));
             let with = |speed: f64| {
                 let (friction, (low, high)) = (self.frictions(j, speed), ranges[STEPS]);
@@ -137,10 +139,10 @@ impl<'a> ArmDynamics<'a> {
         torque
     }
 
-    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. The
-    /// usable torque is the limit minus the margin. The result is at least the sum of holding torque and breakaway
-    /// friction plus a quarter of the remaining torque, or plus 2 % of the limit if that is more. Therefore the arm can
-    /// always move to and from a pose that it can hold.
+    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. The usable torque is the
+    /// limit minus the margin. The result is at least the sum of holding torque, breakaway friction and a quarter of the remaining torque.
+    /// If 2 % of the limit is larger than a quarter of the remaining torque, 2 % of the limit is used. Therefore the arm can always move to
+    /// and from a pose that it can hold.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {
@@ -151,7 +153,8 @@ impl<'a> ArmDynamics<'a> {
         ((1.0 - margin) * whole).max(needed).min(whole)
     }
 
-    /// Returns the highest friction of the joint with index `j` up to the speed at which its sign is fully applied, N·m.
+    /// Returns the breakaway friction of the joint with index `j`, N·m. The breakaway friction is the highest friction up to the speed at
+    /// which the sign of the friction reaches ±1.
     pub(crate) fn breakaway(&self, j: usize) -> f64 {
         let of = |speed: f64| {
             let (low, high) = self.friction_range(j, speed);
@@ -165,9 +168,9 @@ impl<'a> ArmDynamics<'a> {
         self.dynamics.inverse(position, &[0.0; JOINTS], &[0.0; JOINTS])
     }
 
-    /// Returns the torque (N·m) that compensates for the friction of the joint with index `j` at `velocity` (rad/s). Of
-    /// the two temperatures, uses the one with the larger sum of friction and `rigid`. For a velocity outside the
-    /// friction table, the nearest value in the table is used.
+    /// Returns the torque (N·m) that compensates for the friction of the joint with index `j` at `velocity` (rad/s).
+    /// The function uses the bearing temperature with the larger sum of friction and `rigid`. For a velocity outside
+    /// the friction table, the nearest value in the table is used.
     pub(crate) fn friction(&self, j: usize, velocity: f64, rigid: f64) -> f64 {
         let (low, high) = self.frictions(j, velocity);
         if (rigid + high).abs() >= (rigid + low).abs() { high } else { low }
@@ -199,7 +202,7 @@ impl<'a> ArmDynamics<'a> {
     }
 
     /// Returns the highest speed that the friction table covers for the joint with index `j` in both directions, rad/s
-    /// (J-36). The result is infinite without a table.
+    /// (J-36). If there is no friction table, the result is infinite.
     pub(crate) fn velocity_max(&self, j: usize) -> f64 {
         match self.friction {
             Some(Friction::Table(tables)) => {

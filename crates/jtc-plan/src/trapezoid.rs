@@ -1,4 +1,4 @@
-//! Motions without a jerk limit, which have trapezoidal speed profiles.
+//! Motions without a jerk limit. Their speed profiles are trapezoidal.
 use crate::motion::{Motion, Piece};
 use crate::{JOINTS, JointVec, Limits};
 
@@ -7,7 +7,7 @@ use crate::{JOINTS, JointVec, Limits};
 struct Trapezoid {
     /// Acceleration, with the sign of the motion.
     acceleration: f64,
-    /// Time to accelerate to the highest speed, which is also the time to stop from it, s.
+    /// Time to accelerate to the highest speed, s. The deceleration takes the same time.
     ramp: f64,
     /// Time at the highest speed, s.
     cruise: f64,
@@ -53,7 +53,7 @@ impl Trapezoid {
     }
 }
 
-/// Plans a motion from rest to rest. The path is a straight line if this does not increase the duration. If it does,
+/// Plans a motion from rest to rest. The path is a straight line if a straight line does not take longer. If a straight line takes longer,
 /// each joint moves separately, in the time of the slowest joint.
 pub(crate) fn straight_or_joined(from: &JointVec, to: &JointVec, limits: &Limits) -> Motion {
     let way: JointVec = std::array::from_fn(|j| to[j] - from[j]);

@@ -1,12 +1,11 @@
-//! Verification of the share of its limits that a motion uses, including between samples. A motion that exceeds a limit
-//! is slowed down.
+//! Verification that a motion keeps its limits, also between samples. A motion that exceeds a limit is slowed down.
 use jtc_wire::Joint;
 
 use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Tolerance of a limit for rounding, as a share of the limit.
+/// Tolerance for rounding, as a share of a limit.
 const ROUNDING: f64 = 1e-9;
 /// Time between torque samples, s.
 const TORQUE_STEP: f64 = 0.004;
@@ -23,7 +22,8 @@ const SLOWEST: f64 = 64.0;
 pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
     let mut limits = limits.clone();
     for (j, velocity) in limits.velocity.iter_mut().enumerate() {
-        // The limit is slightly below the last row of the table, so that rounding cannot exceed this row.
+        // The speed limit is slightly below the last row of the friction table, so that rounding cannot exceed this
+        // row.
         let table = arm.map_or(f64::INFINITY, |arm| arm.velocity_max(j) * (1.0 - 1e-4));
         *velocity = velocity.min(table);
     }
@@ -59,14 +59,14 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
         let h = piece.length;
-        // Time is measured in durations of the piece.
+        // The unit of time is the duration of the piece.
         let [_, c1, c2, c3, c4, c5] = piece.coefficients[j];
         let velocity = [c1, 2.0 * c2 * h, 3.0 * c3 * h * h, 4.0 * c4 * h.powi(3), 5.0 * c5 * h.powi(4)];
         let acceleration = [2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h.powi(3)];
         let jerk = [6.0 * c3, 24.0 * c4 * h, 60.0 * c5 * h * h];
         let of = |p: &[f64], limit: f64| largest(p, limit) / limit;
-        // For values within their limit, the function computes no root. Most values are within their limit, and
-        // computing roots takes time.
+        // The function computes no root for a value within its limit. Most values are within their limits, and roots
+        // take computing time.
         let root = |share: f64, root: fn(f64) -> f64| if share > 1.0 { root(share) } else { share };
         most = most.max(of(&velocity, limits.velocity[j]));
         most = most.max(root(of(&acceleration, limits.acceleration[j]), f64::sqrt));
@@ -111,8 +111,8 @@ pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) 
     most
 }
 
-/// Returns an upper bound of a polynomial's magnitude on 0..1, accurate to a thousandth if it is above `limit`. Uses
-/// the Bernstein coefficients, whose range always contains the polynomial (Farouki 2012).
+/// Returns an upper bound of a polynomial's magnitude on 0..1. A bound above `limit` is accurate to a thousandth. The
+/// range of the Bernstein coefficients always contains the polynomial (Farouki 2012).
 fn largest(polynomial: &[f64], limit: f64) -> f64 {
     hull(&bernstein(polynomial)[..polynomial.len()], limit, 6)
 }
@@ -179,7 +179,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     };
     let mut factor = 1.0;
     let mut slowed = None;
-    // Loads that have exceeded the limit so far. Most loads have enough torque at every speed.
+    // Loads that have exceeded the torque limit so far. Most loads never exceed the limit.
     let mut some: Vec<&Load> = Vec::new();
     loop {
         let before = some.len();
@@ -201,8 +201,8 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
 /// Time, joint, torque and torque limit at a point at which the torque is not sufficient.
 type Over = (f64, Joint, f64, f64);
 
-/// Returns the smallest time factor above `least` with which no point of the motion is `over`, and the last joint that
-/// was over. `whole` contains the torque limits.
+/// Returns the smallest time factor above `least` with which no point of the motion exceeds the torque limit. Also
+/// returns the last joint that exceeded the limit. `whole` contains the torque limits.
 fn factor_for(
     motion: &Motion,
     whole: &JointVec,
@@ -266,9 +266,9 @@ pub(crate) fn holds(
 }
 
 /// Returns the times at which the torque of a piece is sampled, in seconds after its start. The list contains both
-/// ends, because the acceleration may jump there, and times between the ends that are at most `step` apart. The times
-/// at which the sign of the friction of a joint reaches ±1 are also included. A piece with higher accelerations inside
-/// than at its ends has more sample times.
+/// ends, because the acceleration may jump at the ends, and times between the ends that are at most `step` apart. The
+/// list also contains the times at which the sign of the friction of a joint reaches ±1. A piece with higher
+/// accelerations inside than at its ends has more sample times.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
     let count = (piece.length / step).ceil().max(least) as usize;
@@ -286,7 +286,7 @@ fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<
     moments
 }
 
-/// Returns `true` if a joint's acceleration in the piece may be outside the range between the values at the ends.
+/// Returns `true` if, inside the piece, a joint's acceleration may be higher or lower than at both ends.
 fn bulges(piece: &Piece, limits: &Limits) -> bool {
     let h = piece.length;
     piece.coefficients.iter().zip(&limits.acceleration).any(|([_, _, c2, c3, c4, c5], limit)| {

@@ -1,12 +1,12 @@
-//! Change of the timing of a motion without a change of its path. Each part has its own rate, with smooth transitions
-//! between the rates.
+//! Change of the timing of a motion without a change of its path. Each part of the motion has its own rate, and the
+//! transitions between the rates are smooth.
 use crate::Limits;
 use crate::compose::Section;
 use crate::law::{Law, Phase};
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 
-/// Maximum duration of a change of rate, in s and as a share of the shorter adjacent part.
+/// Maximum duration of a change of rate, in s, and as a share of the duration of the shorter adjacent part.
 const CHANGE: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.4;
 /// Speed below which a motion is considered at rest, rad/s.
@@ -19,7 +19,7 @@ pub(crate) struct Part {
     pub wanted: f64,
 }
 
-/// A motion as a path whose parameter is its time.
+/// Motion as a path whose parameter is the time of the motion.
 struct InTime<'a>(&'a Motion);
 
 impl Path for InTime<'_> {
@@ -56,7 +56,7 @@ pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion
     warped
 }
 
-/// Each part is stretched separately, because all parts begin and end at rest.
+/// Stretches each part separately, because all parts begin and end at rest.
 fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
     // Values for each part: end of the previous part, start before and after stretching, and time factor.
     let (mut before, mut after) = (0.0, 0.0);
@@ -115,11 +115,12 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates with which each part has its requested duration. Half of each change of rate is in the part before
-/// the change, and half is in the part after it.
+/// Returns the rates with which each part has its requested duration. Each change of rate is half in the part before
+/// the change and half in the part after the change.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
-    // The factor is a twelfth of the duration of the change, which is the effect of half a change on the distance.
+    // Half a change of rate changes the distance of a part by the difference of the rates times 1/12 of the change's
+    // duration.
     for _ in 0..60 {
         for i in 0..parts.len() {
             let mut way = lengths[i];

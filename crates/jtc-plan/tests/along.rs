@@ -47,7 +47,7 @@ fn a_curve_is_followed_within_all_limits() {
             let path = Lissajous { turns: 2.0, size };
             let motion = along(&path, &limits, Some(&arm)).unwrap();
             let count = (motion.duration() / H) as usize;
-            // The points of the curve must be close to the motion, in order.
+            // The motion must pass close to all points of the curve, in the order of these points.
             let mut s = 0.0;
             for k in 0..=count {
                 let p: [JointVec; 4] = std::array::from_fn(|i| motion.at((k + i) as f64 * H).position);
@@ -166,7 +166,7 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
         assert!(holding && waypoint == 2 && joint.number() == 2 && torque > limit, "{error}");
         assert!(error.to_string().contains("holding the arm there"), "{error}");
     }
-    // If the position occurs at two consecutive waypoints, the error contains the first of the two.
+    // If two consecutive waypoints have this position, the error contains the first one of these waypoints.
     for blend in [0.0, 0.05] {
         let waypoints = [[0.0; 6], stretched, stretched, [0.0; 6]].map(Waypoint::from);
         let error = through(&waypoints, blend, &limits, Some(&arm)).unwrap_err();
@@ -178,7 +178,7 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
     assert!(point_to_point(&[0.0; 6], &stretched, &limits, Some(&arm)).is_ok());
 }
 
-/// J-36: with any limits, velocities stay within the range of the friction table.
+/// J-36: with any limits, the velocities of a motion stay within the range of the friction table.
 #[test]
 fn j36_velocities_stay_inside_the_friction_table() {
     let (config, parameters) = (Config::avena(), Parameters::avena());

@@ -1,4 +1,4 @@
-//! Tests of the waypoint of an error, as a value and in the message.
+//! Tests that the waypoint number of an error is equal to the number in the message.
 use jtc_plan::kinematics::PoseError;
 use jtc_plan::{LimitKind, PlanError};
 use jtc_wire::Joint;
@@ -34,7 +34,7 @@ fn about(waypoint: usize) -> Vec<PlanError> {
     ]
 }
 
-/// The first number after the word in the message is the number that the method returns.
+/// The first number after the word `waypoint` in a message is the number that the method `waypoint` returns.
 #[test]
 fn the_waypoint_is_the_one_that_the_message_names() {
     for error in about(17) {

@@ -1,4 +1,4 @@
-//! Flange lines that the arm cannot follow, with the error and its location.
+//! Tests of flange lines that the arm cannot follow. Each error must contain the correct location.
 use crate::{lines, robots};
 
 use std::f64::consts::PI;
@@ -12,8 +12,8 @@ fn line(model: &ArmModel, q: &JointVec, to: &Pose) -> PoseError {
     FlangePath::new(&Kinematics::new(model, &WIDE), q, &[Leg::Line { to: *to }], 0.0).unwrap_err()
 }
 
-/// A spherical wrist rotates about axis 5 and passes the position 0. The error occurs on the line, at the angle that
-/// counts as near the singular pose.
+/// A spherical wrist rotates about axis 5 and passes the position 0. The error is at the point of the line from which
+/// the wrist is near the singular pose.
 #[test]
 fn a_line_through_a_wrist_singularity_ends_there() {
     let with = |q5: f64| [0.3, -0.8, 0.9, 0.5, q5, 0.4];
@@ -52,7 +52,7 @@ fn three_parallel_axes_have_the_same_wrist() {
     assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
 }
 
-/// A line ends in a pose in which the arm is stretched, except for half a degree.
+/// The end of a line is a pose that differs from the stretched arm by only half a degree.
 #[test]
 fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
@@ -83,8 +83,8 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends are within reach, but the positions between the ends are not. The positions between are in the column
-/// around the axis of joint 1 that a PUMA 560 cannot enter.
+/// Both ends of the line are within reach, but the positions between the ends are not. The positions between the ends
+/// are in the column around the axis of joint 1 that a PUMA 560 cannot enter.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let model = robots::puma560();
@@ -133,7 +133,7 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     assert!(matches!(arc(&bent, &far), PoseError::NotFinite { .. }));
     let start = FlangePath::new(&kin, &[f64::NAN; 6], &lines, 0.0).unwrap_err();
     assert!(matches!(start, PoseError::Waypoint { waypoint: 1, .. }), "{start}");
-    // The arm is already outside its limits.
+    // With these limits, the arm is outside its limits at the start of the line.
     let mut limits = WIDE;
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();

@@ -1,4 +1,4 @@
-//! Lines and arcs of the flange, checked with forward kinematics that share no code with the paths.
+//! Tests of lines and arcs of the flange. The tests use forward kinematics that share no code with the paths.
 use crate::{lines, robots};
 
 use jtc_core::{Config, Parameters};
@@ -9,7 +9,7 @@ use lines::{Vec3, WIDE, cross, dot, moved, norm, on_leg, sub};
 use proptest::prelude::*;
 use robots::difference;
 
-/// Arms with closed forms, and one arm without.
+/// Arms with closed forms, and one arm without a closed form.
 fn arms() -> [(&'static str, ArmModel); 4] {
     [("avena", robots::avena()), ("UR5", robots::ur5()), ("KR 5", robots::kr5()), ("Jaco 2", robots::jaco2())]
 }
@@ -73,8 +73,8 @@ proptest! {
                 let here = robots::pose(&model, &at);
                 let ideal = std::array::from_fn(|i| from.position[i] + share * (to.position[i] - from.position[i]));
                 prop_assert!(norm(sub(here.position, ideal)) < 1e-9, "{name}: {}", norm(sub(here.position, ideal)));
-                // The sum of the angles to both ends is the total angle only on the shortest rotation between the two
-                // orientations.
+                // Only on the shortest rotation between the two orientations, the angles to both ends add up to the
+                // total angle.
                 let (a, b) = (difference(&from, &here).1, difference(&here, &to).1);
                 prop_assert!((a - share * whole_turn).abs() < 1e-7 && (b - (1.0 - share) * whole_turn).abs() < 1e-7);
                 prop_assert!((0..JOINTS).all(|j| (at[j] - last[j]).abs() < 0.3), "{name}: {last:?} {at:?}");
@@ -100,7 +100,7 @@ proptest! {
             if !at_break {
                 prop_assert!(deviation(&path, s) < 2e-3, "{name}: {} at {s}", deviation(&path, s));
             }
-            // A blended corner must not cause a jump in either derivative.
+            // A blended corner must not cause a jump in the first or the second derivative.
             if path.stops().is_empty() {
                 for corner in path.breaks() {
                     let (before, after) = (path.at(corner - 1e-7), path.at(corner + 1e-7));
@@ -176,7 +176,7 @@ proptest! {
         }
     }
 
-    /// A joint that turns back on the path needs the range up to its turning point, but not more.
+    /// If a joint turns back on the path, its position range must include the turning point, but no more.
     #[test]
     fn a_joint_that_turns_back_needs_the_range_up_to_there(q in start(), shift in small(0.3), turn in small(0.5)) {
         let model = robots::avena();
@@ -222,7 +222,7 @@ proptest! {
     }
 
     /// The test reduces the position range of one joint. The error is at the point at which the unlimited path leaves
-    /// that range.
+    /// this range.
     #[test]
     fn a_limit_on_the_way_is_found_where_it_is(
         q in start(), shift in small(0.3), turn in small(0.5), joint in 0..JOINTS,
@@ -234,7 +234,7 @@ proptest! {
         let at = |s: f64| free.at(s).position[joint];
         let all: Vec<f64> = (0..=1000).map(|k| at(free.end() * f64::from(k) / 1000.0)).collect();
         let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // The position must be clearly higher than its values at both ends.
+        // The highest position of the joint must be clearly above its start position.
         prop_assume!(highest - q[joint] > 0.01);
         let mut limits = WIDE;
         limits[joint].1 = q[joint] + share * (highest - q[joint]);
@@ -245,7 +245,7 @@ proptest! {
                 prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
                 prop_assert!((length - free.end()).abs() < 1e-12);
                 prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
-                // At no earlier point is the limit exceeded.
+                // The limit is not exceeded at any earlier point.
                 let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
                 prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
             }
@@ -258,7 +258,7 @@ proptest! {
     }
 }
 
-/// A motion along a path keeps the flange on its line at all times. The check includes the times between the points
+/// During a motion along a path, the flange is on its line at all times. The test also checks times between the points
 /// that the planner checks.
 #[test]
 fn motions_along_lines_and_arcs_stay_on_them() {

@@ -1,4 +1,4 @@
-//! Inverse kinematics, checked with forward kinematics that share no code with the inverse kinematics.
+//! Tests of the inverse kinematics. The tests use forward kinematics that share no code with the inverse kinematics.
 use crate::robots;
 
 use std::f64::consts::{PI, TAU};
@@ -11,9 +11,9 @@ use jtc_plan::kinematics::{
 use proptest::prelude::*;
 use robots::difference;
 
-/// A whole turn for each joint.
+/// Position range of one turn for each joint.
 const TURN: [(f64, f64); JOINTS] = [(-PI, PI); JOINTS];
-/// Smallest singular value above which a pose does not count as near a singular pose.
+/// A pose is not near a singular pose if its smallest singular value is above this limit.
 const AWAY: f64 = 0.01;
 
 fn positions() -> impl Strategy<Value = JointVec> {
@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// Extreme poses for the closed forms, with right angles and stretched arms.
+    /// The closed forms solve extreme poses, with right angles and stretched arms.
     #[test]
     fn poses_at_and_near_singular_ones_are_reached(
         quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
@@ -121,13 +121,13 @@ proptest! {
             let pose = robots::pose(&model, &q);
             let found = kin.solve(&pose, &near).unwrap();
             let nearest = kin.all(&pose).iter().map(|q| length(q, &near)).fold(f64::INFINITY, f64::min);
-            // `all` contains positions with at most one turn more or less, and `near` is within one turn.
+            // In `all`, each joint differs by at most one turn from its principal value, and `near` is within one turn.
             prop_assert!((length(&found, &near) - nearest).abs() < 1e-6);
             prop_assert!(found.iter().all(|a| a.abs() <= width));
         }
     }
 
-    /// The default arm with its position limits, which some solutions exceed.
+    /// For the default arm, the kinematics return only solutions within the position limits.
     #[test]
     fn the_default_arm_keeps_to_its_limits(share in prop::array::uniform6(0.01..0.99f64)) {
         let limits = robots::avena_limits();
@@ -150,7 +150,8 @@ proptest! {
         }
     }
 
-    /// An arm whose calibration differs by a milliradian and a millimetre from an ideal geometry with a closed form.
+    /// The kinematics also solve poses of an arm whose calibration differs by a milliradian and a millimetre from an
+    /// ideal geometry with a closed form.
     #[test]
     fn an_arm_off_its_ideal_geometry_is_solved_too(
         q in positions(), off in prop::array::uniform6(prop::array::uniform6(-1e-3..1e-3f64))
@@ -172,8 +173,8 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1, and its height is at most the length of
-/// both links together.
+/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1. The height of the wrist above the shoulder is at most the
+/// length of the two links together.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);
@@ -200,14 +201,14 @@ fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
     let kin = Kinematics::new(&model, &TURN);
     let q = [0.3, -1.0, 0.1, -1.5, 0.4, 0.0];
     let mut pose = robots::pose(&model, &q);
-    // A reachable pose, rotated by half a turn about the x axis of the flange.
+    // The pose is a reachable pose, rotated by half a turn about the x axis of the flange.
     pose.rotation = pose.rotation.map(|[x, y, z]| [x, -y, -z]);
     let error = kin.solve(&pose, &q).unwrap_err();
     let PoseError::Orientation { distance, missing } = error else { panic!("{error}") };
     assert!((distance - pose.position.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < 1e-12);
     assert!(missing > 0.01 && missing < PI, "{error}");
-    // If such an orientation is rotated back by slightly more than the missing angle, it is within reach. If it is
-    // rotated by a smaller angle, about any axis near the correct axis, it is out of reach.
+    // If this orientation is rotated back by slightly more than the missing angle, it is within reach. After a rotation
+    // by a smaller angle about any axis near the correct axis, the orientation is still out of reach.
     let turned = |angle: f64| {
         let (s, c) = angle.sin_cos();
         let rotation = pose.rotation.map(|[x, y, z]| [x, c * y + s * z, c * z - s * y]);
@@ -224,7 +225,7 @@ fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
     let all = Kinematics::new(&model, &TURN).all(&pose);
     for joint in 0..JOINTS {
         let mut limits = TURN;
-        // With the other joints unlimited, no solution has the joint at this position.
+        // If the other joints have no limits, no solution has a position of this joint in this range.
         let (low, high) = (0..60)
             .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
             .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))
@@ -263,7 +264,7 @@ fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
     assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
 }
 
-/// Numbers of all kinds, of which most are invalid.
+/// Returns numbers of all kinds, most of which are invalid.
 fn any_number() -> impl Strategy<Value = f64> {
     let special =
         vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300, 1e-300, 1e9];
@@ -273,7 +274,7 @@ fn any_number() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
-    /// An invalid pose, start or limit results in an error or in no solution. The search never panics, and it always
+    /// An invalid pose, start or limit results in an error or in no solution. The search does not panic, and always
     /// ends.
     #[test]
     fn no_number_does_any_harm(
@@ -304,7 +305,8 @@ proptest! {
     }
 }
 
-/// Singular poses, found by their definition, for both geometries.
+/// The kinematics report the correct kind of singular pose for both geometries. The test finds the singular poses from
+/// their definitions.
 #[test]
 fn singular_poses_have_their_names() {
     use SingularKind::{Elbow, Shoulder, Wrist};
@@ -319,7 +321,7 @@ fn singular_poses_have_their_names() {
         (robots::ur5(), "UR5", with(2, 0.0), Elbow, &[2, 3, 4]),
         (robots::puma560(), "PUMA 560", with(4, 0.0), Wrist, &[4, 6]),
         (robots::puma560(), "PUMA 560", with(2, -PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2, 3]),
-        // Folded arm whose two links have equal length, with the wrist close to the axis of joint 2.
+        // The arm is folded: its two links have equal length, and the wrist is close to the axis of joint 2.
         (robots::puma560(), "PUMA 560", with(2, PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2]),
         (robots::kr5(), "KR 5", with(4, PI), Wrist, &[4, 6]),
         (robots::kr5(), "KR 5", over_the_base(), Shoulder, &[1]),
@@ -335,7 +337,8 @@ fn singular_poses_have_their_names() {
     assert!(far.smallest > 0.05, "{far}");
 }
 
-/// A KR 5 with the wrist over the axis of joint 1. The test finds this position by bisection.
+/// Returns joint positions of a KR 5 with the wrist over the axis of joint 1. The function finds these positions by
+/// bisection.
 fn over_the_base() -> JointVec {
     let with = |q2: f64| [0.3, q2, 0.3, 0.4, 0.8, 0.2];
     let radius = |q2: f64| {
@@ -386,7 +389,8 @@ fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
     assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
 }
 
-/// Compares the velocity of the flange and the rate of its rotation with central differences of independent forward kinematics.
+/// The test compares the velocity and the angular velocity of the flange with central differences of independent
+/// forward kinematics.
 #[test]
 fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
     let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];

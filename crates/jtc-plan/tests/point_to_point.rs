@@ -1,4 +1,4 @@
-//! Point-to-point motions, checked by samples of the positions only.
+//! Tests of point-to-point motions. The tests use only samples of the positions.
 use jtc_core::Config;
 use jtc_plan::{Limits, PlanError, point_to_point};
 

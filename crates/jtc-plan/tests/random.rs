@@ -1,6 +1,6 @@
-//! Random motions of random arms, checked by samples of their positions. No limit is exceeded, no corner is cut by more
-//! than the blend, and the motion begins and ends exactly and at rest. `cargo run --profile dist -p jtc-plan --example
-//! campaign` checks any number of motions.
+//! Tests of random motions of random arms with samples of the positions. A motion exceeds no limit, stays within the
+//! blend at each corner, and begins and ends at rest exactly at the requested positions. `cargo run --profile dist -p
+//! jtc-plan --example campaign` checks any number of motions.
 use jtc_plan::{PlanError, point_to_point, through};
 use proptest::prelude::*;
 
@@ -41,8 +41,8 @@ proptest! {
         }
     }
 
-    /// The states of a motion are consistent, which means that velocities are the slopes of positions, and
-    /// accelerations are the slopes of velocities.
+    /// The states of a motion are consistent: velocities are the slopes of the positions, and accelerations are the
+    /// slopes of the velocities.
     #[test]
     fn velocity_and_acceleration_are_the_slopes(seed in any::<u64>()) {
         const H: f64 = 1e-5;

@@ -1,4 +1,4 @@
-//! Routes through waypoints, checked with forward kinematics that share no code with the paths.
+//! Tests of routes through waypoints. The tests use forward kinematics that share no code with the paths.
 use crate::{lines, robots};
 
 use jtc_core::{Config, Parameters};
@@ -62,7 +62,7 @@ fn mixed() -> Mixed {
     Mixed { points, corners: [first, corner, top], centre }
 }
 
-/// States between two waypoints (counted from 1), including both ends.
+/// Returns the states between two waypoints (counted from 1), including both ends.
 fn between(motion: &Motion, from: usize, to: usize) -> Vec<State> {
     let (from, to) = (motion.waypoint_times()[from - 1], motion.waypoint_times()[to - 1]);
     assert!(from < to, "{:?}", motion.waypoint_times());
@@ -170,8 +170,8 @@ fn times_of_waypoints_on_lines_are_kept() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
 
-    /// A line to joint positions ends at these positions, if their configuration is the same as at the start of the
-    /// line. If the configuration differs, the error contains the joint.
+    /// A line to joint positions ends at these positions, if the configuration of the arm at both ends of the line is
+    /// the same. If the configurations differ, the error contains a joint with a different position.
     #[test]
     fn joint_positions_at_the_end_of_a_line_are_of_its_configuration(shift in prop::array::uniform3(-0.15..0.15f64)) {
         prop_assume!(norm(shift) > 1e-3);
@@ -222,7 +222,7 @@ fn errors_name_the_waypoints_of_the_route() {
         let (number, source) = far(index);
         assert!(number == index + 1 && matches!(source, PoseError::OutOfReach { .. }), "{index}: {source}");
     }
-    // An arc whose via point is out of reach.
+    // The via point of this arc is out of reach.
     let mut changed = points.clone();
     let Target::Flange(via) = points[4].target else { panic!("a pose") };
     changed[4] = flange(moved(&via, [-3.0, 0.0, 0.0], [0.0; 3]), LegKind::Via);
@@ -237,7 +237,8 @@ fn errors_name_the_waypoints_of_the_route() {
     assert_eq!(route(&points, (0.0, -1.0)).unwrap_err(), PoseError::Blend { radius: -1.0 }.into());
 }
 
-/// A leg without motion still has its own waypoint. The motion passes it at the time of the previous waypoint.
+/// A leg without motion still has its own waypoint. The motion passes this waypoint at the time of the previous
+/// waypoint.
 #[test]
 fn waypoints_at_one_place_are_passed_at_one_time() {
     let there = moved(&at(&Q), [-0.1, 0.0, 0.0], [0.0; 3]);

@@ -1,5 +1,5 @@
-//! All tests of the crate are in one program, so that only one program is linked. Each file in this folder is a module
-//! of this program.
+//! All tests of the crate are in one program, so the linker links only one program. Each file in this folder is a
+//! module of this program.
 mod along;
 mod choices;
 mod error_places;

@@ -1,4 +1,5 @@
-//! The planner keeps the specified times if the limits permit, and rejects these times otherwise.
+//! Tests of specified times. The planner keeps the specified times if the limits permit these times. If the limits do not permit a time,
+//! the planner returns an error.
 use jtc_core::Config;
 use jtc_plan::{LimitKind, Limits, PlanError, Waypoint, through};
 use proptest::prelude::*;
@@ -10,8 +11,8 @@ use judge::Case;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// In this test, some waypoints have later times than in the fastest motion. The planned motion keeps these times
-    /// and all limits. A time may be too early only with rounded corners, because slower adjacent legs slow down the
+    /// Some waypoints of this test have later times than in the fastest motion. The planned motion keeps these times
+    /// and all limits. A time can be too early only if corners are rounded, because slower adjacent legs slow down the
     /// motion at the waypoint.
     #[test]
     fn given_times_are_kept(

@@ -1,4 +1,4 @@
-//! Limits at a point of a path, expressed by the coefficients of a spline.
+//! Limits at a point of a path as functions of the spline coefficients.
 use crate::along::Plan;
 use crate::{JOINTS, JointVec};
 
@@ -13,14 +13,14 @@ pub(super) struct Place {
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
-    /// Coefficients of bend, slope and squared speed, as shares of the limits. The first are for the jerk (without the
-    /// speed factor), the second for the acceleration (which does not depend on the bend).
+    /// Coefficients as shares of the limits: bend, slope and squared speed for the jerk (without the speed factor), and
+    /// slope and squared speed for the acceleration.
     pub jerk: [JointVec; 3],
     pub acceleration: [JointVec; 2],
     /// Highest squared speed, if speed, acceleration and torque are limited at this point.
     pub cap: f64,
-    /// Weights of the reciprocal speed in the time, at this point and at the middle of the cell. Also the squared speed
-    /// at the middle.
+    /// Weights of the reciprocal speed in the sum for the duration, at this point and at the middle of the cell. The
+    /// second field also contains the weights of the squared speed at the middle.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
@@ -29,11 +29,11 @@ pub(super) struct Place {
 pub(super) struct Torque {
     /// First derivative of the path.
     pub first: JointVec,
-    /// Coefficient of the slope.
+    /// Coefficient of the slope in the torque.
     pub mass: JointVec,
-    /// Coefficient of the squared speed.
+    /// Coefficient of the squared speed in the torque.
     pub speed: JointVec,
-    /// Available torque without friction, up and down, N·m.
+    /// Available torque without friction, in the positive and negative direction, N·m.
     pub high: JointVec,
     pub low: JointVec,
 }
@@ -55,13 +55,13 @@ impl Place {
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Adapts the point to rest, so that only jerk along the path remains.
+    /// Adapts the point to an arm at rest. For such a point, only the jerk along the path remains.
     pub(super) fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Returns the contribution of this point to the time, and to the sum of the logarithms of the margins to the
-    /// limits. `None` outside the limits.
+    /// Returns the contribution of this point to the duration, and to the sum of the logarithms of the margins to the
+    /// limits. Returns `None` if a limit is exceeded.
     pub(super) fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
         let c = &c[self.at..self.at + 3];
         let b = dot(&self.b, c);
@@ -101,8 +101,8 @@ impl Place {
         is_inside.then(|| (time, product.ln()))
     }
 
-    /// Adds the contribution of this point to the derivatives of the time plus `barrier` times the barriers. The derivatives are with respect to the
-    /// coefficients.
+    /// Adds the contribution of this point to the derivatives of the minimised function. The function that is minimised is the duration
+    /// plus `barrier` times the barriers. The derivatives are with respect to the spline coefficients.
     pub(super) fn add_to(
         &self,
         gradient: &mut [f64],

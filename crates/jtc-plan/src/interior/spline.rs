@@ -1,8 +1,8 @@
-//! Knots and time law of a spline.
+//! Knots of a spline, and its time law.
 use super::Problem;
 use crate::law::{Law, Phase};
 
-/// Largest relative change of speed in a pair of phases of a law, and largest number of phase pairs per cell.
+/// Largest relative change of the speed within a pair of phases, and largest number of phase pairs per cell.
 const ALIKE: f64 = 0.2;
 const PARTS_MAX: f64 = 4.0;
 
@@ -27,7 +27,8 @@ impl Problem<'_> {
         phases.push(Phase { length: start, jerk: acceleration / start, ..Phase::default() });
         for pair in states.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            // A phase has constant jerk, whereas the jerk of the spline grows with the speed.
+            // A phase has a constant jerk, but the jerk of the spline grows with the speed. Therefore a large change of
+            // speed is divided into several phase pairs.
             let parts = ((to.1 - from.1).abs() / (ALIKE * from.1.min(to.1))).ceil().clamp(1.0, PARTS_MAX);
             let mut before = from;
             for part in 1..=parts as usize {
@@ -51,7 +52,8 @@ fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64,
     (from.0 + way, square.max(0.0).sqrt(), acceleration)
 }
 
-/// Adds two phases of equal length that match parameter, speed and acceleration at both ends. Returns the end time.
+/// Adds two phases of equal length. The phases match the parameter, speed and acceleration of the spline at both ends. Returns the end
+/// time.
 fn phases_between(
     phases: &mut Vec<Phase>,
     start: f64,

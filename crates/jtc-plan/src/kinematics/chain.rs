@@ -46,14 +46,14 @@ pub(crate) struct Chain {
     /// Divisor of lengths in the Jacobian and in residuals, m. The value is the length of the stretched arm from its
     /// first axis to the flange.
     pub length: f64,
-    /// Axes at the joint positions 0, on which the closed forms are based.
+    /// Axes at the joint positions 0. The closed forms use these axes.
     pub zero: Axes,
 }
 
 /// Axes and flange at given joint positions, in the base frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Axes {
-    /// Directions, unit vectors.
+    /// Directions of the axes, as unit vectors.
     pub axis: [Vector3<f64>; JOINTS],
     /// A point on each axis, m.
     pub point: [Vector3<f64>; JOINTS],
@@ -85,8 +85,8 @@ impl Chain {
         Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
     }
 
-    /// Returns the geometric Jacobian of the flange with translations divided by [`Chain::length`], so that its
-    /// singular values are comparable.
+    /// Returns the geometric Jacobian of the flange with translations divided by [`Chain::length`]. The division makes
+    /// the singular values comparable.
     pub(super) fn scaled_jacobian(&self, axes: &Axes) -> Matrix6<f64> {
         let mut jacobian = axes.jacobian();
         jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / self.length);
@@ -122,7 +122,7 @@ impl Axes {
         let flange = self.jacobian().fixed_rows::<3>(0) * qd;
         let mut spin = Vector3::zeros();
         for j in 0..JOINTS {
-            // Velocity of the point on the axis, caused by the joints before it.
+            // Velocity of the point on the axis, caused by the joints before this axis.
             let moved = (0..j).map(|k| self.axis[k].cross(&(self.point[j] - self.point[k])) * qd[k]);
             let speed = moved.fold(Vector3::zeros(), |sum, v| sum + v);
             let turned = spin.cross(&self.axis[j]);

@@ -1,24 +1,25 @@
 //! Inverse kinematics in closed form, for two geometries that cover most arms.
 //!
 //! * **Spherical wrist**: the last three axes meet in a point (Pieper 1968), and two adjacent axes of the first three
-//!   are parallel or meet. The first three joints move this point to its position, and the last three joints set the
-//!   orientation.
+//!   are parallel or meet. The first three joints move the intersection to its position, and the last three joints set
+//!   the orientation of the flange.
 //! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in the
 //!   arms of Universal Robots (Hawkins 2013). The first joint moves the intersection of axes 5 and 6 to the required
 //!   coordinate along the parallel axes. The fifth and the sixth joint turn the flange, and the three parallel joints
 //!   form a planar arm.
 //!
 //! All values are computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
-//! 1984; decomposition by Elias and Wen, IK-Geo, 2022). So the result does not depend on the frames chosen on the axes.
+//! 1984; decomposition by Elias and Wen, IK-Geo, 2022). Therefore the result does not depend on the choice of joint
+//! frames.
 use jtc_dynamics::JointVec;
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::{Axes, Frame, turn};
 use super::subproblems::{across, turn_onto, turn_to_length, turn_to_value, turned};
 
-/// Largest sine of an angle, and largest distance in m, that are treated as zero when a geometry is recognised. This
-/// tolerance is larger than the rounding errors of a robot description. Solutions for the ideal geometry are refined
-/// with the actual arm.
+/// Largest sine of an angle, and largest distance in m, that are treated as zero when the geometry of an arm is
+/// determined. This tolerance is larger than the rounding errors of a robot description. Solutions for the ideal
+/// geometry are refined with the actual arm.
 pub(crate) const EXACT: f64 = 1e-5;
 /// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry. For such an arm, the closed form
 /// supplies good starting values for a search.
@@ -33,7 +34,7 @@ pub(crate) enum Geometry {
     ThreeParallel { centre: Vector3<f64> },
 }
 
-/// Relation between two adjacent axes of the first three.
+/// Relation between two adjacent axes of the first three joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Shoulder {
     /// Axes 2 and 3 are parallel.
@@ -71,9 +72,9 @@ impl Geometry {
         None
     }
 
-    /// Returns joint positions at which the flange is at `goal`, except for rounding and the deviations from the ideal
-    /// geometry. There are at most eight solutions, and some of these may not reach the goal. A joint that the goal
-    /// does not determine stays at `hint`.
+    /// Returns joint positions at which the flange is at `goal`, except for rounding and the deviations from the ideal geometry. There are
+    /// at most eight solutions. At some of the returned joint positions, the flange may not be at the goal. A joint that the goal does not
+    /// determine stays at `hint`.
     pub(super) fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let rotation = goal.rotation * zero.flange.rotation.transpose();
         let motion = Motion { rotation, shift: goal.position - rotation * zero.flange.position };
@@ -126,8 +127,8 @@ fn moved(zero: &Axes, j: usize, angle: f64, point: &Vector3<f64>) -> Vector3<f64
 impl Shoulder {
     /// Returns up to four solutions of the first three joints with which `centre` is at `target`.
     ///
-    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ maps y to z, so y and z have equal coordinates along axis 2 and equal
-    /// distances from each point of the axis.
+    /// Let y = E₃·centre and z = E₁⁻¹·target. Because E₂ maps y to z, y and z have equal coordinates along axis 2 and
+    /// equal distances from each point of axis 2.
     fn place(
         &self,
         zero: &Axes,
@@ -137,8 +138,8 @@ impl Shoulder {
     ) -> Vec<[f64; 3]> {
         let (h, p) = (&zero.axis, &zero.point);
         let (forearm, reach) = (centre - p[2], target - p[0]);
-        // Joint 1 follows from the required coordinate of z along axis 2, and joint 3 from the coordinate of y. The two
-        // coordinates are in m, measured from the point on the axis of the joint.
+        // The coordinate of z along axis 2 determines joint 1, and the coordinate of y along axis 2 determines joint 3.
+        // The two coordinates are in m, measured from the point on the axis of the joint.
         let first = |along: f64| {
             let found = turn_to_value(&h[1], &h[0], &reach, along - h[1].dot(&p[0]), -hint[0]);
             found.into_iter().map(|angle| -angle).collect::<Vec<_>>()
@@ -183,7 +184,7 @@ impl Shoulder {
     }
 }
 
-/// Adds the two solutions of the last three joints, with the wrist flipped and not flipped.
+/// Adds the two solutions of the last three joints: one with a flipped wrist, and one without a flip.
 fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, found: &mut Vec<JointVec>) {
     let h = &zero.axis;
     let before = turn(&h[0], arm[0]) * turn(&h[1], arm[1]) * turn(&h[2], arm[2]);
@@ -196,7 +197,7 @@ fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, 
     }
 }
 
-/// Returns the angle of a rotation about `axis`.
+/// Returns the angle of `rotation`, which is a rotation about `axis`.
 fn angle_of(rotation: &Matrix3<f64>, axis: &Vector3<f64>) -> f64 {
     let least = Vector3::ith(axis.iamin(), 1.0);
     let side = across(axis, &least);
@@ -212,12 +213,12 @@ fn three_parallel(
 ) {
     let (h, p) = (&zero.axis, &zero.point);
     let along = &h[1];
-    // The parallel joints do not move the centre in the direction of their axes.
+    // Joints 2, 3 and 4 do not move the centre in the direction of their parallel axes.
     let height = along.dot(&(centre - p[0]));
     for back in turn_to_value(along, &h[0], &(goal.apply(centre) - p[0]), height, -hint[0]) {
         let q1 = -back;
         let rest = turn(&h[0], back) * goal.rotation;
-        // The parallel joints do not change the angle between their axes and the last axis.
+        // Joints 2, 3 and 4 do not change the angle between their parallel axes and axis 6.
         for q5 in turn_to_value(along, &h[4], &h[5], along.dot(&(rest * h[5])), hint[4]) {
             let fifth = turn(&h[4], q5);
             let q6 = -turn_onto(&h[5], &(fifth.transpose() * along), &(rest.transpose() * along), -hint[5]);

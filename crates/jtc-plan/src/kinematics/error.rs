@@ -37,7 +37,7 @@ pub enum PoseError {
     OutOfReach {
         /// Distance of the position from the origin of the base, m.
         distance: f64,
-        /// Distance between the requested position and the nearest flange position that was found, m.
+        /// Distance between the requested position and the nearest flange position that the search found, m.
         missing: f64,
     },
     /// The flange can reach the position, but not with this orientation.
@@ -48,7 +48,8 @@ pub enum PoseError {
     Orientation {
         /// Distance of the position from the origin of the base, m.
         distance: f64,
-        /// Angle between the requested orientation and the nearest orientation that was found at this position, rad.
+        /// Angle between the requested orientation and the nearest orientation that the search found at this position,
+        /// rad.
         missing: f64,
     },
     /// The arm can reach the pose only with a joint outside its limits.
@@ -56,7 +57,7 @@ pub enum PoseError {
     OutsideLimits {
         /// Joint that is farthest outside its limits, in the solution that exceeds the limits least.
         joint: Joint,
-        /// Position of this joint in that solution, rad.
+        /// Position of the joint in this solution, rad.
         value: f64,
         /// Lowest position, rad.
         low: f64,
@@ -84,18 +85,18 @@ pub enum PoseError {
         /// Distance of the second point from the straight line, m; 0 if the first and the last point are equal.
         distance: f64,
     },
-    /// Two orientations with an angle of half a turn between them.
+    /// Two consecutive orientations with an angle of half a turn between them.
     #[error(
         "the orientation is half a turn from that of the waypoint before, so the direction of the turn is ambiguous"
     )]
     HalfTurn,
-    /// An arc's `via` point without an arc after it.
+    /// A `via` point that is not followed by an arc.
     #[error("a point on an arc (`via`) is not followed by the end of the arc")]
     NoArc,
     /// An arc without its `via` point.
     #[error("the end of an arc does not follow a point on the arc (`via`)")]
     NoVia,
-    /// Joint positions at the end of a line that the arm cannot have in its current configuration.
+    /// A line to joint positions that the arm cannot have in its configuration on this line.
     #[error(
         "the line ends there with {joint} at {value:.4} rad, not at {wanted:.4} rad: the arm keeps its configuration along a line"
     )]
@@ -129,8 +130,8 @@ pub enum PoseError {
     Leg {
         /// Number of the leg, from 1. Leg n is between waypoints n and n + 1.
         leg: usize,
-        /// Distance along the leg, m. A turn of 1 rad counts as [`RADIUS`](super::RADIUS) m if this length is greater
-        /// than the translation.
+        /// Distance along the leg, m. A rotation of 1 rad counts as [`RADIUS`](super::RADIUS) m if this length is
+        /// greater than the translation.
         distance: f64,
         /// Length of the leg, m, computed in the same way as the distance along the leg.
         length: f64,
@@ -145,8 +146,8 @@ impl PoseError {
         Self::Waypoint { waypoint, source: Box::new(self) }
     }
 
-    /// Returns the number (from 1) of the waypoint in the message, if the message contains one. For a leg, this is the
-    /// waypoint at the end of the leg.
+    /// Returns the number (from 1) of the waypoint in the message, if the message contains a waypoint. For an error on
+    /// a leg, returns the waypoint at the end of the leg.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Waypoint { waypoint, .. } => Some(*waypoint),

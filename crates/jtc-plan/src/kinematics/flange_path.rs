@@ -11,13 +11,13 @@ use super::trace::Trace;
 use super::{Kinematics, PoseError, outside};
 use crate::{Path, PathPoint};
 
-/// Largest rotation of a joint between two samples, rad. With such small steps, the iteration follows one solution and
-/// does not miss a singular pose.
+/// Largest rotation of a joint between two samples, rad. With this step, the iteration follows one solution and does
+/// not miss a singular pose.
 const TURN: f64 = 0.02;
 /// Largest and smallest distance between two samples, m.
 const STEP: (f64, f64) = (0.01, 1e-7);
-/// Largest rotation of a joint between two breaks, rad. Up to this rotation, the curve is simple enough for the
-/// planner.
+/// Largest rotation of a joint between two breaks, rad. With this rotation, the curve between two breaks is simple
+/// enough for the planner.
 const SIMPLE: f64 = 0.25;
 /// Number of points on the remainder of the leg that are tested. The test detects whether the leg leaves the reach of
 /// the arm.
@@ -25,16 +25,16 @@ const LOOK_AHEAD: usize = 40;
 
 /// A path through joint space on which the flange moves on straight lines and arcs, with corners blended within a radius.
 ///
-/// The path parameter is the length of the legs, m (a turn of 1 rad is counted as [`RADIUS`](super::RADIUS)). With a
-/// blend radius of 0 the path stops at each corner. Each query computes the position by inverse kinematics, so the flange
-/// is on the line except for rounding. The derivatives are computed from the Jacobian and its rate.
+/// The path parameter is the length of the legs, m. A rotation of 1 rad counts as [`RADIUS`](super::RADIUS). With a
+/// blend radius of 0 the path stops at each corner. The path computes each position by inverse kinematics. Therefore
+/// the flange is on the line, except for rounding. The derivatives are computed from the Jacobian and its rate.
 ///
 /// The arm keeps its initial configuration (elbow, wrist, shoulder).
 #[derive(Clone, Debug)]
 pub struct FlangePath {
     chain: Chain,
     trace: Trace,
-    /// Joint positions along the path, from which the iteration starts, in the order of the path parameter.
+    /// Joint positions along the path, in the order of the path parameter. The iteration starts from these positions.
     samples: Vec<(f64, JointVec)>,
     breaks: Vec<f64>,
 }
@@ -46,9 +46,10 @@ impl FlangePath {
     ///
     /// # Errors
     ///
-    /// [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits, [`PoseError::Leg`]
-    /// for an error along a leg: a joint at its limit, a singular pose, the end of the arm's reach. Each error is the
-    /// first along the path. Waypoints are checked before legs.
+    /// Returns [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits. Returns
+    /// [`PoseError::Leg`] for an error along a leg, such as a joint at its limit, a singular pose, or the end of the
+    /// arm's reach. Of several errors, the first error along the path is returned. All waypoints are checked before the
+    /// legs.
     pub fn new(
         kinematics: &Kinematics,
         start: &JointVec,
@@ -71,8 +72,8 @@ impl FlangePath {
         Ok(Self { chain: chain.clone(), trace, samples, breaks })
     }
 
-    /// Returns the parameter at which leg `number` (from 1), an arc, passes its `via` point. The rounding of a corner
-    /// may remove this point from the path.
+    /// Returns the parameter at which the arc with leg number `number` (from 1) passes its `via` point. The rounding of
+    /// a corner may remove this point from the path.
     pub(crate) fn via(&self, number: usize) -> Option<f64> {
         self.trace.via(number)
     }
@@ -116,7 +117,8 @@ impl Path for FlangePath {
     }
 }
 
-/// Runs Newton's iteration from a value near a solution. Returns the solution and the arm in this position.
+/// Runs Newton's iteration from joint positions near a solution. Returns the solution and the axes of the arm at this
+/// solution.
 fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
     let mut axes = chain.at(&q);
     let mut residual = chain.residual(goal, &axes);
@@ -128,7 +130,7 @@ fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
         if left.norm() < residual.norm() {
             (q, axes, residual) = (tried, there, left);
         } else {
-            // The iteration has converged except for rounding, or the value is not finite.
+            // The iteration has converged except for rounding, or the joint positions are not finite.
             break;
         }
     }
@@ -144,8 +146,8 @@ fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>
     Some((first, factors.solve(&rest)?))
 }
 
-/// Returns the points at which the path changes its form, and points between these, so that no joint turns far between
-/// two points.
+/// Returns the points at which the path changes its form. Also returns points between them, so that no joint turns far
+/// between two points.
 fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
     let mut all = trace.breaks();
     let mut turned = [0.0; JOINTS];
@@ -164,14 +166,14 @@ fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
     all
 }
 
-/// Follows a path in small steps and stays with one solution.
+/// Iteration that follows a path in small steps and stays with one solution of the inverse kinematics.
 struct Follower<'a> {
     kinematics: &'a Kinematics,
     trace: &'a Trace,
     s: f64,
     q: JointVec,
     axes: Axes,
-    /// Sign of the determinant of the Jacobian. The sign changes only in a singular pose.
+    /// Sign of the determinant of the Jacobian. The sign of the determinant changes only in a singular pose.
     sign: f64,
 }
 
@@ -191,7 +193,7 @@ impl<'a> Follower<'a> {
         for corner in corners {
             while self.s < corner {
                 let left = corner - self.s;
-                // This condition avoids a tiny step at the end.
+                // The step is limited to half of the remaining length, which avoids a tiny last step.
                 let wanted = if step >= left { corner } else { self.s + step.min(0.5 * left) };
                 match self.try_step(wanted)? {
                     Some(()) => {
@@ -205,15 +207,15 @@ impl<'a> Follower<'a> {
         Ok(samples)
     }
 
-    /// Advances to `s`. Returns `None` if the step must be shorter, and an error if the arm cannot follow the path
-    /// further.
+    /// Advances to `s`. Returns `None` if the step must be shorter. Returns an error if the arm cannot follow the path
+    /// beyond this point.
     fn try_step(&mut self, s: f64) -> Result<Option<()>, PoseError> {
         let chain = &self.kinematics.chain;
         let place = self.trace.at(s);
         let (q, axes) = newton(chain, &place.frame, self.q);
         let (joint, turn) = largest_turn(&self.q, &q);
         let left = chain.residual(&place.frame, &axes);
-        // With this form of the condition, NaN does not count as arrival.
+        // With this form of the condition, a NaN is not considered a solution.
         let arrived = left.norm() <= TOLERANCE;
         if arrived && turn <= TURN {
             self.check(s, &q, &axes)?;
@@ -249,7 +251,8 @@ impl<'a> Follower<'a> {
 
     /// Checks the limits at every turning point of a joint between the current point and `s`.
     fn check_between(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
-        // The point is slightly inside the interval, so that the derivatives at a corner are evaluated on this side.
+        // The point is slightly inside the interval. At a corner, the derivatives are therefore evaluated on the side
+        // of this interval.
         let inset = 1e-3 * (s - self.s);
         let rate = |at: f64, axes: &Axes| derivatives(axes, &self.trace.at(at)).unwrap_or_default().0;
         let (before, after) = (rate(self.s + inset, &self.axes), rate(s - inset, axes));

@@ -7,20 +7,20 @@ use super::chain::{Frame, exponential, logarithm};
 use super::orientation::checked;
 use super::subproblems::turned;
 
-/// Length that corresponds to a rotation of the flange by 1 rad, m. If the rotation in this measure is longer than the
-/// translation, it is the length of the leg.
+/// Length that corresponds to a rotation of the flange by 1 rad, m. The length of a leg is the larger of its
+/// translation and its rotation in this measure.
 pub const RADIUS: f64 = 0.25;
 
-/// Length below which a leg counts as no movement, m.
+/// Length below which a leg is considered to have no movement, m.
 pub(crate) const SHORTEST: f64 = 1e-9;
-/// Distance of the second of three points from the line through the first and third, below which the three points count
-/// as collinear, m.
+/// Three points are considered collinear if the distance of the second point from the line through the other two points
+/// is below this value, m.
 const IN_LINE: f64 = 1e-6;
-/// Deviation from half a turn below which the direction of the rotation is ambiguous, rad.
+/// If a rotation differs from half a turn by less than this angle, the direction of the rotation is ambiguous, rad.
 const HALF_TURN: f64 = 1e-6;
 
-/// Leg of a flange path, which starts at the end of the previous leg. The orientation turns at a constant rate about
-/// one axis, in the shorter direction (spherical linear interpolation).
+/// Leg of a flange path, which starts at the end of the previous leg. Along a leg, the orientation turns at a constant
+/// rate about one axis, in the shorter direction (spherical linear interpolation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leg {
     /// A straight line to a pose.
@@ -41,13 +41,13 @@ pub enum Leg {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub frame: Frame,
-    /// Velocity, m per unit.
+    /// Velocity, m per unit of the parameter.
     pub velocity: Vector3<f64>,
-    /// Angular velocity as a rotation vector in the base frame, rad per unit.
+    /// Angular velocity as a rotation vector in the base frame, rad per unit of the parameter.
     pub spin: Vector3<f64>,
-    /// Acceleration, m per squared unit.
+    /// Acceleration, m per squared unit of the parameter.
     pub acceleration: Vector3<f64>,
-    /// Rate of change of the angular velocity, rad per squared unit.
+    /// Rate of change of the angular velocity, rad per squared unit of the parameter.
     pub spin_rate: Vector3<f64>,
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Place {
 pub(crate) struct Drawn {
     /// Number of the leg in the request, counted from 1.
     pub number: usize,
-    /// Length, m.
+    /// Length of the leg, m.
     pub length: f64,
     from: Frame,
     pub to: Frame,
@@ -67,7 +67,7 @@ pub(crate) struct Drawn {
 
 #[derive(Clone, Debug)]
 enum Way {
-    /// Direction, m per m.
+    /// Line with its direction, m per m.
     Line(Vector3<f64>),
     /// Arc with its angle, rad per m.
     Arc(Circle, f64),
@@ -77,13 +77,13 @@ enum Way {
 #[derive(Clone, Debug)]
 struct Circle {
     centre: Vector3<f64>,
-    /// Vector from the centre to the beginning.
+    /// Vector from the centre to the beginning of the arc.
     arm: Vector3<f64>,
     /// Unit vector of the rotation axis of the arc.
     normal: Vector3<f64>,
     /// Angle of the arc, rad.
     angle: f64,
-    /// Angle up to the `via` point, rad.
+    /// Angle from the beginning of the arc to its `via` point, rad.
     via: f64,
 }
 
@@ -113,7 +113,7 @@ impl Drawn {
         Ok(Self { number, length, from: *from, to, spin: turn / unit, way })
     }
 
-    /// Returns the distance from the beginning at which an arc passes its `via` point, m.
+    /// Returns the distance from the beginning of an arc to its `via` point, m. Returns `None` for a line.
     pub(super) fn via(&self) -> Option<f64> {
         match &self.way {
             Way::Line(_) => None,
@@ -121,7 +121,7 @@ impl Drawn {
         }
     }
 
-    /// Returns the point at the distance `u` (m) from the beginning.
+    /// Returns the point at the distance `u` (m) from the beginning of the leg.
     pub(super) fn at(&self, u: f64) -> Place {
         let rotation = exponential(&(self.spin * u)) * self.from.rotation;
         let (position, velocity, acceleration) = match &self.way {

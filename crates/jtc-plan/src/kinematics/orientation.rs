@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use super::PoseError;
 use super::chain::Frame;
 
-/// Maximum deviation of the length of a quaternion from 1, which permits values with few digits.
+/// Maximum deviation of the length of a quaternion from 1. A deviation of 0.001 permits values with few digits.
 const UNIT: f64 = 1e-3;
 /// Maximum deviation of the entries of RᵀR from the unit matrix.
 const ROTATION: f64 = 1e-6;
@@ -14,7 +14,7 @@ const ROTATION: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
     /// A unit quaternion x, y, z, w with the scalar last, as in ROS. The length of the quaternion may deviate from 1 by
-    /// a thousandth, so that few digits are sufficient.
+    /// a thousandth, so values with few digits are sufficient.
     Quaternion([f64; 4]),
     /// Roll, pitch and yaw, rad, about the fixed axes x, y and z in this order: Rz(yaw)·Ry(pitch)·Rx(roll), as in a
     /// URDF.
@@ -26,7 +26,8 @@ impl Orientation {
     ///
     /// # Errors
     ///
-    /// [`PoseError::NotFinite`] and [`PoseError::NotUnit`].
+    /// Returns [`PoseError::NotFinite`] for a value that is not finite. Returns [`PoseError::NotUnit`] for a quaternion whose length
+    /// deviates from 1 by more than a thousandth.
     pub fn at(&self, position: [f64; 3]) -> Result<Pose, PoseError> {
         finite(&POSITION, &position)?;
         let rotation = match self {
@@ -58,7 +59,7 @@ pub fn quaternion_of(pose: &Pose) -> [f64; 4] {
 }
 
 /// Returns the orientation of a pose as roll, pitch and yaw, rad, with the pitch within ±π/2. At a pitch of ±π/2, only
-/// the sum or the difference of roll and yaw is defined. In this case the roll is 0.
+/// the sum or the difference of roll and yaw is defined, and the returned roll is 0.
 pub fn rpy_of(pose: &Pose) -> [f64; 3] {
     let r = &pose.rotation;
     let flat = r[2][1].hypot(r[2][2]);
@@ -75,7 +76,8 @@ const POSITION: [&str; 3] = ["position x", "position y", "position z"];
 ///
 /// # Errors
 ///
-/// [`PoseError::NotFinite`] and [`PoseError::NotRotation`].
+/// Returns [`PoseError::NotFinite`] for a value that is not finite. Returns [`PoseError::NotRotation`] for a matrix that is not a rotation
+/// matrix, except for rounding.
 pub(crate) fn checked(pose: &Pose) -> Result<Frame, PoseError> {
     finite(&POSITION, &pose.position)?;
     finite(&["an entry of the rotation matrix"; 9], pose.rotation.as_flattened())?;
@@ -87,7 +89,7 @@ pub(crate) fn checked(pose: &Pose) -> Result<Frame, PoseError> {
     if frame.rotation.determinant() < 0.0 {
         return Err(PoseError::NotRotation { deviation: 2.0 });
     }
-    // A step of Newton's iteration to the nearest rotation matrix squares the deviation.
+    // One step of Newton's iteration to the nearest rotation matrix squares the deviation from this matrix.
     let rotation =
         frame.rotation * (Matrix3::identity() * 3.0 - frame.rotation.tr_mul(&frame.rotation)) * 0.5;
     Ok(Frame { rotation, ..frame })
@@ -148,7 +150,7 @@ mod tests {
         let long = at(Orientation::Quaternion([0.0, 0.0, 1.0, 1.0])).unwrap_err();
         assert_eq!(long, PoseError::NotUnit { length: 2f64.sqrt() });
         assert_eq!(long.to_string(), "the quaternion has the length 1.414214, expected 1");
-        // A precision of three digits is sufficient.
+        // Quaternions with three digits are sufficiently precise.
         at(Orientation::Quaternion([0.0, 0.0, 0.707, 0.707])).unwrap();
         let nan = at(Orientation::Rpy([0.0, f64::NAN, 0.0])).unwrap_err();
         assert!(matches!(nan, PoseError::NotFinite { what: "pitch", .. }), "{nan}");

@@ -1,5 +1,5 @@
-//! Routes, which consist of sections that are straight in joint space and sections on which the flange follows lines
-//! and arcs.
+//! Routes. A route consists of sections that are straight in joint space, and of sections on which the flange follows
+//! lines and arcs.
 use jtc_dynamics::JointVec;
 
 use super::target::one;
@@ -10,7 +10,7 @@ use crate::{BlendedPath, Path, PathPoint, PlanError, furthest_joint};
 /// Largest distance between the joint positions of a waypoint and the end of the line to this waypoint, rad.
 const SAME: f64 = 1e-5;
 
-/// Kind of motion from the previous waypoint to a waypoint.
+/// Type of motion from the previous waypoint to a waypoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LegKind {
     /// Straight motion in joint space.
@@ -18,7 +18,8 @@ pub enum LegKind {
     Joint,
     /// Motion with the flange on a straight line.
     Line,
-    /// A point that the arc to the next waypoint passes. The orientation of this point is ignored.
+    /// Motion on an arc that passes this waypoint and ends at the next waypoint. The orientation of this waypoint is
+    /// ignored.
     Via,
     /// Motion with the flange on an arc through the previous waypoint, whose kind must be [`LegKind::Via`].
     Arc,
@@ -29,18 +30,20 @@ pub enum LegKind {
 pub struct RoutePoint {
     /// Position of the waypoint.
     pub target: Target,
-    /// Kind of motion to the waypoint. For the first waypoint, the kind is ignored.
+    /// Type of motion to the waypoint. The type of motion of the first waypoint is ignored.
     pub leg: LegKind,
 }
 
-/// A path through waypoints, straight in joint space or with the flange on lines and arcs. The path stops between
-/// sections of different kinds.
+/// A path through waypoints, straight in joint space or with the flange on lines and arcs. The path stops between a
+/// section in joint space and a section of lines and arcs.
 ///
 /// Along lines and arcs, the arm keeps its configuration (elbow, wrist, shoulder) from the start of the first line or
 /// arc. The arm reaches a flange pose at the end of a line in this configuration. Joint positions at the end of a line
-/// must also have this configuration. For any other flange pose, the solution nearest to the previous waypoint is used.
+/// must also have this configuration. If a flange pose is not at the end of a line or an arc, the solution nearest to
+/// the previous waypoint is used.
 ///
-/// The path parameter continues from section to section. Its unit is rad in joint space, and in m along lines and arcs.
+/// The path parameter continues from section to section. The unit of the parameter is rad in joint space, and m along
+/// lines and arcs.
 #[derive(Clone, Debug)]
 pub struct Route {
     sections: Vec<Section>,
@@ -53,9 +56,8 @@ pub struct Route {
 struct Section {
     way: Way,
     begin: f64,
-    /// Points at which the path changes its form, including the ends, as values of the route parameter and of the
-    /// section parameter. The sum of parameters is rounded. The rounding must not move a point to the other side of a
-    /// change of form.
+    /// Points at which the path changes its form, including the ends, as values of the route parameter and of the section parameter. The
+    /// sum of `begin` and a section parameter is rounded. This rounding must not move a point across a change of form.
     marks: Vec<(f64, f64)>,
 }
 
@@ -103,14 +105,15 @@ impl Section {
 impl Route {
     /// Creates the route through `points`. If the first point is a flange pose, the solution nearest to `near` (rad) is
     /// used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]). Corners
-    /// between lines and arcs are rounded within `blend_m` m (see [`FlangePath`]). If the value is 0, the path stops at
-    /// the corner.
+    /// between lines and arcs are rounded within `blend_m` m (see [`FlangePath`]). If the blend of a corner is 0, the
+    /// path stops at this corner.
     ///
     /// # Errors
     ///
-    /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the impossible waypoint, or with the
-    /// leg and the distance along the leg (see [`PoseError`]). [`PoseError::NoMotion`] if all waypoints are at the same
-    /// position.
+    /// Returns [`PlanError::TooFew`] for fewer than two waypoints, and [`PlanError::Blend`] for an invalid `blend`. Returns
+    /// [`PlanError::Flange`] for an impossible waypoint or leg. This error contains the waypoint, or the leg and the distance along the leg
+    /// (see [`PoseError`]). The flange error is [`PoseError::NoMotion`] if all waypoints are at the same position, and [`PoseError::Blend`]
+    /// for an invalid `blend_m`.
     pub fn new(
         kinematics: &Kinematics,
         points: &[RoutePoint],
@@ -141,8 +144,8 @@ impl Route {
         if route.sections.is_empty() { Err(PoseError::NoMotion.into()) } else { Ok(route) }
     }
 
-    /// Returns the joint positions at the waypoints, rad. For a rounded corner, the result is the position of the
-    /// corner itself.
+    /// Returns the joint positions at the waypoints, rad. At a rounded corner, the result is the position of the
+    /// waypoint, which the path does not pass exactly.
     pub fn positions(&self) -> &[JointVec] {
         &self.positions
     }
@@ -228,7 +231,7 @@ impl Route {
                     same(&reached, &wanted).map_err(|e| e.at_waypoint(first + k))?;
                     wanted
                 }
-                // A solution of the inverse kinematics has rounding errors.
+                // A solution of the inverse kinematics has rounding errors, so it is clamped to the position limits.
                 _ => std::array::from_fn(|j| {
                     let (low, high) = kinematics.limits()[j];
                     reached[j].clamp(low, high)
@@ -256,7 +259,7 @@ struct Legs {
 }
 
 impl Legs {
-    /// Returns the number of the leg, from 1, that contains the point with this index.
+    /// Returns the number (from 1) of the leg that contains the point with this index.
     fn of_point(&self, index: usize) -> usize {
         self.ends.partition_point(|end| *end < self.first + index) + 1
     }
@@ -371,7 +374,7 @@ mod tests {
     use super::*;
     use jtc_dynamics::JOINTS;
 
-    /// If a parameter is on one side of a change of form, the section parameter is also on this side.
+    /// If a route parameter is on one side of a change of form, the section parameter is also on this side.
     #[test]
     fn rounding_does_not_lead_across_a_mark() {
         let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];

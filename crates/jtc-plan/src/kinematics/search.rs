@@ -8,13 +8,13 @@ use super::chain::{Chain, Frame};
 
 /// Maximum residual of a solution, m and rad.
 pub(crate) const TOLERANCE: f64 = 1e-9;
-/// Squared residual (translation divided by the arm's length, rotation in rad) below which the residual counts as
-/// rounding.
+/// Squared residual below which the residual is only rounding. The residual consists of the translation divided by the
+/// arm's length, and of the rotation in rad.
 const ROUNDING: f64 = 1e-29;
 /// Largest step of a joint in an iteration, rad. For larger steps, the linearisation is not accurate enough.
 const STEP: f64 = 0.7;
-/// Maximum difference of a joint between two solutions that count as one solution, rad. Two solutions that are so
-/// close are near a singularity, and the flange moves only by nanometres between the two.
+/// Maximum joint difference between two solutions that are considered one solution, rad. Two such solutions are near a
+/// singularity, and the flange moves only by nanometres between them.
 pub(crate) const SAME: f64 = 1e-4;
 /// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).
 const SOLUTIONS: usize = 16;
@@ -76,8 +76,8 @@ pub(crate) fn descend(
     Reached { q, squared, residual }
 }
 
-/// Returns the solution to which the iteration from `q` converges, if it converges. The joint positions of the solution
-/// are within (−π, π].
+/// Returns the solution to which the iteration from `q` converges. Returns `None` if the iteration does not converge.
+/// The joint positions of the solution are within (−π, π].
 pub(crate) fn converge(chain: &Chain, goal: &Frame, q: &JointVec, iterations: usize) -> Option<JointVec> {
     let reached = descend(chain, goal, *q, &Vector6::repeat(1.0), iterations);
     fits(chain, &reached).then(|| reached.q.map(principal))
@@ -96,7 +96,7 @@ pub(crate) fn principal(angle: f64) -> f64 {
     if turned <= -PI { turned + TAU } else { turned }
 }
 
-/// Adds a solution if it is not yet in the list. Returns `true` if it was added.
+/// Adds a solution that is not yet in the list. Returns `true` if the solution was added.
 pub(crate) fn add(solutions: &mut Vec<JointVec>, q: JointVec) -> bool {
     let same = |other: &JointVec| q.iter().zip(other).all(|(a, b)| principal(a - b).abs() < SAME);
     let new = !solutions.iter().any(same);
@@ -106,9 +106,9 @@ pub(crate) fn add(solutions: &mut Vec<JointVec>, q: JointVec) -> bool {
     new
 }
 
-/// Adds the solutions that the iteration finds from many fixed starting values, until many consecutive values find no
-/// new solution. If the number of solutions is odd, the search continues, because the solutions are roots of a
-/// polynomial of even degree.
+/// Adds the solutions that the iteration finds from many fixed starting values. The search ends when many consecutive
+/// starting values give no new solution. If the number of solutions is odd, the search continues, because the solutions
+/// are roots of a polynomial of even degree.
 pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>) {
     let mut last = 0;
     for n in 1..=SEEDS.1 {
@@ -120,7 +120,8 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
             && add(solutions, q)
         {
             last = n;
-            // A new solution is only accurate to the tolerance, so it is refined to the rounding error.
+            // A new solution is accurate only to the tolerance. Therefore the solution is refined until only rounding
+            // errors remain.
             if let (Some(newest), Some(refined)) = (solutions.last_mut(), converge(chain, goal, &q, 40)) {
                 *newest = refined;
             }
@@ -128,7 +129,7 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
     }
 }
 
-/// Returns `true` if a solution is found, near `near` or elsewhere.
+/// Returns `true` if the search finds a solution, near `near` or elsewhere.
 pub(crate) fn is_reachable(chain: &Chain, goal: &Frame, near: &JointVec) -> bool {
     let reached = |q: &JointVec| converge(chain, goal, q, 40).is_some();
     reached(near) || (1..=SEEDS.0).any(|n| reached(&seed(n)))

@@ -9,8 +9,8 @@ use super::chain::{Axes, Chain};
 use super::closed_form::{Geometry, Shoulder};
 use super::subproblems::across;
 
-/// Smallest singular value of the Jacobian that is permitted on a path of the flange (see [`Singularity::smallest`]).
-/// The value corresponds to half a degree from aligned wrist axes, and to a few degrees from the stretched arm.
+/// Smallest singular value of the Jacobian that is permitted on a path of the flange (see [`Singularity::smallest`]). A
+/// value of 0.01 corresponds to half a degree from aligned wrist axes, and to a few degrees from the stretched arm.
 pub const SINGULAR: f64 = 0.01;
 
 /// Kind of singular pose.
@@ -35,9 +35,9 @@ pub struct Singularity {
     pub kind: SingularKind,
     /// Joints that can move while the flange is almost at rest.
     pub joints: Vec<Joint>,
-    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm. It is the
-    /// smallest motion of the flange for joint motions of 1 rad in total (the root of the sum of squares). The value is
-    /// 0 in the singular pose, and NaN if a joint position is NaN or infinite.
+    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm. The smallest singular value
+    /// is the smallest motion of the flange for joint motions of 1 rad in total (root of the sum of squares). The smallest singular value
+    /// is 0 in a singular pose, and NaN if a joint position is NaN or infinite.
     pub smallest: f64,
 }
 
@@ -68,7 +68,7 @@ impl fmt::Display for Singularity {
     }
 }
 
-/// Share of the largest entry above which an entry belongs to a joint that moves.
+/// A joint is considered moving if its entry in the vector of joint motions exceeds this share of the largest entry.
 const TAKES_PART: f64 = 0.2;
 /// Sine of the wrist angle below which a singular pose of an arm without a planar elbow is reported as a wrist
 /// singularity.
@@ -78,7 +78,7 @@ const NAMED: f64 = 0.1;
 /// joint position is NaN or infinite, returns NaN and 0.
 pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
     let jacobian = chain.scaled_jacobian(axes);
-    // With such values, the iteration for singular values would not end.
+    // With values that are not finite, the iteration for singular values would not end.
     if !jacobian.iter().all(|entry| entry.is_finite()) {
         return (f64::NAN, Vector6::zeros());
     }
@@ -100,7 +100,7 @@ pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -
 /// 0.
 fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     let (h, p) = (&axes.axis, &axes.point);
-    // The factor is divided by its value at a quarter turn of joint 5.
+    // The factor of the wrist is divided by its value at a quarter turn of joint 5.
     let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
     let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
     let (centre, is_planar) = match geometry {

@@ -1,19 +1,20 @@
-//! Rotations that solve one equation of a closed form (the subproblems of Paden and Kahan).
+//! Functions that solve one equation of a closed form for a rotation angle (the subproblems of Paden and Kahan).
 //!
-//! Each function has an argument `hint`, which is the angle that it returns if the geometry does not determine the
-//! angle, as in singular poses. If a target is slightly out of reach (which happens for a nearly ideal arm), the
-//! nearest reachable target is used. The result is refined later. A result that does not reach the goal is dropped.
+//! If the geometry does not determine the angle, as in singular poses, each function returns its argument `hint`. A target may be slightly
+//! out of reach, because an arm may differ slightly from the ideal geometry. For a target that is slightly out of reach, the functions use
+//! the nearest reachable target. The caller refines the result, and drops a result that does not reach the goal.
 use nalgebra::Vector3;
 
 use super::chain::turn;
 
-/// Length of a direction, as a share of the lengths of the vectors, below which rounding dominates and the angle is not
+/// If the length of a direction is below this share of the vectors' lengths, rounding dominates, and the angle is not
 /// determined.
 const FREE: f64 = 1e-9;
 /// Largest excess of a target over the largest reachable value, as a share of the vectors' lengths.
 const SLACK: f64 = 1e-3;
 
-/// Returns the angle of a rotation about `axis` that turns `from` to the direction of `to`, in a view along the axis.
+/// Returns the angle of a rotation about `axis` that turns `from` to the direction of `to`, in the plane perpendicular
+/// to the axis.
 pub(crate) fn turn_onto(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>, hint: f64) -> f64 {
     let (a, b) = (across(axis, from), across(axis, to));
     if a.norm() <= FREE * from.norm() || b.norm() <= FREE * to.norm() {

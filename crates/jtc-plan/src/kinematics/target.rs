@@ -12,13 +12,13 @@ pub enum Target {
     Flange(Pose),
 }
 
-/// Returns joint positions for each target. For a pose, the result is the solution nearest to the previous target. For
-/// the first target, the result is the solution nearest to `start` (rad).
+/// Returns joint positions for each target. For a flange pose, the result is the solution nearest to the previous
+/// target. If the first target is a flange pose, the result is the solution nearest to `start` (rad).
 ///
 /// # Errors
 ///
-/// [`PoseError::Waypoint`] with the number of the first target without a solution, counted from 1, and the reason (see
-/// [`Kinematics::solve`]). Targets that are joint positions must also be within the limits.
+/// Returns [`PoseError::Waypoint`] with the number of the first target without a solution, counted from 1, and with the
+/// reason (see [`Kinematics::solve`]). Targets that are joint positions must also be within the limits.
 pub fn resolve(
     kinematics: &Kinematics,
     targets: &[Target],
@@ -33,7 +33,7 @@ pub fn resolve(
     Ok(found)
 }
 
-/// Returns joint positions for a target. For a pose, this is the solution nearest to `before`.
+/// Returns joint positions for a target. For a flange pose, the result is the solution nearest to `before`.
 pub(crate) fn one(
     kinematics: &Kinematics,
     target: &Target,

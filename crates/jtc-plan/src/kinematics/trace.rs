@@ -1,10 +1,10 @@
-//! Path of the flange, which consists of consecutive legs with blended corners.
+//! Path of the flange. The path consists of consecutive legs with blended corners.
 //!
-//! A blend begins at the distance r before the corner and ends at the distance r after it. Between these two points,
-//! the parameter of the previous leg slows down to a stop while the parameter of the next leg starts. Let τ go from −r
-//! to r, let w rise smoothly from 0 to 1, and let W = ∫w. The point on the path is the point of the previous leg at τ −
-//! W plus the displacement of the next leg by W. Position and orientation have continuous second derivatives. The
-//! position stays within the triangle of the corner if the legs are straight.
+//! A blend begins at the distance r before a corner and ends at the distance r after the corner. Within the blend, the
+//! parameter of the previous leg slows down to a stop while the parameter of the next leg starts. Let τ go from −r to
+//! r, let w rise smoothly from 0 to 1, and let W = ∫w. The point on the path is the point of the previous leg at τ − W
+//! plus the displacement of the next leg by W. Position and orientation of the blended path have continuous second
+//! derivatives. If the legs are straight, the position stays within the triangle of the corner.
 use nalgebra::Vector3;
 
 use super::PoseError;
@@ -21,7 +21,7 @@ pub(crate) struct Trace {
     legs: Vec<Drawn>,
     /// Parameter at the start of each leg, and at the end of the path.
     begins: Vec<f64>,
-    /// Blend radius after each leg, m; 0 if the path stops.
+    /// Blend radius at the end of each leg, m; 0 if the path stops at this end.
     blends: Vec<f64>,
     /// Number of legs in the request; some of these may have no motion.
     given: usize,
@@ -59,7 +59,7 @@ impl Trace {
         behind.saturating_sub(1).min(self.legs.len() - 1)
     }
 
-    /// Returns the number (from 1) of the leg at `s`, the distance along this leg, and its length, m.
+    /// Returns the number (from 1) of the leg at `s`, the distance along this leg (m), and the length of the leg (m).
     pub(super) fn whereabouts(&self, s: f64) -> (usize, f64, f64) {
         let k = self.leg(s);
         (self.legs[k].number, s - self.begins[k], self.legs[k].length)
@@ -92,7 +92,7 @@ impl Trace {
         all
     }
 
-    /// Returns the parameter at which leg `number`, an arc, passes its `via` point.
+    /// Returns the parameter at which the arc with leg number `number` passes its `via` point.
     pub(super) fn via(&self, number: usize) -> Option<f64> {
         let k = self.legs.iter().position(|leg| leg.number == number)?;
         Some(self.begins[k] + self.legs[k].via()?)
@@ -182,8 +182,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// The tested points include the ends of the blends. A jump of the second derivative at such an end would
-        /// appear as half of the jump.
+        /// The test also checks the ends of the blends. At such an end, a jump of the second derivative would cause an
+        /// error of half the jump.
         #[test]
         fn derivatives_are_those_of_the_places_and_continuous(
             start in pose(), legs in prop::collection::vec(leg(), 2..5), blend in 0.05..0.3f64, at in 0.0..1.0f64

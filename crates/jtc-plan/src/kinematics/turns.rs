@@ -1,28 +1,28 @@
-//! Equivalent joint positions within the position limits, which differ by whole turns.
+//! Equivalent joint positions within the position limits. Equivalent positions differ by whole turns of a joint.
 use std::f64::consts::TAU;
 
 use jtc_dynamics::{JOINTS, JointVec};
 use jtc_wire::Joint;
 
-/// Distance beyond a limit that is tolerated because solutions have rounding errors, rad.
+/// Distance beyond a limit that is tolerated because of the rounding errors of solutions, rad.
 pub(crate) const ROUNDING: f64 = 1e-10;
 
 type Limits = [(f64, f64); JOINTS];
 
-/// Returns `angle` if it is within the limits, except for rounding.
+/// Returns `angle` if the angle is within the limits, except for rounding.
 fn within(angle: f64, (low, high): (f64, f64)) -> Option<f64> {
     (low <= high && low - ROUNDING <= angle && angle <= high + ROUNDING).then(|| angle.clamp(low, high))
 }
 
-/// Moves each joint of `q` by whole turns as near to `near` as the limits permit. Returns `None` if a joint is outside
-/// its limits at every number of turns.
+/// Turns each joint of `q` by whole turns until it is as near to `near` as the limits permit. Returns `None` if a joint
+/// is outside its limits at every number of turns.
 pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<JointVec> {
     let mut found = *q;
     for (j, angle) in found.iter_mut().enumerate() {
         let turned = *angle + TAU * ((near[j] - *angle) / TAU).round();
         let ends = [limits[j].0, limits[j].1].map(|end| *angle + TAU * ((end - *angle) / TAU).round());
-        // The turn nearest to `near` may be outside the limits. If so, a turn next to one of the limits is the nearest
-        // valid turn, if there is any.
+        // The turn nearest to `near` may be outside the limits. If this turn is outside the limits, the nearest valid turn (if there is
+        // one) is next to one of the limits.
         let candidates = [turned, ends[0], ends[0] + TAU, ends[1], ends[1] - TAU];
         let inside = candidates.into_iter().filter_map(|angle| within(angle, limits[j]));
         *angle = inside.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))?;
@@ -30,8 +30,8 @@ pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<
     Some(found)
 }
 
-/// Returns the variants of `q` within the limits. In a variant, each joint, which is within (−π, π], is unchanged or
-/// turned by ±2π.
+/// Returns the variants of `q` within the limits. Each joint of `q` is within (−π, π]. In a variant, each joint is
+/// unchanged or turned by ±2π.
 pub(crate) fn variants(q: &JointVec, limits: &Limits) -> Vec<JointVec> {
     let mut all = vec![*q];
     for j in 0..JOINTS {
@@ -50,12 +50,12 @@ pub(crate) struct Outside {
     pub joint: Joint,
     /// Position, rad.
     pub value: f64,
-    /// Distance outside, rad.
+    /// Distance of the position beyond the limit, rad.
     pub beyond: f64,
 }
 
-/// Returns the joint that is farthest outside its limits. For each joint the turn that is least outside the limits is
-/// used.
+/// Returns the joint that is farthest outside its limits. For each joint, the function uses the turn that is least
+/// outside the limits.
 pub(crate) fn outside(q: &JointVec, limits: &Limits) -> Outside {
     let mut worst = Outside { joint: Joint::ALL[0], value: q[0], beyond: f64::NEG_INFINITY };
     for (joint, (&angle, &(low, high))) in Joint::ALL.into_iter().zip(q.iter().zip(limits)) {
@@ -92,7 +92,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Compares with the result of testing every turn in a wide range.
+        /// The test compares the result with a search over all turns in a wide range.
         #[test]
         fn the_nearest_turn_is_the_nearest_of_all(
             angle in -3.1..3.1f64, near in -20.0..20.0f64, low in -15.0..10.0f64, width in 0.1..14.0f64

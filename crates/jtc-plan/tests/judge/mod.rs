@@ -1,5 +1,5 @@
-//! Random arms and waypoints, and a check of motions that is independent of the planner. The check samples positions
-//! and computes differences.
+//! Random arms and waypoints, and a check of motions that is independent of the planner. The check samples the
+//! positions of a motion and computes their differences.
 
 use std::fmt::Write as _;
 
@@ -29,7 +29,7 @@ fn between(rng: &mut fastrand::Rng, low: f64, high: f64) -> f64 {
 }
 
 impl Case {
-    /// The arm of arms/avena.toml with random masses, limits, payload and waypoints.
+    /// Returns the arm of arms/avena.toml with random masses, limits, payload and waypoints.
     pub(crate) fn random(seed: u64) -> Self {
         let rng = &mut fastrand::Rng::with_seed(seed);
         let parameters = Parameters::avena();
@@ -77,7 +77,8 @@ impl Case {
         self.waypoints.iter().copied().map(Waypoint::from).collect()
     }
 
-    /// Joint torques for these differences, first without and then with friction.
+    /// Returns the joint torques, including rotor inertia and friction, for these positions, velocities and
+    /// accelerations.
     pub(crate) fn torque(&self, dynamics: &Dynamics, q: &JointVec, v: &JointVec, a: &JointVec) -> JointVec {
         let mut torque = dynamics.inverse(q, v, a);
         for j in 0..JOINTS {
@@ -124,7 +125,7 @@ impl Case {
         let breakaway = self.breakaway();
         // The samples include the standstill before and after the motion.
         let count = (motion.duration() / H).ceil() as i64 + 4;
-        // In long motions only some stretches are sampled.
+        // In a long motion, only some time intervals are sampled.
         let stride = if count > 400_000 { count / 4_000 } else { 0 };
         let mut used = [0.0f64; 4];
         let mut k = -4;
@@ -156,7 +157,8 @@ impl Case {
                 let rounding = 4e-15 + 4.0 * f64::EPSILON * time * v[j].abs();
                 take(2, "jerk", jerk[j], self.limits.jerk[j], rounding / (H * H * H));
                 if let (Some(torque), Some(usable)) = (torque, usable) {
-                    // Tolerance for the rounding of positions, divided by the square of the time between samples.
+                    // This tolerance covers the rounding of positions, divided by the square of the time between
+                    // samples.
                     take(3, "torque", torque[j], usable[j], 1e-4);
                 }
                 if !(low - 1e-9..=high + 1e-9).contains(&p[1][j]) && wrong.len() < 2000 {
@@ -168,7 +170,8 @@ impl Case {
         used
     }
 
-    /// Largest friction of each joint, up to a speed slightly above the one at which its sign reaches ±1.
+    /// Returns the largest friction of each joint, up to a speed slightly above the speed at which the sign of the
+    /// friction reaches ±1.
     fn breakaway(&self) -> JointVec {
         std::array::from_fn(|j| {
             let fastest = self.config.friction_sign_width + self.config.joints[j].velocity_max / 128.0;
@@ -177,8 +180,8 @@ impl Case {
         })
     }
 
-    /// Torque that a motion may use. The usable torque is the limit minus its margin, but at least the holding torque
-    /// plus a small part of the remaining torque.
+    /// Returns the torque that a motion may use. The usable torque is the limit minus the margin, but at least the
+    /// holding torque plus a small part of the remaining torque.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {
@@ -198,7 +201,8 @@ impl Case {
         }
     }
 
-    /// Torque from differences over a very short time, in which acceleration and friction hardly change.
+    /// Returns the torque at `time`. The torque is computed from differences over a very short time, in which
+    /// acceleration and friction hardly change.
     fn torque_at(&self, dynamics: &Dynamics, motion: &Motion, time: f64) -> JointVec {
         const H: f64 = 1e-5;
         let [a, b, c] = [time - H, time, time + H].map(|t| motion.at(t).position);
@@ -236,8 +240,8 @@ impl Case {
         distance(q, &std::array::from_fn(|j| a[j] + u * way[j]))
     }
 
-    /// Returns `true` if the point is within the blend of one of several close waypoints around a leg, and in the
-    /// bounding box of all these waypoints.
+    /// Returns `true` if the point is within the blend of one of several close waypoints around a leg. The point must also be in the
+    /// bounding box of these waypoints.
     fn is_in_row(&self, leg: usize, q: &JointVec) -> bool {
         [leg, leg + 1].into_iter().any(|at| {
             let row = &self.waypoints[row(&self.waypoints, at, self.blend)];
@@ -261,7 +265,8 @@ impl Case {
     }
 }
 
-/// Range of waypoints that are closer to each other than the blend. The planner may omit some of these.
+/// Returns the range of waypoints that are closer to each other than the blend. The planner may omit some of these
+/// waypoints.
 fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
     let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
     let (mut from, mut to) = (at, at);
@@ -274,8 +279,8 @@ fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusiv
     from.saturating_sub(1)..=(to + 1).min(waypoints.len() - 1)
 }
 
-/// A random walk inside the position limits. Some waypoints are repeated, continue in a straight line, or return to an
-/// earlier position.
+/// Returns a random walk inside the position limits. Some waypoints are repeated, continue in a straight line, or
+/// return to an earlier position.
 fn waypoints(rng: &mut fastrand::Rng, count: usize, limits: &Limits) -> Vec<JointVec> {
     let size = *rng.choice(&[0.002, 0.05, 0.3, 1.0]).unwrap_or(&0.3);
     let inside = |q: JointVec| -> JointVec {

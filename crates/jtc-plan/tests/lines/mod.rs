@@ -34,7 +34,7 @@ pub(crate) fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
 /// Position range of two turns for each joint.
 pub(crate) const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
 
-/// Returns the leg, the distance along it, and the error on the leg.
+/// Returns the number of the leg, the distance along this leg, and the error on the leg.
 pub(crate) fn on_leg(error: PoseError) -> (usize, f64, PoseError) {
     match error {
         PoseError::Leg { leg, distance, source, .. } => (leg, distance, *source),

@@ -15,7 +15,7 @@ pub(super) fn avena_limits() -> [(f64, f64); JOINTS] {
     std::array::from_fn(|joint| config.position_range(joint))
 }
 
-/// An arm from classic Denavit-Hartenberg parameters: d (m), a (m) and α (rad) for each joint.
+/// Returns an arm with these classic Denavit-Hartenberg parameters: d (m), a (m) and α (rad) for each joint.
 pub(super) fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
     let mut model = ArmModel::default();
     for (joint, [d, a, alpha]) in model.joints[1..].iter_mut().zip(parameters) {
@@ -89,8 +89,8 @@ pub(super) fn crooked() -> ArmModel {
     ArmModel { joints: joints.map(|(xyz, rpy)| Origin { xyz, rpy }), ..ArmModel::default() }
 }
 
-/// Arms for geometries that the arms above do not cover: a spherical wrist with axes 2 and 3 that meet, or with axes 1
-/// and 2 that are parallel. The parameters are invented.
+/// Returns two arms with a spherical wrist. In one arm axes 2 and 3 meet, and in the other arm axes 1 and 2 are parallel. The parameters
+/// are invented.
 pub(super) fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
     let half = FRAC_PI_2;
     let wrist = [[0.4, 0.0, -half], [0.0, 0.0, half], [0.1, 0.0, 0.0]];
@@ -127,7 +127,7 @@ fn product(a: &Mat3, b: &Mat3) -> Mat3 {
 /// Returns the distance between two poses, in m and rad.
 pub(super) fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let shift = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
-    // The chord between two rotations is 2·√2·sin of half the angle.
+    // The chord between two rotation matrices is 2·√2·sin(angle/2).
     let chord = a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(a, b)| (a - b).powi(2));
     (shift, 2.0 * (chord.sum::<f64>().sqrt() / 8f64.sqrt()).min(1.0).asin())
 }
@@ -142,7 +142,7 @@ pub(super) fn pose(model: &ArmModel, q: &JointVec) -> Pose {
             _ => [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]],
         }
     };
-    // An angle within 2 µrad of a multiple of a right angle is rounded to it.
+    // An angle within 2 µrad of a multiple of a right angle is rounded to this multiple.
     let squared = |angle: f64| {
         let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
         if (angle - quarters).abs() <= 2e-6 { quarters } else { angle }

@@ -1,4 +1,4 @@
-//! Generates the constants of the default arm from `arms/avena.toml`, so that each default value has a single source.
+//! Generates the constants of the default arm from `arms/avena.toml`, so that each default value is defined in one place.
 use std::fmt::Write;
 use std::{env, fs, path::PathBuf};
 
@@ -14,7 +14,7 @@ fn main() {
     fs::write(&out, generate(&arm)).unwrap_or_else(|e| panic!("cannot write {}: {e}", out.display()));
 }
 
-/// Returns the value under `key`. If the value is missing, the panic message contains the key.
+/// Returns the value under `key`. If the key is missing, the panic message contains the key.
 fn get<'a>(table: &'a Table, key: &str) -> &'a Value {
     table.get(key).unwrap_or_else(|| panic!("arms/avena.toml: `{key}` is missing"))
 }

@@ -1,5 +1,5 @@
-//! Measures the time of one control tick in Operate and the memory of the controller. The program prints one `name value` pair per line, in
-//! ns and bytes.
+//! Measures the time of one control tick in Operate, and the memory that the controller needs. The program prints one `name value` pair per
+//! line. Times are in ns, and sizes are in bytes.
 use std::collections::VecDeque;
 use std::hint::black_box;
 
@@ -21,8 +21,8 @@ fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
 /// Ticks over which the drives average their speed.
 const WINDOW: usize = 10;
 
-/// Returns the answers of nodes that answer at once and follow their set values exactly. `position` contains the positions in the last
-/// ticks, rad, newest first.
+/// Returns the answers of simulated nodes, which answer at once and follow their set values exactly. `position` contains the positions of
+/// the joints in the last ticks, rad, newest first.
 fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f64; 6]>) -> Vec<Frame> {
     let at = |j: usize, ago: usize| position.get(ago).or(position.back()).map_or(0.0, |position| position[j]);
     let mut out = Vec::new();
@@ -63,7 +63,7 @@ fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f
 }
 
 fn main() {
-    // The path moves forward and back twice in 1,499 steps of 10 ms, and is at rest at both ends (J-36).
+    // The joints move forward and back twice in 1,499 steps of 10 ms, and are at rest at both ends of the path (J-36).
     let pace = 2.0 * std::f64::consts::TAU / 14.99;
     let points: Vec<RawPoint> = (0..1500i32)
         .map(|i| {
@@ -99,7 +99,7 @@ fn main() {
     let mut start = None;
     let mut ticks = 0;
     while recorded.len() < 4_000 {
-        // Later commands require HoldPos.
+        // The later commands of the queue require HoldPos.
         let ready = queue.len() > 2 || controller.telemetry().state == ControllerState::HoldPos;
         let host = queue
             .front()

@@ -2,16 +2,17 @@
 //! reads it.
 //!
 //! [`bit_codec!`] lists the fields of a type. A field that is missing in the list is a compile error, so every snapshot is complete.
-//! Reading never fails. Bits that are not from a snapshot result in an arbitrary value, and [`BitSource::is_damaged`] reports this damage.
+//! Reading never fails. If the bits are not from a snapshot, the value that was read is arbitrary, and [`BitSource::is_damaged`] reports
+//! this damage.
 use jtc_bus::{JointReport, NodeState};
 use jtc_wire::{ControllerState, StopKind, TrajectoryState};
 
-/// Destination of bits.
+/// Destination of the bits of a snapshot.
 pub(crate) trait BitSink {
-    /// Appends the lowest `bits` (0 to 32) of `value`. The higher bits must be zero.
+    /// Appends the lowest `bits` (0 to 32) of `value`. The higher bits of `value` must be zero.
     fn put(&mut self, value: u32, bits: u32);
 
-    /// Appends 64 bits, or a single bit if all 64 bits are zero, as for joints at rest.
+    /// Appends 64 bits. If all 64 bits are zero, which is the case for joints at rest, appends a single bit.
     fn put_double(&mut self, value: u64) {
         self.put((value != 0).into(), 1);
         if value != 0 {
@@ -21,19 +22,19 @@ pub(crate) trait BitSink {
     }
 }
 
-/// Source of bits, in the order in which they were written.
+/// Source of the bits of a snapshot, in the order in which the bits were written.
 pub(crate) trait BitSource {
     /// Returns the next `bits` (0 to 32). Bits after the end are zero.
     fn take(&mut self, bits: u32) -> u32;
-    /// Marks the source as damaged, because the bits that were read cannot have been written.
+    /// Marks the source as damaged, because no writer can have produced the bits that were read.
     fn damage(&mut self);
-    /// Returns `true` if bits after the end were read, or if the bits cannot have been written.
+    /// Returns `true` if bits after the end of the source were read, or if no writer can have produced these bits.
     fn is_damaged(&self) -> bool;
 }
 
 /// A value that is part of a snapshot.
 pub(crate) trait BitCodec: Sized {
-    /// Appends the value.
+    /// Appends the value to a snapshot.
     fn write<S: BitSink>(&self, to: &mut S);
     /// Reads a value from a snapshot.
     fn read<S: BitSource>(from: &mut S) -> Self;

@@ -1,10 +1,10 @@
 //! Set values (commanded positions and velocities) of the last ticks. A measurement is compared with the set value of the same time (J-62).
 //!
-//! A measurement is delayed, because the drive has read its encoder before it received the Move that it answered. The command that follows
-//! from the measurement takes effect even later. The *due* position is the position that was commanded one *delay*
-//! ([`Config::delay_ticks`](crate::Config)) ago. A joint that follows exactly would measure the due position now. The difference between
-//! the measured and the due position is therefore an error of the joint. The difference does not include the distance that the joint has
-//! moved during the delay.
+//! A measurement has a delay: the drive has read its encoder before it received the Move frame that it answered. The torque that the
+//! controller computes from this measurement takes effect even later. The *due* position is the set position of the tick that is one
+//! *delay* ([`Config::delay_ticks`](crate::Config)) ago. If a joint follows its set positions exactly, its measured position is equal to
+//! the due position. The difference between the measured and the due position is therefore an error of the joint. The error of the joint
+//! does not include the distance that the joint has moved during the delay.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::interpolation::SetPoint;
@@ -16,11 +16,11 @@ const SLOTS: usize = 8;
 /// Ring buffer of the last set values.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Commanded {
-    /// Positions, rad.
+    /// Set positions of all joints in the last ticks, rad.
     position: [[f64; JOINTS]; SLOTS],
-    /// Velocities, rad/s.
+    /// Set velocities of all joints in the last ticks, rad/s.
     velocity: [[f64; JOINTS]; SLOTS],
-    /// Slot of the present tick. The slot number wraps around.
+    /// Slot of the present tick. The slot number is counted modulo 256.
     now: u8,
 }
 
@@ -30,35 +30,36 @@ impl Commanded {
     /// Age of the oldest stored set values, ticks.
     pub(crate) const OLDEST: u8 = SLOTS as u8 - 1;
 
-    /// Begins the next tick.
+    /// Begins the next tick of the record.
     pub(crate) fn next_tick(&mut self) {
         self.now = self.now.wrapping_add(1);
     }
 
-    /// Stores the set values of the present tick. Call this function each time that the tick changes the set values.
+    /// Stores the set values of the present tick. The tick must call this function each time that it changes the set values.
     pub(crate) fn put(&mut self, point: &SetPoint) {
         let now = self.slot(0);
         (self.position[now], self.velocity[now]) = (point.position, point.velocity);
     }
 
-    /// Returns the positions (rad) that were commanded `ticks` ago, at most [`Self::OLDEST`].
+    /// Returns the set positions (rad) of the tick that is `ticks` ago, at most [`Self::OLDEST`].
     pub(crate) fn position(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.position[self.slot(ticks)]
     }
 
-    /// Returns the velocities (rad/s) that were commanded `ticks` ago.
+    /// Returns the set velocities (rad/s) of the tick that is `ticks` ago.
     pub(crate) fn velocity(&self, ticks: u8) -> &[f64; JOINTS] {
         &self.velocity[self.slot(ticks)]
     }
 
-    /// Returns the velocities (rad/s) that are due in the measurement of this tick. The set values of this tick are not known yet, so the
-    /// newest set values are from the last tick.
+    /// Returns the set velocities (rad/s) that belong to the measurement of this tick. The set values of this tick are not known yet, so
+    /// the function returns set values of the last tick or of an earlier tick.
     pub(crate) fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
         self.velocity(config.delay_ticks.max(1))
     }
 
-    /// Resets the set values of a joint as if it had always been commanded to move at `velocity` (rad/s), with `position` (rad) as the set
-    /// position `ticks` ago. With a delay of `ticks`, the due position is then `position`, and it moves at `velocity` in the next ticks.
+    /// Replaces all stored set values of a joint by a motion at the constant `velocity` (rad/s), with `position` (rad) as the set position
+    /// `ticks` ago. With a delay of `ticks`, the due position of the joint is then `position`, and it changes at `velocity` in the next
+    /// ticks.
     pub(crate) fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         for ago in 0..SLOTS as u8 {
             let slot = self.slot(ago);
@@ -69,13 +70,13 @@ impl Commanded {
         }
     }
 
-    /// Resets the set values of all joints to rest at `position` (rad).
+    /// Replaces all stored set values by joints at rest at `position` (rad).
     pub(crate) fn rest(&mut self, position: &[f64; JOINTS]) {
         (self.position, self.velocity) = ([*position; SLOTS], [[0.0; JOINTS]; SLOTS]);
     }
 
     /// Shifts all stored set positions of a joint by `way` (rad), after the joint has sagged by this distance. A sag is not a motion, so
-    /// the older set positions also change.
+    /// the function also shifts the older set positions.
     pub(crate) fn shift(&mut self, joint: usize, way: f64) {
         for positions in &mut self.position {
             if let Some(position) = positions.get_mut(joint) {
@@ -103,7 +104,7 @@ mod tests {
     }
 
     proptest! {
-        /// Set values of earlier ticks can be read at every start position of the ring buffer, even if a tick stores its values twice.
+        /// Set values of earlier ticks can be read from any start index of the ring buffer, even if a tick stores its values twice.
         #[test]
         fn j62_the_last_set_values_are_kept(start in any::<u8>(), values in prop::collection::vec(-3.0..3.0f64, 8..300)) {
             let mut commanded = Commanded { now: start, ..Commanded::default() };
@@ -119,8 +120,9 @@ mod tests {
             }
         }
 
-        /// After the reset, the measured position of a joint is the due position. If the joint keeps its velocity, its position is also the
-        /// due position in the next ticks. The set values of other joints do not change.
+        /// After the stored set values of a joint were replaced, its measured position is equal to the due position. If the joint keeps its
+        /// velocity, its measured position is also equal to the due position in the next ticks. The stored set values of other joints do
+        /// not change.
         #[test]
         fn j44_j62_a_joint_that_begins_anew_has_no_error(
             start in any::<u8>(),
@@ -148,7 +150,7 @@ mod tests {
         }
     }
 
-    /// A sag shifts all stored set positions, and also the position errors that the PID controller stores.
+    /// A sag shifts all stored set positions of the joint, and also the position errors that the PID controller stores.
     #[test]
     fn j43_j62_a_sag_is_no_motion() {
         let mut commanded = Commanded::default();

@@ -22,115 +22,120 @@ pub struct Config {
     pub gravity: [f64; 3],
     /// `true` if a gripper is on the bus (J-20).
     pub gripper: bool,
-    /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. If `true`, the pump is switched off until the host
-    /// switches it on again. The gripper changes to ReadyToOperate, so it drops its part. If `false`, an enabled gripper and the command of
-    /// its pump do not change, so the gripper keeps its part.
+    /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. If `true`, the controller switches the pump off until
+    /// the host switches it on again. The gripper then changes to ReadyToOperate, so it drops the workpiece. If `false`, an enabled gripper
+    /// stays enabled and the pump command does not change, so the gripper keeps the workpiece.
     pub pump_off_on_error: bool,
     /// Full-scale value of the velocity of the drives, rad/s (J-11).
     pub velocity_full_scale: f64,
     /// Speed at which the drives report an error and stop if configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
-    /// Time over which the drives average their speed, ms. The controller compares positions and speed over this time (J-35). With 0, it
-    /// does not compare them.
+    /// Time over which the drives average their speed, ms. The controller compares the change of the position with the reported speed over
+    /// this time (J-35). With a time of 0, the controller does not make this comparison.
     pub drive_speed_window_ms: u8,
     /// Torque that twists a gear by 1 rad, N·m/rad. The positions before and after the gear may differ by this elastic twist (J-35).
     pub gear_stiffness: f64,
-    /// Resolution of the joint encoders, rad. In the known drives it is 16 bits per revolution, which is much coarser than the resolution
-    /// on the bus. While a joint is at rest, the integral does not change within one encoder step (J-41).
+    /// Resolution of the joint encoders, rad. The encoders of the known drives have 16 bits per revolution, which is much coarser than the
+    /// resolution on the bus. While a joint is at rest, the integral does not change within one encoder step (J-41).
     pub encoder_step: f64,
-    /// Age of a measurement at the time when the resulting command takes effect, in ticks (J-62). The highest value is 7. The drives have a
-    /// loop of 1 ms, in which they read the encoder and apply the torque. A drive answers a Move that it receives between two loops with
-    /// the encoder value of the first loop, and applies the torque in the second loop. The controller uses the answer in its next tick, and
-    /// the Move of that tick takes effect in the third loop. The torque therefore takes effect two loops after the encoder was read, for
-    /// any phase between the loops of the drive and the ticks of the controller. An arm with a slower bus, or with drives that filter their
-    /// positions, has a longer delay. With 0, measurements are compared with the present command.
+    /// Delay from the measurement to the time when the resulting torque takes effect, in ticks (J-62). The highest allowed delay is 7. The
+    /// drives have a control loop of 1 ms, in which they read the encoder and apply the torque. A drive can receive a Move frame between
+    /// two of its loops. The drive answers with the encoder value of the first loop, and applies the torque in the second loop. The
+    /// controller uses this answer in its next tick, and the Move frame of that tick takes effect in the third loop. The torque therefore
+    /// takes effect two loops of the drive after the encoder was read, for any phase between these loops and the ticks of the controller.
+    /// An arm with a slower bus, or with drives that filter their positions, has a longer delay. With a delay of 0, measurements are
+    /// compared with the set values of the same tick.
     pub delay_ticks: u8,
     /// Configuration bits that the controller sends to every joint (J-11).
     pub joint_config_bits: u8,
     /// Configuration bits that the controller sends to the gripper (J-11).
     pub gripper_config_bits: u8,
-    /// Ticks between statuses without a response (J-04).
+    /// Ticks between two statuses that contain no response record (J-04).
     pub status_period_ms: u16,
-    /// Number of consecutive Moves without an answer or an acknowledgement that raises an error (J-14). The number also applies to
-    /// consecutive Moves without a usable answer of one joint (J-35). Below this number the joint's motion is predicted (J-63).
+    /// Number of consecutive Moves without an answer or an acknowledgement after which the controller raises an error (J-14). The number
+    /// also applies to consecutive Moves without a usable answer of one joint (J-35). After fewer missing answers, the controller predicts
+    /// the motion of the joint (J-63).
     pub missed_moves_max: u8,
     /// Time for which a node may be silent after its reset without an error, ms.
     pub node_boot_ms: u32,
-    /// Longest time from READY to ENABLE, ms (J-16). The time is measured while the controller requests enabling.
+    /// Longest time from READY to ENABLE, ms (J-16). The controller measures this time while it requests the drives to enable.
     pub enable_timeout_ms: u32,
-    /// Highest speed at which joints are enabled, rad/s (J-16). Every joint must have been slower than this speed for `enable_still_ms`, so
-    /// that a falling arm is not stopped abruptly.
+    /// Highest speed at which the controller enables the joints, rad/s (J-16). Every joint must have been slower than this speed for
+    /// `enable_still_ms`, so that a falling arm is not stopped abruptly.
     pub enable_speed_max: f64,
-    /// Time for which the arm must have been slower than `enable_speed_max`, ms.
+    /// Time for which every joint must have been slower than `enable_speed_max`, ms.
     pub enable_still_ms: u16,
-    /// Time after the torque was switched off in which joints are not enabled, ms. The motor control of the drives pauses for this time
-    /// after a stop. If enabling were requested earlier, the drives would enable only after the pause, when the arm may have begun to fall.
+    /// Time after the torque was switched off in which the controller does not enable the joints, ms. The motor control of the drives
+    /// pauses for this time after a stop. If the controller requested enabling earlier, the drives would enable only after this pause, when
+    /// the arm may have begun to fall.
     pub enable_rest_ms: u16,
-    /// Start position tolerance, rad (J-34).
+    /// Largest distance of each joint from the first point at which Execute is accepted, rad (J-34).
     pub start_tolerance_rad: f64,
     /// Duration of the ramp of path time for pause, stop and resume, ms (J-33). The ramp is longer if the acceleration or torque limits
     /// require it.
     pub ramp_ms: u16,
-    /// Measured speed that raises an error while the torque is on, as a multiple of the velocity limit of the joint (J-35).
+    /// Measured speed at which the controller raises an error while the torque is on, as a multiple of the velocity limit of the joint
+    /// (J-35).
     pub overspeed_factor: f64,
-    /// Time for which a joint may exceed the over-speed threshold before an error is raised, ms.
+    /// Time for which a joint may exceed the over-speed threshold before the controller raises an error, ms.
     pub overspeed_ms: u16,
     /// Longest duration of a pause or stop if the torque limits allow it, ms (J-33).
     pub stop_ms: u16,
     /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after this time, the moving joints
     /// are overloaded and lower their loads (J-33, J-70).
     pub braking_ms_max: u16,
-    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share is
-    /// considered a push (J-66).
+    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share counts as
+    /// a push (J-66).
     pub yield_torque_share: f64,
     /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms within any 100 ms (J-43). During this
-    /// time the torque limit is commanded and the integral does not change. With 0, the joint is overloaded in the first tick with a torque
-    /// above its limit. A single missing point in a recorded trajectory causes a torque peak of a few milliseconds.
+    /// time, the controller commands the torque limit, and the integral does not change. With a time of 0, the joint is overloaded in the
+    /// first tick with a torque above its limit. A single missing point in a recorded trajectory causes a torque peak of only a few
+    /// milliseconds.
     pub torque_over_ms: u16,
-    /// If `true`, an overloaded joint releases the arm, as the manual describes. Otherwise the controller reacts as described in J-66
-    /// (J-43, J-66).
+    /// If `true`, an overloaded joint makes the controller switch the torque of the arm off, as the manual describes. If `false`, the
+    /// controller reacts as described in J-66 (J-43).
     pub torque_release: bool,
     /// `true` if a held stop ends only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms (J-43). At first, the load
-    /// of the joint may be unknown, and the controller must catch it.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms (J-43). Directly after
+    /// enabling, the load of the joint may be unknown, and the controller must catch this load.
     pub catch_ms_max: u16,
-    /// Time over which a torque step at a change of state is blended out, ms (J-25, J-44).
+    /// Time over which the controller blends out a torque step at a change of state, ms (J-25, J-44).
     pub blend_ms: u16,
     /// Torque up to which Teaching holds a joint at standstill, as a share of the torque limit and including the friction of the joint
     /// (J-25).
     pub teach_stiction: f64,
     /// Share of the joints' Coulomb friction that Teaching compensates (J-25).
     pub teach_friction: f64,
-    /// Highest speed of the flange in a jog, m/s (J-58). In Teaching, braking increases above this speed, up to its full value at twice
-    /// this speed (J-25). With 0, the speed is not limited.
+    /// Highest speed of the flange in a jog, m/s (J-58). In Teaching, the damping increases above this speed, up to its full value at twice
+    /// this speed (J-25). With a limit of 0, the controller does not limit the speed of the flange.
     pub tool_speed_max: f64,
-    /// Time in which a motion can stop after the safety input has become 0, before the torque is switched off, ms (J-22). With 0, the
-    /// torque is switched off at once.
+    /// Time in which a motion can stop after the safety input has become 0, before the torque is switched off, ms (J-22). With a time of 0,
+    /// the controller switches the torque off at once.
     pub safety_input_ramp_ms: u16,
-    /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
+    /// Range of speeds around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
-    /// Time without a valid frame from any host after which a motion is paused and teaching ends, ms (J-59). With 0, host supervision is
-    /// off.
+    /// Time without a valid frame from any host after which a motion is paused and teaching ends, ms (J-59). With a time of 0, host
+    /// supervision is off.
     pub host_timeout_ms: u16,
-    /// Speed override (0.05 to 1), in seconds of path time per second (J-57). The speed override is not part of an arm.
+    /// Speed override (0.05 to 1), in seconds of path time per second (J-57). The speed override is not part of an arm file.
     pub speed: f64,
-    /// Joints that are declared absent, for tests on a bench (J-53). The controller does not expect nodes for absent joints. While a
-    /// joint is absent, the controller does not execute a trajectory. The setting is not part of an arm, and no joint is absent at the start
-    /// of the device.
+    /// Joints that the host has declared absent, for tests on a bench (J-53). The controller does not expect nodes for absent joints. While
+    /// a joint is declared absent, the controller does not execute a trajectory. The list of absent joints is not part of an arm file, and
+    /// no joint is declared absent at the start of the device.
     pub absent: [bool; JOINTS],
     /// Position of each absent joint in the model, rad.
     pub absent_position: [f64; JOINTS],
-    /// Payload at the flange of the arm (J-60). The payload is not part of an arm, and the device starts without a payload.
+    /// Payload at the flange of the arm (J-60). The payload is not part of an arm file, and the device starts without a payload.
     pub payload: Payload,
     /// Bounds of gains, masses and friction that a host may send (J-06).
     pub parameter_bounds: ParameterBounds,
 }
 
 impl Config {
-    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded. The range is defined by the
-    /// position limits of the joint, clipped to the working area if the drives are configured to keep to this area (J-43). If `joint` is
-    /// out of range, the range is empty.
+    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded. The commanded range is defined
+    /// by the position limits of the joint. If the drives keep to their working area, the range is clipped to this area (J-43). If `joint`
+    /// is not a valid index, the range is empty.
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
@@ -147,47 +152,47 @@ impl Config {
     }
 }
 
-/// Reason why settings are refused, for example because the drives do not support the limits.
+/// Reason why the controller refuses settings, for example because the drives do not support the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// A position limit is outside the working area of the drives (J-43).
+    /// A position limit of a joint is outside the working area of the drives (J-43).
     Position {
-        /// Joint, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
         /// Position limit, rad.
         value: f64,
         /// Half of the working area, rad.
         limit: f64,
     },
-    /// The lowest position is not below the highest position.
+    /// The lowest position of a joint is not below its highest position.
     Range {
-        /// Joint, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
         /// Lowest position, rad.
         value: f64,
         /// Highest position, rad.
         limit: f64,
     },
-    /// The braking time is shorter than a pause or stop may take (J-33).
+    /// The time for braking is shorter than a pause or stop may take (J-33).
     Braking {
-        /// [`Config::braking_ms_max`].
+        /// Value of [`Config::braking_ms_max`], ms.
         value: u16,
-        /// Twice [`Config::stop_ms`].
+        /// Twice the value of [`Config::stop_ms`], ms.
         limit: u32,
     },
     /// The torque limit times the torque gain (J-61) is above the full scale of the bus.
     TorqueScale {
-        /// Joint, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// The product, N·m.
+        /// Torque limit times torque gain, N·m.
         value: f64,
         /// Full scale of the bus, N·m.
         limit: f64,
     },
     /// The over-speed threshold (J-35) is above the highest speed that the drives can report.
     SpeedScale {
-        /// Joint, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
         /// The velocity limit times [`Config::overspeed_factor`], rad/s.
         value: f64,
@@ -196,7 +201,7 @@ pub enum ConfigError {
     },
     /// The over-speed threshold (J-35) is above the speed at which the drives trip.
     SpeedTrip {
-        /// Joint, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
         /// The velocity limit times [`Config::overspeed_factor`], rad/s.
         value: f64,
@@ -263,7 +268,7 @@ impl Config {
     /// must be able to report the over-speed threshold, and must not trip below this threshold.
     ///
     /// # Errors
-    /// Returns an error with the first joint whose limits the drives do not support. A limit that is NaN is also refused.
+    /// Returns an error for the first joint whose limits the drives do not support. A limit that is NaN is also refused.
     #[allow(clippy::neg_cmp_op_on_partial_ord)]
     pub const fn check(&self) -> Result<(), ConfigError> {
         let (value, limit) = (self.braking_ms_max, 2 * self.stop_ms as u32);
@@ -275,7 +280,7 @@ impl Config {
             let limits = &self.joints[j];
             j += 1;
             let joint = j;
-            // The comparisons also refuse NaN.
+            // The comparisons also reject NaN.
             if self.keeps_to_working_area() {
                 if !(limits.position_min >= -WORKING_AREA) {
                     return Err(ConfigError::Position {

@@ -23,9 +23,9 @@ use crate::{ControllerState, TrajectoryState};
 
 /// Joint trajectory controller. `M` is the memory for the trajectory, with space for [`crate::POINTS_MAX`] points.
 ///
-/// The parts that have a state are separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory), `motion` (control
-/// law), `errors`. `Controller` connects these parts. [`Controller::tick`] executes the steps of the figure in the manual from top to
-/// bottom.
+/// The parts of the controller that have a state are separate modules: `nodes` (the bus), `host_parameters`, `store` (trajectory), `motion`
+/// (control law) and `errors`. `Controller` connects these parts. [`Controller::tick`] executes the steps of the figure in the manual from
+/// top to bottom.
 #[derive(Clone, Debug)]
 pub struct Controller<M> {
     pub(crate) config: Config,
@@ -35,10 +35,10 @@ pub struct Controller<M> {
     // Parameters and commands that the controller has received from the host.
     pub(crate) parameters: HostParameters,
     pub(crate) teaching: bool,
-    /// Time for which Teaching has waited until the arm is held, ms.
+    /// Time for which the controller has waited for the arm to be held before Teaching begins, ms.
     pub(crate) teaching_waits_ms: u32,
     pub(crate) pump: bool,
-    // Store of the trajectory, followed by the fields of its execution.
+    // Store of the trajectory. The next fields belong to its execution.
     pub(crate) store: Store<M>,
     pub(crate) check: TrajectoryCheck,
     pub(crate) violation: Option<Violation>,
@@ -52,7 +52,7 @@ pub struct Controller<M> {
     pub(crate) motion: Motion,
     /// Cause of the last held stop (J-69).
     pub(crate) last_stop: LastStop,
-    // Progress of the present host command, followed by other fields of the link to the host.
+    // Progress of the present host command. The next fields belong to the link to the host.
     pub(crate) slice_progress: SliceProgress,
     pub(crate) priorities: [Priority; HOST_LINES],
     pub(crate) uploads: [LineUpload; HOST_LINES],
@@ -65,7 +65,7 @@ pub struct Controller<M> {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Creates a controller in Start. In the first tick, the state changes to Init.
+    /// Creates a controller in state Start. In the first tick, the state changes to Init.
     pub fn new(config: Config, points: M) -> Self {
         Self {
             state: ControllerState::Start,
@@ -98,8 +98,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises an internal error that no other bit explains, because the device failed and was therefore reset (J-12). The error latches
-    /// like any other error (J-21). The board calls this function before the first tick.
+    /// Raises an internal error that does not come from a joint or from the bus, because the device failed and was therefore reset (J-12).
+    /// The error latches like any other error (J-21). The board calls this function before the first tick.
     pub fn raise_internal(&mut self) {
         self.errors.raise_device();
     }
@@ -109,12 +109,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         &self.status_frame
     }
 
-    /// Returns the reason why the check of J-36 refused the last segment or Execute. Returns `None` if the check did not refuse it.
+    /// Returns the reason why the check of J-36 refused the last segment or Execute. Returns `None` if the check did not refuse this
+    /// segment or Execute.
     pub fn violation(&self) -> Option<&Violation> {
         self.violation.as_ref()
     }
 
-    /// Returns the settings.
+    /// Returns the settings of the controller.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -152,7 +153,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !clearing
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         if initialised && !self.powered() && !self.parameters.holdable(self.nodes.positions(), &self.config) {
-            // The model was received before the positions were known, so the host must send it again.
+            // The torque limits cannot hold the arm with this model. The model arrived before the positions were known, so the host must
+            // send it again.
             self.parameters.withdraw_model();
             initialised = false;
         }
@@ -161,7 +163,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            // J-60: HoldPos can determine a load that is missing in the model only after the model includes the payload.
+            // J-60: after a change of the payload, HoldPos can determine an unmodelled load only when the model includes the whole payload.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
                 && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
@@ -175,7 +177,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return;
         }
         if matches!(next, ControllerState::Error | ControllerState::Init | ControllerState::Teaching) {
-            // J-24: a trajectory is never resumed after these states, so the host must send it again.
+            // J-24: the controller never resumes a trajectory after Error, Init or Teaching, so the host must send it again.
             self.store.clear();
             self.set_trajectory(TrajectoryState::Null);
         }
@@ -188,7 +190,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
                 self.errors.end_held_stop();
-                // If the gripper does not keep its part, the pump stays off until the host switches it on again.
+                // If the gripper does not keep its workpiece, the pump stays off until the host switches it on again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
             ControllerState::HoldPos if last == ControllerState::Teaching => {
@@ -200,7 +202,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
         if last == ControllerState::Teaching {
-            // The torque that decelerates the arm is not reduced.
+            // After Teaching, no torque may step, because the model torque then contains the torque that decelerates the arm.
             self.motion.law.change_whole_torque();
         } else {
             self.motion.law.change_mode();
@@ -220,7 +222,7 @@ mod tests {
     use super::*;
     use crate::POINTS_MAX;
 
-    /// Checks the size of the controller without the trajectory, which must fit into the fast memory of the board.
+    /// Checks the size of the controller without the trajectory, because this part must fit into the fast memory of the board.
     #[test]
     fn memory_beside_the_trajectory_fits_40_kib() {
         let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>() - size_of::<[RawPoint; POINTS_MAX]>();

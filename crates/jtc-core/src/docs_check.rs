@@ -4,7 +4,7 @@ extern crate std;
 use std::format;
 use std::path::Path;
 
-/// Checks that a part of docs/protocol-jtc.md, between two markers, is equal to the generated text.
+/// Checks that the text between two markers in docs/protocol-jtc.md is equal to the generated text.
 pub(crate) fn is_in_the_protocol(part: &str, drawn: &str) {
     std::println!("{drawn}");
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/protocol-jtc.md");

@@ -1,4 +1,5 @@
-//! Errors latch (J-21). The module stores the errors that have occurred, and the errors that keep the controller in Error.
+//! Errors of the controller latch (J-21). This module stores the errors that have occurred, and the errors that keep the controller in
+//! state Error.
 use crate::bit_codec::bit_codec;
 use crate::{JOINTS, error};
 
@@ -9,7 +10,7 @@ pub(crate) struct Errors {
     emergency_input: bool,
     /// `true` if the controller device failed.
     device: bool,
-    /// `true` if a joint reported an error or misbehaved.
+    /// `true` if a joint reported an error, or misbehaved in another way (J-16, J-35, J-53).
     external_joints: bool,
     /// Internal error word of each joint.
     joints: [u16; JOINTS],
@@ -18,7 +19,7 @@ pub(crate) struct Errors {
     held: [u16; JOINTS],
     /// CAN flags that count as errors.
     can: u32,
-    /// Present CAN flags that are shown but do not count as errors.
+    /// Present CAN flags that the status shows but that do not count as errors.
     can_shown: u32,
     can_occurred: u32,
     occurred: u16,
@@ -53,7 +54,7 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Raises the internal errors of each joint. The word of a joint without an error is 0.
+    /// Raises the internal errors of each joint. The error word of a joint without an error is 0.
     pub(crate) fn raise_joints(&mut self, bits: &[u16; JOINTS]) {
         if !any(bits) {
             return;
@@ -65,8 +66,8 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Adds the causes of a held stop to the occurred errors (J-69). If the stop `latches`, the causes are also shown as current errors
-    /// until the host clears them. The safety output stays 1.
+    /// Adds the causes of a held stop to the occurred errors (J-69). If the stop `latches`, the controller also shows the causes as current
+    /// errors until the host clears them. During a held stop, the safety output stays 1.
     pub(crate) fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
         for j in 0..JOINTS {
             self.joints_occurred[j] |= causes[j];
@@ -81,12 +82,12 @@ impl Errors {
         self.hold_joints(bits, false);
     }
 
-    /// Returns `true` if a held stop is latched, so that the arm does not move until the host clears the stop.
+    /// Returns `true` if a held stop is latched. The arm does not move until the host clears this stop.
     pub(crate) fn held_stop(&self) -> bool {
         any(&self.held)
     }
 
-    /// Ends a held stop, because an arm without torque is not held.
+    /// Ends a held stop, because the controller cannot hold an arm without torque.
     pub(crate) fn end_held_stop(&mut self) {
         self.held = [0; JOINTS];
     }
@@ -100,14 +101,14 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Shows the CAN flags of this tick that do not count as errors, which are the flags of the gripper (J-14). A flag is shown only as
-    /// long as its cause is present.
+    /// Shows the CAN flags of this tick that do not count as errors, which are the flags of the gripper (J-14). The status shows such a
+    /// flag only as long as its cause is present.
     pub(crate) fn show_can(&mut self, flags: u32) {
         self.can_shown = flags;
         self.can_occurred |= flags;
     }
 
-    /// Clears the current errors (ClearCurrentErrors). Errors that still persist are raised again in the same tick.
+    /// Clears the current errors (ClearCurrentErrors). Errors whose cause still persists are raised again in the same tick.
     pub(crate) fn clear_current(&mut self) {
         self.emergency_input = false;
         self.device = false;
@@ -146,7 +147,7 @@ impl Errors {
         self.occurred
     }
 
-    /// Returns the words of current and occurred errors of a joint.
+    /// Returns the words of the current and occurred errors of a joint.
     pub(crate) fn joint(&self, joint: usize) -> (u16, u16) {
         let of = |words: &[u16; JOINTS]| words.get(joint).copied().unwrap_or(0);
         (of(&self.joints) | of(&self.held), of(&self.joints_occurred))
@@ -174,8 +175,8 @@ mod tests {
 
     const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
 
-    /// When an error is raised, both words show it in the same tick. The word of occurred errors contains the error until the host also
-    /// clears this word.
+    /// When an error is raised, the words of current and occurred errors show it in the same tick. The word of occurred errors contains an
+    /// error until the host also clears this word.
     #[test]
     fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
         for (raise, word) in [
@@ -197,8 +198,8 @@ mod tests {
         }
     }
 
-    /// The cause of a held stop is shown as occurred, and as current if the stop latches. The cause of a held stop is not an error, so the
-    /// safety output stays 1.
+    /// The cause of a held stop is shown as an occurred error, and also as a current error if the stop latches. The cause of a held stop is
+    /// not an error, so the safety output stays 1.
     #[test]
     fn j66_j69_the_cause_of_a_held_stop_is_shown_and_is_no_error() {
         for latches in [false, true] {

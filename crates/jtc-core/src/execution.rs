@@ -15,7 +15,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Starts the path after Execute in Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        // If joints are not enabled yet, their positions are checked again when they are enabled.
+        // If joints are not enabled yet, the controller checks their positions again when they are enabled.
         if !self.near(&first) || (self.motion.set.all_holding() && self.approach_to(&first).is_none()) {
             return Err(DataStatus::StartPositionMismatch);
         }
@@ -58,7 +58,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Returns the phase that moves the arm from the held position to `point` of the path. Returns `None` if a joint would leave its range,
-    /// or if too little torque is available for an approach. An arm that is exactly at the first point needs no approach.
+    /// or if the available torque is not sufficient for an approach. An arm that is exactly at the first point needs no approach.
     fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
         let from = self.motion.set.point.position;
         if from == *point && self.clock.time == 0.0 {
@@ -92,7 +92,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Slows down the time of the path or of the approach, because this motion overloads a joint (J-75). Returns `false` if the arm is not
+    /// Slows down the clock of the path or of the approach, because this motion overloads a joint (J-75). Returns `false` if the arm is not
     /// on a path or an approach, or if it is already stopping. In the tick in which the arm arrives at its target, no reaction to the
     /// overload is necessary.
     pub(crate) fn hold_back(&mut self) -> bool {
@@ -111,7 +111,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         true
     }
 
-    /// Executes one tick of a motion whose time (of the path or of the approach) is slowed down or returns to its normal rate.
+    /// Executes one tick of a motion whose clock (of the path or of the approach) is slowed down or returns to its normal rate.
     pub(crate) fn step_hold_back(&mut self) {
         if !self.motion.hold_back.is_watched() || !self.phase.goes_on() {
             return;
@@ -135,7 +135,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Pauses or stops the execution. The execution state (TES) stays Execute until standstill (J-33).
+    /// Pauses or stops the execution of the trajectory. The execution state (TES) stays Execute until standstill (J-33).
     pub(crate) fn leave_path(&mut self, command: ExecCommand) {
         let to = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
         match &mut self.phase {
@@ -146,7 +146,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     self.begin_braking();
                 }
             }
-            // The arm comes to rest before it reaches the point.
+            // The arm comes to rest before it reaches the target of the approach.
             Phase::Approaching { clock, leave, .. } if clock.time > 0.0 => {
                 if leave.replace(to).is_none() {
                     clock.halt();
@@ -158,7 +158,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Begins braking, for which all available torque is allowed.
+    /// Begins braking, which may use all available torque.
     pub(crate) fn begin_braking(&mut self) {
         self.braking_ms = Some(0);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
@@ -168,7 +168,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn walk(&mut self) {
         match self.phase {
             Phase::Waiting { elapsed_ms } => {
-                // Drives may take seconds to enable. During this time the arm is held, and it may have sagged.
+                // Drives may need seconds to enable. Until all drives are enabled, the arm is held and may sag.
                 self.motion.set.hold(&self.config);
                 if self.parameters.blend_left_ms() > 0 {
                     self.motion.law.payload_comes();
@@ -176,7 +176,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.parameters.blend_payload();
                 // The model must not change while the arm is on the path (J-60).
                 if !self.motion.set.all_holding() || self.parameters.blend_left_ms() > 0 {
-                    // The wait ends here, because the operator no longer expects a motion (J-16).
+                    // After the enabling timeout, the operator no longer expects a motion, so the controller stops waiting (J-16).
                     self.phase = Phase::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);
@@ -195,7 +195,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Phase::Approaching { from, length_ms, mut clock, leave } => {
                 if clock.time == 0.0 {
-                    // Until this tick, the arm was held without friction compensation.
+                    // Until this tick, the controller held the arm without friction compensation.
                     self.motion.law.change_mode();
                 }
                 clock.advance(length_ms);
@@ -267,13 +267,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Executes one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. During the stop, all
-    /// available torque may be used for braking. After `stop_ms`, a remaining motion is ignored if it is slow enough. If path time or a jog
-    /// has not stopped when the braking time is over, the torque is not sufficient, and the moving joints are overloaded. If the arm is
-    /// already held at that time but is moved by an external force, the normal limits apply.
+    /// Executes one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. During a pause or stop, the
+    /// controller may use all available torque for braking. After `stop_ms`, the stop ends as soon as every joint is slow enough to count
+    /// as at rest. If path time or a jog has not stopped at the end of the braking time, the torque is not sufficient. The moving joints
+    /// are then overloaded. If the arm is already held at the end of the braking time but an external force moves it, the normal limits
+    /// apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
-            // A jog has begun since the stop, or continues.
+            // A jog has begun since the stop, or a jog continues.
             self.braking_ms = None;
         }
         let Some(ms) = self.braking_ms else { return false };
@@ -295,7 +296,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             if self.config.torque_release {
                 self.errors.raise_joints(&causes);
             } else {
-                // Path time stops, and joints that still move lower their loads (J-70).
+                // Path time stops, and each joint that still moves lowers its load (J-70).
                 self.motion.begin_yields(&[false; JOINTS], &moving, &self.config);
                 self.hold_stop(&causes, StopKind::Overload);
                 if jogged {

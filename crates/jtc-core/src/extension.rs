@@ -1,4 +1,4 @@
-//! Extensions of the protocol (J-50 to J-59): identity and settings of the device, the arm as a unit, and jogging.
+//! Extensions of the protocol (J-50 to J-59): identity and settings of the device, storage of a complete arm, and jogging.
 mod answers;
 mod arm;
 mod image;
@@ -24,22 +24,23 @@ const LIVE_MAX: usize = 4;
 /// Highest number of values in a SetSettings frame while the arm is held or in Teaching. A payload has ten values.
 const STANDING_MAX: usize = 16;
 
-/// Highest velocity of a jog while the two encoders of a joint disagree (J-35), rad/s. A host sends f32 values.
+/// Highest velocity of a jog, rad/s, while the two encoders of a joint disagree (J-35). The type is f32, because hosts send velocities as
+/// f32.
 const UNTRUSTED_MAX: f32 = 0.1;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Sets the identity of the controller. The board calls this before the first tick.
+    /// Sets the identity of the controller. The board calls this function before the first tick.
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
         self.extensions.identity = identity;
     }
 
-    /// Sets the program in the flash. Boards that read their program after the start call this (J-67).
+    /// Sets the identification of the program in the flash. Boards that read their program after the start call this function (J-67).
     pub fn set_program(&mut self, program: Option<Program>) {
         self.extensions.identity.program = program;
     }
 
-    /// Returns the frame with the answer to an extension request. Send this frame if the outputs of the last tick had
+    /// Returns the frame with the answer to an extension request. The board must send this frame if the outputs of the last tick had
     /// [`crate::Outputs::answer_line`] set.
     pub fn answer_frame(&self) -> &[u8] {
         self.extensions.answers.frame()
@@ -65,8 +66,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::StoreArm => self.store_arm(),
             Command::Disable if self.settable() || self.holds_at_rest() => {
-                // J-53: without its parameters the controller changes to Init, without torque, and stays in Init. In Init and Error a host
-                // can then send another arm. The parts of the new arm need not match the parameters of the last arm (J-71).
+                // J-53: without parameters, the controller changes to Init, without torque, and stays in Init. In Init and Error a host can
+                // then send another arm. The gains, model and friction of the new arm need not match the parameters of the last arm (J-71).
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -98,7 +99,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
-            // If a jog key is still pressed when a held stop is cleared, it does not cause a motion.
+            // An operator may still press a jog key when a held stop is cleared. The controller then refuses the Jogs of this key.
             if self.stops_held() && velocities.iter().any(|velocity| velocity != 0.0) {
                 self.extensions.refuse_jogs();
             }
@@ -108,7 +109,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let untrusted = self.nodes.untrusted() != 0;
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
-            // The wire format uses f32, so a velocity at the limit may arrive as the next higher number. The comparison also refuses NaN.
+            // The wire format uses f32, so the host may round a velocity at the limit up to the next f32 number. The comparison also
+            // rejects NaN.
             let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
             // J-53: an absent joint does not move.
@@ -142,7 +144,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.set.jog(&room.velocity, &room.acceleration, config);
                 Ok(())
             }
-            // No torque is available for the jog, so the jog comes to rest.
+            // No torque is available for the jog, so the controller brings the joints to rest.
             None if jogging => {
                 self.motion.set.end_jog();
                 Ok(())
@@ -175,8 +177,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         matches!(self.state, ControllerState::Init | ControllerState::Error)
     }
 
-    /// Returns `true` if the arm is held or in Teaching and no motion is commanded. In this state, live settings that affect the torque may
-    /// change.
+    /// Returns `true` if the arm is held or in Teaching and no motion is commanded. In this state, a host may change live settings that
+    /// affect the torque.
     fn stands(&self) -> bool {
         match self.state {
             ControllerState::Teaching => true,
@@ -260,12 +262,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Applies all values or none (J-53). If the controller uses friction tables, it checks one table per tick.
+    /// Applies all received settings, or none of them (J-53). If the controller uses friction tables, it checks the table of one joint per
+    /// tick.
     fn set_settings(&mut self, values: Values<'_>) -> SliceOutcome {
         let all = |taken: fn(Live) -> bool| {
             values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))
         };
-        // In every state, a tick has time for a few values in addition to its normal computation.
+        // In every state, a tick has time to apply a few settings in addition to its normal computation.
         let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
         let standing = self.stands()
             && values.len() <= STANDING_MAX
@@ -286,7 +289,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         if standing {
             if reloaded {
-                // If the old and the new payload are empty, the payload counts as unchanged, even if its position changes.
+                // If both the old and the new payload are empty, the payload counts as unchanged, even if its position changes.
                 if config.payload.is_there() || self.config.payload.is_there() {
                     let heavier = config.payload.mass - self.config.payload.mass;
                     self.parameters.change_payload(&config, heavier);
@@ -313,10 +316,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         SliceOutcome::Done
     }
 
-    /// Replaces the settings of the controller by these settings. The controller must be in a state without torque.
+    /// Replaces the settings of the controller by `config`. The controller must be in a state without torque.
     fn use_settings(&mut self, config: Config) {
         if self.nodes.use_settings(&config, &self.config) {
-            // The pump does not start again without a command (J-23).
+            // The pump does not start again without a command of the host (J-23).
             self.pump = false;
         }
         self.config = config;
@@ -324,8 +327,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// Stops path time and ends Teaching if no host has sent a valid frame for too long (J-59). `done` is the number of host events that
-    /// were processed in this tick.
+    /// Pauses the path, ends a jog and ends Teaching if no host has sent a valid frame within the timeout (J-59). `done` is the number of
+    /// host events that were processed in this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));

@@ -5,14 +5,14 @@ use crate::parameters::TableOf;
 /// Returns the torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
 /// The torque is (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), with s as the smoothed sign of v. The temperature factor is clipped to
-/// 0.2..2, because the straight line that was fitted to the measured drives changes its sign near 60 °C. Without the clip, the compensation
-/// would then act as drag.
+/// 0.2..2, because the straight line that was fitted to the measured drives becomes negative near 60 °C. Without the clip, the compensation
+/// would then act against the motion.
 pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
 
-/// Like [`polynomial`]. The smoothed sign of the speed is a straight line around 0. `sign_slope` is the reciprocal of the speed at which
-/// this line reaches ±1, s/rad.
+/// Like [`polynomial`], but with the reciprocal of the width of the smoothed sign. Around a speed of zero, the smoothed sign of the speed
+/// is a straight line. `sign_slope` is the reciprocal of the speed at which this line reaches ±1, s/rad.
 #[inline]
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
     // If the speed is NaN, the c1 term makes the torque NaN.
@@ -30,8 +30,9 @@ fn warmth(c: &[f64; 6], t: f64) -> f64 {
     within(1.0 + c[4] * (t - c[5]), 0.2, 2.0)
 }
 
-/// Returns the Coulomb friction of the table, N·m. In both directions, a straight line through two slow speeds is extended to standstill.
-/// The lower of the two results is used. Returns zero if the table does not contain these speeds.
+/// Returns the Coulomb friction of the table, N·m. For each direction, a straight line through the torques at two slow speeds is extended
+/// to standstill. The Coulomb friction is the lower of the two torques at standstill. Returns zero if the table does not contain the two
+/// slow speeds.
 pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     const SLOW: f64 = 0.1;
     let at = |direction: f64| {
@@ -62,19 +63,22 @@ fn ends(axis: &[f32; 20]) -> (f64, f64) {
 }
 
 /// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. For a temperature outside the table, the
-/// nearest column is used. Returns `None` for a velocity outside the table. The end values belong to the table.
+/// column of the nearest temperature is used. Returns `None` for a velocity outside the table. The first and the last velocity of the table
+/// are inside the table.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let (slowest, fastest) = velocities(table);
-    // A velocity that is outside only because of rounding in the interpolation between two points is considered inside.
+    // The interpolation between two points can move a velocity out of the table by a rounding error. A velocity that is outside only by a
+    // rounding error counts as inside the table.
     let inside = (v >= slowest - ROUNDING) & (v <= fastest + ROUNDING);
     let (coldest, warmest) = temperatures(table);
-    // `clamp` is not used, because it may panic. NaN becomes the lowest temperature.
+    // `clamp` is not used, because it may panic. A temperature of NaN becomes the lowest temperature.
     let (v, t) = (v.max(slowest).min(fastest), t.max(coldest).min(warmest));
     let (x, [row, next]) = locate(&table.velocity, table.torque.array_windows(), v)?;
     let columns = row.array_windows().zip(next.array_windows());
     let (y, ([a, b], [c, d])) = locate(&table.temperature, columns, t)?;
     let [a, b, c, d] = [a, b, c, d].map(|&torque| f64::from(torque));
-    // The first step interpolates along the velocity at both temperatures of the cell, and the second step between the temperatures.
+    // The first step interpolates between the velocities of the cell, at both temperatures. The second step interpolates between the
+    // temperatures.
     let (low, high) = (a + x * (c - a), b + x * (d - b));
     inside.then_some(low + y * (high - low))
 }
@@ -181,8 +185,8 @@ mod tests {
         assert_eq!([200, 246, 255].map(celsius), [-56.0, -10.0, -1.0]);
     }
 
-    /// If a velocity is outside the table by at most the rounding tolerance, the torque at the end of the table is used. At twice this
-    /// distance, the velocity is refused.
+    /// If a velocity is outside the table by at most the rounding tolerance, the torque at the end of the table is used. A velocity outside
+    /// the table by twice the rounding tolerance is refused.
     #[test]
     fn j36_j42_what_rounding_adds_to_a_velocity_has_the_torque_at_the_end() {
         let t = sample();

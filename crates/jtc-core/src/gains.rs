@@ -1,8 +1,8 @@
-//! Check that gains match the inertia of the joints (J-71), and trial of new gains.
+//! Check that the gains match the inertia of the joints (J-71), and trial of new gains.
 //!
-//! The torques of the derivative and of the position error take effect with a delay, so a joint that is too light for its gains oscillates.
-//! The controller computes the smallest effective inertia of each joint in some fixed poses, one pose per tick, and compares the gains with
-//! this inertia.
+//! The torques of the derivative and of the position error take effect with a delay, so a joint with too little inertia for its gains
+//! oscillates. The controller computes the smallest effective inertia of each joint in a fixed set of poses, one pose per tick. The
+//! controller compares the gains with this inertia.
 use core::f64::consts::TAU;
 
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -17,31 +17,32 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Delay of the torque of the derivative in addition to [`Config::delay_ticks`], ticks. The delay is half of the ticks over which the
-/// derivative is computed, plus half of the tick for which a torque is constant.
+/// Delay of the torque of the derivative in addition to [`Config::delay_ticks`], ticks. The additional delay of the derivative is half of
+/// the ticks over which it is computed, plus half of the tick for which a torque is constant.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Delay of the torque of the position error in addition to [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
-/// Factors in the required inertia: the first for Kd times the delay of its torque, the second for Kp times both delays. The result is 1.1
-/// to 1.7 times the inertia at which the control loop of one joint becomes stable. This range applies if Kp is at most half of the Kp that
-/// Kd can damp.
+/// Factors in the formula for the required inertia: the first for Kd times the delay of its torque, the second for Kp times both delays.
+/// The required inertia is 1.1 to 1.7 times the inertia at which the control loop of one joint becomes stable. The range of 1.1 to 1.7
+/// applies if Kp is at most half of the Kp that Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
-/// Largest permitted sag of a joint if new gains reduce the torque of its integral, as a share of the position error limit.
+/// Largest sag of a joint, as a share of the position error limit, that is permitted when new gains reduce the torque of its integral.
 const SAG: f64 = 0.25;
-/// Least torque of the position gain at the position error limit, as a share of the torque limit.
+/// Least torque that the position gain must produce at the position error limit, as a share of the torque limit.
 const STIFF: f64 = 0.03;
 /// Time over which new gains are blended in, and duration of the trial of new gains, ms.
 const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
-/// Time after new gains during which an unstable control loop is attributed to these gains, ms.
+/// Time after a change of gains during which the controller attributes an unstable control loop to the new gains, ms.
 const BLAMED_MS: u16 = 10_000;
-/// Factor that reduces the gains of a joint with an unstable control loop, and time after the reduction within which a second instability
+/// Factor that reduces the gains of a joint with an unstable control loop, and time after this reduction within which a second instability
 /// is an error, ms.
 const SOFTER: f64 = 0.3;
 const AGAIN_MS: u16 = 500;
 
-/// Position of each joint, as a share of its range, in the poses after the first pose. The points fill the ranges evenly (Halton 1960).
+/// Position of each joint, as a share of its range, in the poses after the first pose. The shares of all poses fill the ranges evenly
+/// (Halton 1960).
 const SHARES: [[f32; JOINTS]; POSES - 1] = shares();
 
 const fn shares() -> [[f32; JOINTS]; POSES - 1] {
@@ -64,7 +65,7 @@ const fn shares() -> [[f32; JOINTS]; POSES - 1] {
     shares
 }
 
-/// Returns the pose with this number, within the limits of the joints. Pose 0 is the zero pose.
+/// Returns the pose `number`, within the position limits of the joints. Pose 0 is the zero pose.
 fn pose(number: usize, config: &Config) -> JointVec {
     let shares = number.checked_sub(1).and_then(|n| SHARES.get(n));
     core::array::from_fn(|j| {
@@ -77,7 +78,7 @@ fn pose(number: usize, config: &Config) -> JointVec {
     })
 }
 
-/// Smallest effective inertia of each joint in the poses that were computed so far, while the other joints are free, kg·m².
+/// Smallest effective inertia of each joint, kg·m², in the poses that were computed so far. In each pose, the other joints are free.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FeltInertia {
     joints: [f64; JOINTS],
@@ -86,10 +87,10 @@ pub(crate) struct FeltInertia {
 bit_codec!(FeltInertia { joints });
 
 impl FeltInertia {
-    /// Start value before the first pose.
+    /// Value before the inertia is computed in the first pose.
     pub(crate) const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
-    /// Computes the effective inertias in the pose with this number, for an arm without a payload.
+    /// Computes the effective inertias in the pose `number`, for an arm without a payload.
     #[inline(never)]
     pub(crate) fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
         let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
@@ -106,14 +107,14 @@ impl FeltInertia {
 
     /// Returns `true` if the inertia of every joint is sufficient for its gains.
     pub(crate) fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
-        // The comparison also refuses NaN.
+        // The comparison also rejects NaN.
         gains.iter().zip(&self.joints).all(|(gains, felt)| *felt >= inertia_needed(gains, config.delay_ticks))
     }
 }
 
 /// Returns the smallest effective inertia (kg·m²) of each joint of an arm without a payload, while the other joints are free. Like a
-/// controller with these settings (J-71), the function uses the zero pose and sixteen poses within the position limits. For a drive without
-/// a configured rotor inertia, 0.7 kg·m² is used.
+/// controller with these settings (J-71), the function computes the inertia in the zero pose and in sixteen poses within the position
+/// limits. For a drive without a configured rotor inertia, 0.7 kg·m² is used.
 pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
     let mut felt = FeltInertia::NONE;
     (0..POSES).for_each(|number| felt.look(number, model, config));
@@ -128,13 +129,13 @@ pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
 
 /// Returns the delay of the torque of the position error, s.
 fn position_delay(delay_ticks: u8) -> f64 {
-    // The delay is at least the tick for which a torque is constant.
+    // The delay of the position torque is at least the tick for which a torque is constant.
     DT * (f64::from(delay_ticks) + POSITION_AGE).max(1.0)
 }
 
 /// Returns `true` if a held joint does not fall when these gains are applied (J-71). `p` is the torque of the position error of the joint,
-/// and `i` is the torque of its integral, N·m. The position gain must produce a minimum torque. The torque that the integral can no longer
-/// produce must cause only a small position error.
+/// and `i` is the torque of its integral, N·m. At the position error limit, the position gain must produce a minimum torque. If the new
+/// gains reduce the torque of the integral, the resulting position error must be small.
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -145,15 +146,15 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
 /// Gains that were received under torque, and the state of their trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
-    /// Gains before the trial, as long as the controller may restore them.
+    /// Gains before the trial, for as long as the controller may restore them.
     before: Option<[PidGains; JOINTS]>,
     /// Time for which all joints have been held stable during the trial, ms.
     held_ms: u16,
-    /// Kp and Kd at the time when the gains changed, followed by the remaining time of the blend to the new gains, ms.
+    /// Kp and Kd at the time when the gains changed. The next field is the remaining time of the blend to the new gains, ms.
     from: [[f32; 2]; JOINTS],
     blend_ms: u16,
-    /// Joints (one bit each) whose gains were reduced or restored because of an unstable control loop. The next field is the remaining time
-    /// in which a second instability is an error, ms.
+    /// Joints (one bit each) whose gains were reduced or restored because their control loop was unstable. The next field is the remaining
+    /// time in which a second instability is an error, ms.
     unstable: u8,
     again_ms: u16,
 }
@@ -162,10 +163,10 @@ bit_codec!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// Begins a trial of the gains `given`, which a host has sent under torque. The gains `before` are replaced.
+    /// Begins a trial of the gains `given`, which a host has sent while the torque was on. The gains `given` replace the gains `before`.
     pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
-        // If the gains in `before` are still on trial, they have not yet held the arm stable.
+        // If the gains in `before` are still on trial, the controller does not know yet whether they hold the arm stable.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
@@ -174,8 +175,8 @@ impl Trial {
         self.held_ms = 0;
     }
 
-    /// Ends the trial, because the arm is no longer held. If gains are on trial, returns the gains before the trial, because the new gains
-    /// have not held the arm stable.
+    /// Ends the trial of gains, because the controller no longer holds the arm. If gains are on trial, returns the gains before the trial,
+    /// because the new gains have not yet held the arm stable.
     pub(crate) fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
@@ -187,13 +188,13 @@ impl Trial {
         self.before = self.before.filter(may);
     }
 
-    /// Returns `true` if one of the times of the trial has not elapsed.
+    /// Returns `true` if a time of the trial or of the blend has not elapsed.
     #[inline(always)]
     pub(crate) fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
     }
 
-    /// Executes one tick under torque. `held` is true if all joints have settled and no joint yields.
+    /// Executes one tick of the trial while the torque is on. `held` is `true` if all joints have settled and no joint yields.
     pub(crate) fn step(&mut self, held: bool) {
         self.again_ms = self.again_ms.saturating_sub(1);
         self.blend_ms = self.blend_ms.saturating_sub(1);
@@ -208,8 +209,8 @@ impl Trial {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// Returns the gains of this tick during the blend to the new gains `given`. Kp and Kd change gradually, but the integral changes at
-    /// once. Returns `None` if the blend is over.
+    /// Returns the gains of this tick during the blend to the new gains `given`. Kp and Kd change gradually, but the gain of the integral
+    /// changes at once. Returns `None` if the blend is over.
     pub(crate) fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
@@ -223,7 +224,7 @@ impl Trial {
         Some(blended)
     }
 
-    /// Begins a blend to other gains. The blend starts from the gains that are effective now, while `given` are the configured gains.
+    /// Begins a blend to other gains. The blend starts from the gains that are effective now. `given` are the configured gains.
     fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
         let acting = self.blended(given).unwrap_or(*given);
         self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
@@ -256,7 +257,7 @@ impl Trial {
             (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
         })?;
         self.blend_from(gains);
-        // For the joints that fail, the new gains apply at once, without a blend.
+        // For the joints that fail, the gains change at once, without a blend.
         for j in 0..JOINTS {
             if failed >> j & 1 != 0 {
                 self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];
@@ -266,7 +267,7 @@ impl Trial {
     }
 }
 
-/// Returns softer gains for the `joints` (one bit each). The damping of these gains is sufficient for their Kp.
+/// Returns gains that are reduced for the `joints` (one bit each). With the reduced gains, the damping is sufficient for Kp.
 fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains; JOINTS] {
     core::array::from_fn(|j| match gains[j] {
         own if joints >> j & 1 == 0 => own,

@@ -1,4 +1,4 @@
-//! The host's commands: executed in bounded slices, with one response record each (J-04, J-06).
+//! Execution of the host's commands in bounded slices, with one response record for each command (J-04, J-06).
 pub(crate) mod line_upload;
 pub(crate) mod priority;
 pub(crate) mod slices;
@@ -28,7 +28,7 @@ use slices::{SliceOutcome, SliceProgress};
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// Returns the data status for existing hosts, which do not know values above 6 (J-51).
+/// Returns the data status for existing hosts, which do not know data statuses above 6 (J-51).
 pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     match data {
         DataStatus::NotAllowed | DataStatus::StartPositionMismatch => DataStatus::IncorrectValue,
@@ -36,13 +36,13 @@ pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     }
 }
 
-/// Part of the tick that an event has used.
+/// Share of a tick that the execution of an event has used.
 enum Served {
-    /// The event took a few instructions, so the tick has time for another one.
+    /// The event took a few instructions, so the tick has time for another event.
     Quickly,
-    /// The event took the full budget of a tick.
+    /// The event took all the time that a tick has for events.
     Fully,
-    /// Only a part of the event was executed. The remainder needs more ticks.
+    /// Only a part of the event was executed. The remainder of the event needs more ticks.
     Partly,
 }
 
@@ -56,7 +56,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
         }
         if inputs.host.is_empty() {
-            // Most ticks return here and so avoid the loop, which needs much preparation.
+            // In most ticks, the function returns here. A tick that returns here skips the loop, whose preparation takes many instructions.
             return 0;
         }
         let mut done = 0;
@@ -70,7 +70,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         done
     }
 
-    /// Executes Stop and Pause at once (J-04). The response records of Stop and Pause are sent later, when their frames are processed.
+    /// Executes Stop and Pause at once, before earlier frames (J-04). The response records of Stop and Pause are sent later, when their
+    /// frames are processed.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
         self.priorities.iter_mut().for_each(|priority| priority.stopped |= stops);
@@ -81,7 +82,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Executes one event or a slice of the event. When the event is completed, its response record is queued.
+    /// Executes one event or a slice of the event. When the event is completed, its response record is put in the queue.
     fn serve(&mut self, received: &HostEvent<'_>) -> Served {
         let Some(priority) = self.priorities.get_mut(received.line) else { return Served::Quickly };
         let mut plain = received.plain;
@@ -103,7 +104,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (priority.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
-                            // The Jog was received before a Stop or a Pause that has already taken effect.
+                            // The controller received this Jog before a Stop or a Pause that has already taken effect.
                             Command::Jog(_) if received.overtaken => {
                                 (SliceOutcome::Refused(DataStatus::NotAllowed), Served::Quickly)
                             }
@@ -118,8 +119,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // A command that the state does not allow is refused without computation. Only a Jog may have been computed
-                            // before it was refused.
+                            // The refusal of a command that the state does not allow takes no computation. A Jog is the exception, because
+                            // the controller may compute its motion before it refuses the Jog.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
@@ -162,7 +163,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
-            // J-69: the condition to which the controller reacts persists.
+            // J-69: the condition to which the controller reacts still exists.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
                 if self.is_reacting() =>
             {
@@ -190,7 +191,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
-            // J-53: if joints are absent, the drives on the bench do not carry the load of the model.
+            // J-53: if joints are absent, the drives on the bench do not carry the load that the model assumes.
             Command::TeachingModeEnable
                 if self.state == ControllerState::HoldPos
                     && !self.joints_absent()
@@ -215,7 +216,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::ResetCanDevices { nodes } => {
                 self.nodes.reset(nodes);
-                // The pump must not start by itself when the gripper is ready again.
+                // The pump must not start without a command when the gripper is ready again.
                 self.pump &= nodes & GRIPPER_MASK == 0;
                 SliceOutcome::Done
             }
@@ -234,8 +235,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21). A fault that a joint still reports is raised again in this tick. If `clear` has no effect for this reason, the
-    /// command is refused. The command is also not executed later, after the joint has been cleared.
+    /// Clears errors (J-21). If a joint still reports a fault, the controller raises this fault again in this tick. If the errors would not
+    /// change for this reason, the controller refuses the command. The controller also does not execute this command later, when the joint
+    /// no longer reports the fault.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -248,7 +250,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Accepts or refuses a frame with friction, gains or a model.
+    /// Accepts or refuses a frame with friction parameters, gains or a model.
     fn take_parameters(&mut self, command: &Command<'_>) -> SliceOutcome {
         self.extensions.forget_hash();
         if command.frame_type().is_default() {
@@ -285,7 +287,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Checks and copies a model in slices. `taken` passes one slice to the parameters.
+    /// Checks and copies an arm model in slices. `taken` checks or copies one slice of the model.
     fn take_model(
         &mut self,
         taken: impl FnOnce(&mut HostParameters, SliceProgress, Option<&[f64; JOINTS]>, &Config) -> SliceOutcome,
@@ -303,7 +305,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         outcome
     }
 
-    /// Takes gains. If the arm has torque, new gains must hold the present torque, and are on trial (J-71).
+    /// Accepts or refuses gains from a host. If the torque is on, new gains must hold the present torque, and a trial of these gains begins
+    /// (J-71).
     #[inline(never)]
     fn take_gains(&mut self, gains: &[PidGains; JOINTS]) -> Result<(), DataStatus> {
         self.parameters.check_pid(gains, &self.config)?;
@@ -319,7 +322,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Uses a default of the stored arm, if an arm is stored (J-54).
+    /// Executes a UseDefault frame with the parameters of the stored arm, if an arm is stored (J-54).
     #[inline(never)]
     fn use_stored(&mut self, frame_type: FrameType) -> SliceOutcome {
         let Self { extensions, parameters, config, nodes, .. } = self;
@@ -355,22 +358,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Executes Execute, Pause or Stop (J-34).
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
-        // J-30: a Stop also drops the upload while joints are jogged.
+        // J-30: a Stop during a jog also drops the upload.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
-        // A Stop or a Pause holds the arm. Therefore both commands also end Teaching, or cancel Teaching that has not begun yet.
+        // A Stop or a Pause makes the controller hold the arm. Therefore both commands also end Teaching, or cancel a request for Teaching.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
         if command != ExecCommand::Execute && self.stop_jog() {
             return Ok(());
         }
         match (self.trajectory, command) {
-            // J-33: a Pause must not turn a stop of the path into a pause.
+            // J-33: a Pause must not turn a Stop on the path into a Pause.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>
             {
                 Err(DataStatus::NotAllowed)
             }
-            // Execute is refused, for example, if Teaching was accepted and begins as soon as the arm is held, or if joints are absent
-            // (J-53). The command is also refused if a hand was leading the arm and the arm is not at rest yet.
+            // Execute is refused, for example, if Teaching was accepted and begins as soon as the controller holds the arm, or if joints
+            // are absent (J-53). Execute is also refused if a hand was moving the arm and the arm is not at rest yet.
             (_, ExecCommand::Execute)
                 if self.teaching
                     || self.motion.set.is_led()
@@ -380,7 +383,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
-            // J-30: a Stop arrived during the upload of this trajectory.
+            // J-30: a Stop arrived during the upload of this trajectory, so Execute is refused.
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute)
                 if self.store.stopped() =>
             {
@@ -415,8 +418,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Refuses a trajectory that was stored although the check had found a violation (J-36). The violation is recorded as an occurred
-    /// error.
+    /// Refuses to execute a trajectory in which the check has found a violation (J-36). The violation is recorded as an occurred error.
     fn check_verdict(&mut self) -> Result<(), DataStatus> {
         let Some(violation) = self.store.refused() else { return Ok(()) };
         let error = |j: usize| if j == violation.joint { violation.joint_error() } else { 0 };
@@ -425,8 +427,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Err(DataStatus::IncorrectValue)
     }
 
-    /// Checks whether the bearing temperatures are inside the friction table (J-36). If friction was received after the trajectory was
-    /// loaded, the velocities of the path must also be inside the table. No other parameter that is accepted in HoldPos affects this check.
+    /// Checks that the bearing temperatures are inside the friction table (J-36). If the controller received friction parameters after the
+    /// trajectory, the velocities of the path must also be inside the table. No other parameter that is accepted in HoldPos affects this
+    /// check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));

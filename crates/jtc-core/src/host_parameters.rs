@@ -1,4 +1,5 @@
-//! Parameters received from the host: gains, model and friction. Each parameter is accepted completely or not at all (J-06).
+//! Parameters received from the host: gains, model and friction. The controller accepts each set of parameters completely or not at all
+//! (J-06).
 mod floats;
 mod frames;
 mod payload;
@@ -20,7 +21,7 @@ use crate::parameters::{PidGains, TableOf};
 /// Number of floats in the friction table of one joint. A tick checks or copies the table of one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
-/// Placeholder for a table that was not received. The control law does not use this table.
+/// Placeholder for a friction table that was not received. The control law does not use the placeholder table.
 const NO_TABLE: TableOf<f32> =
     TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
 
@@ -29,14 +30,14 @@ const NO_TABLE: TableOf<f32> =
 pub(crate) struct HostParameters {
     /// Mask of the received parameters ([`missing_parameter`]).
     received: u8,
-    /// Mask of the parameters that were received since the start, including withdrawn parameters.
+    /// Mask of the parameters that were received since the start, including parameters that were withdrawn later.
     given: u8,
     /// Model from which `dynamics` was computed.
     model: ArmModel,
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
-    /// Inertia that the joints feel in the received model, and in the model that is being checked (J-71).
+    /// Effective inertia of the joints in the received model, and in the model that is being checked (J-71).
     felt: FeltInertia,
     looked_at: FeltInertia,
     /// Trial of gains that were received under torque.
@@ -49,7 +50,7 @@ pub(crate) struct HostParameters {
     pub friction_is_new: bool,
 }
 
-/// State of the parameters. The values are part of the arm and are not included.
+/// State of the parameters. The values of the parameters belong to the arm, so this state does not include them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HostParametersState {
     received: u8,
@@ -64,14 +65,14 @@ pub(crate) struct HostParametersState {
 bit_codec!(HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial });
 
 impl HostParameters {
-    /// Returns the state of the parameters without the values.
+    /// Returns the state of the parameters, without their values.
     pub(crate) fn state(&self) -> HostParametersState {
         let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
         let payload = self.payload.state();
         HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
     }
 
-    /// Restores the state of the parameters, with the payload in these settings.
+    /// Restores the state of the parameters, with the payload in `config`.
     pub(crate) fn restore(&mut self, state: &HostParametersState, config: &Config) {
         let HostParametersState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
             *state;
@@ -82,12 +83,12 @@ impl HostParameters {
         (self.friction_is_table, self.friction_is_new) = (friction_is_table, friction_is_new);
     }
 
-    /// Returns three values that are `true` if the gains, the model and the polynomial are the built-in ones.
+    /// Returns three flags, which are `true` if the gains, the model and the polynomial are the built-in values.
     pub(crate) fn built_in(&self) -> [bool; 3] {
         [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
     }
 
-    /// Uses the built-in gains, model or polynomial for each value that is `true`.
+    /// Uses the built-in gains, model or polynomial if its flag is `true`.
     pub(crate) fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
         if pid {
             self.pid = defaults::PID;
@@ -100,7 +101,7 @@ impl HostParameters {
         }
     }
 
-    /// Creates the parameters in the state before any parameter was received.
+    /// Creates the parameters as they are before a host has sent any parameter.
     pub(crate) fn new(config: &Config) -> Self {
         let dynamics = dynamics(&defaults::MODEL, config);
         Self {
@@ -120,7 +121,7 @@ impl HostParameters {
         }
     }
 
-    /// Resets the parameters in place, as if no parameter had been received.
+    /// Resets the parameters in place to their state before a host has sent any parameter.
     pub(crate) fn begin(&mut self, config: &Config) {
         self.model = defaults::MODEL;
         self.set_gravity(config);
@@ -130,7 +131,7 @@ impl HostParameters {
         self.forget();
     }
 
-    /// Marks the parameters as loaded from storage, not sent by a host.
+    /// Marks all parameters as not received, because they were loaded from storage. A host must still send or request them.
     pub(crate) fn forget(&mut self) {
         (self.received, self.given) = (0, 0);
         (self.friction_is_table, self.friction_is_new) = (false, false);
@@ -141,8 +142,8 @@ impl HostParameters {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
-    /// Returns `true` if each parameter was received since the start. In this case, the controller uses no built-in value without a request
-    /// from a host.
+    /// Returns `true` if each parameter was received since the start. If each parameter was received, the controller uses a built-in value
+    /// only if a host has requested it.
     pub(crate) fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
@@ -179,53 +180,54 @@ impl HostParameters {
         self.received = 0;
     }
 
-    /// Uses the gravity and the payload in these settings from now on.
+    /// Uses the gravity and the payload in `config` from now on.
     pub(crate) fn set_gravity(&mut self, config: &Config) {
         self.dynamics = dynamics(&self.model, config);
         self.payload.forget();
     }
 
-    /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Before all
-    /// positions are known and the model is received, this cannot be checked, so `true` is returned. The payload is checked again when Init
-    /// ends.
+    /// Returns `true` if every joint can hold the payload in `config` at `at` (rad), or needs less torque than now (J-60). If a position is
+    /// unknown or the model is missing, the controller cannot check this, and the function returns `true`. The controller checks the
+    /// payload again when Init ends.
     pub(crate) fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
         let now = self.dynamics.gravity_torque(at);
-        // With this comparison, NaN counts as too much torque. An absent joint does not hold any load (J-53).
+        // With this comparison, a holding torque of NaN counts as too high. An absent joint holds no load (J-53).
         let held =
             |j: usize| config.absent[j] || next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
         (0..JOINTS).all(held)
     }
 
-    /// Begins to blend the payload in these settings into the model, over half a second (J-60). `heavier` is the mass of this payload minus
-    /// the mass of the last payload, kg.
+    /// Begins to blend the payload in `config` into the model, over half a second (J-60). `heavier` is the mass of this payload minus the
+    /// mass of the last payload, kg.
     pub(crate) fn change_payload(&mut self, config: &Config, heavier: f64) {
         self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
-    /// Runs one tick of the payload blend. The arm is held or in Teaching.
+    /// Executes one tick of the payload blend. The blend runs while the arm is held or in Teaching.
     pub(crate) fn blend_payload(&mut self) {
         self.payload.step(&mut self.dynamics);
     }
 
-    /// Ends the blend in a tick without torque. The model then contains the whole payload.
+    /// Ends the payload blend in a tick without torque. The model then contains the whole payload.
     pub(crate) fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
     }
 
-    /// Returns the mass that the next [`blend_payload`](Self::blend_payload) adds, kg.
+    /// Returns the mass that the next call of [`blend_payload`](Self::blend_payload) adds, kg.
     pub(crate) fn next_mass(&self) -> f64 {
         self.payload.next_mass()
     }
 
-    /// Returns the time until the model contains the whole payload, ms. Returns 0 if the model already contains it.
+    /// Returns the remaining time until the model contains the whole payload, ms. Returns 0 if the model already contains the whole
+    /// payload.
     pub(crate) fn blend_left_ms(&self) -> u16 {
         self.payload.left_ms()
     }
 
-    /// Returns `true` if the parameters received since the start are also within the bounds in these settings (J-06). For friction tables
-    /// see [`table_fits`](Self::table_fits).
+    /// Returns `true` if the parameters that were received since the start are also within the bounds in `config` (J-06). For friction
+    /// tables, use [`table_fits`](Self::table_fits).
     pub(crate) fn fits(&self, config: &Config) -> bool {
         let bounds = &config.parameter_bounds;
         let has = |part: u8| self.given & part != 0;
@@ -238,8 +240,8 @@ impl HostParameters {
             && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
     }
 
-    /// Returns `true` if the friction table of the joint with this index is within the bounds. Also returns `true` if friction tables are
-    /// not in use.
+    /// Returns `true` if the friction table of the joint with index `j` is within the bounds. Also returns `true` if the controller does
+    /// not use friction tables.
     pub(crate) fn table_fits(&self, j: usize, config: &Config) -> bool {
         let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
@@ -254,34 +256,34 @@ impl HostParameters {
         borne.then_some(()).ok_or(DataStatus::IncorrectValue)
     }
 
-    /// Runs one tick with torque after gains were received. Returns the gains of this tick while new gains are blended in. `held` means
-    /// that all joints have settled and no joint yields.
+    /// Executes one tick with torque after gains were received. During a blend to new gains, returns the gains of this tick. `held` is
+    /// `true` if all joints have settled and no joint yields.
     #[inline(never)]
     pub(crate) fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
         self.trial.step(held);
         self.trial.blended(&self.pid)
     }
 
-    /// Returns `true` if the joints of the present model have enough inertia for the gains, with the present settings.
+    /// Returns `true` if the joints of the present model have enough inertia for the present gains, with the settings in `config`.
     pub(crate) fn gains_are_borne(&self, config: &Config) -> bool {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
 
-    /// Returns `true` if the joints of the last checked model have too little inertia for the gains. That model may have been accepted or
-    /// refused.
+    /// Returns `true` if the joints of the last checked model have too little inertia for the gains. The controller may have accepted or
+    /// refused this model.
     #[cfg(test)]
     pub(crate) fn gains_were_too_much(&self, config: &Config) -> bool {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
     }
 
-    /// Uses gains that have passed [`check_pid`](Self::check_pid).
+    /// Uses `gains`, which have passed [`check_pid`](Self::check_pid).
     pub(crate) fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
         self.pid = *gains;
         self.receive(missing_parameter::PID);
     }
 
-    /// Computes the inertia of a model with these settings, one pose per slice (J-71). After that, refuses the model if the received gains
-    /// need more inertia, and calls `used` otherwise.
+    /// Computes the effective inertia of the joints of a model, with the settings in `config`, one pose per slice (J-71). After the last
+    /// pose, refuses the model if the received gains need more inertia, and calls `used` otherwise.
     fn look_at(
         &mut self,
         model: &ArmModel,
@@ -310,7 +312,7 @@ impl HostParameters {
         outcome.into()
     }
 
-    /// Computes the inertia of the model in use again, if other settings affect it (J-71).
+    /// Computes the inertia of the model in use again if the settings that affect this inertia have changed (J-71).
     pub(crate) fn look_again(
         &mut self,
         progress: SliceProgress,
@@ -325,7 +327,7 @@ impl HostParameters {
             return SliceOutcome::Done;
         }
         if self.missing() & missing_parameter::MODEL != 0 {
-            // The model is checked when the host sends the model again.
+            // The controller checks the model when the host sends the model again.
             self.felt = FeltInertia::NONE;
             return SliceOutcome::Done;
         }
@@ -333,7 +335,7 @@ impl HostParameters {
         self.look_at(&model, progress, config, |_| Ok(()))
     }
 
-    /// Checks and copies a model in slices. `at` contains the measured positions (rad) if all positions are known.
+    /// Checks and copies an arm model in slices. `at` contains the measured positions (rad) if the positions of all joints are known.
     pub(crate) fn set_model(
         &mut self,
         model: &ArmModel,
@@ -358,7 +360,8 @@ impl HostParameters {
         config: &Config,
     ) -> Result<(), DataStatus> {
         let dynamics = dynamics(model, config);
-        // Before all positions are known, the holding torque cannot be checked. The model is checked again when Init ends.
+        // Before all positions are known, the controller cannot check the torque that holds the arm. The controller checks the model again
+        // when Init ends.
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
             return Err(DataStatus::IncorrectValue);
         }
@@ -379,13 +382,13 @@ impl HostParameters {
         Ok(())
     }
 
-    /// Checks and copies the default tables, like received tables.
+    /// Checks and copies the default friction tables, like received tables.
     pub(crate) fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
         self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
     }
 
-    /// Checks or copies the table of one joint per tick. All tables are checked before the first table is copied, so that a refused table
-    /// does not change any value.
+    /// Checks or copies the friction table of one joint per tick. The controller checks all tables before it copies the first table, so a
+    /// refused table does not change the parameters.
     fn take_tables(
         &mut self,
         table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,
@@ -437,7 +440,7 @@ fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result
     Ok(())
 }
 
-/// Returns the dynamics of a model with the gravity and the payload in these settings.
+/// Returns the dynamics of a model with the gravity and the payload in `config`.
 #[inline(never)]
 fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
     Dynamics::with_payload(model, config.gravity, &config.payload)
@@ -446,7 +449,7 @@ fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
 /// Returns `true` if the torque limits suffice to hold an arm with these dynamics at `position` (rad) (J-06).
 fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
     let gravity = dynamics.gravity_torque(position);
-    // With this comparison, NaN counts as too much torque. An absent joint does not hold any load (J-53).
+    // With this comparison, a holding torque of NaN counts as too high. An absent joint holds no load (J-53).
     (0..JOINTS).all(|j| config.absent[j] || gravity[j].abs() <= config.joints[j].torque_max)
 }
 

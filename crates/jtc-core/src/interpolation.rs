@@ -1,9 +1,9 @@
-//! Computes the set values between two trajectory points (J-32).
+//! Computation of the set values between two trajectory points (J-32).
 //!
 //! Position, velocity and acceleration are interpolated separately. The position is the quintic polynomial through the positions,
 //! velocities and accelerations of both points. The velocity is the cubic polynomial through the velocities and accelerations of both
-//! points. The acceleration is a straight line. The velocity and the acceleration are not computed as derivatives, because derivatives of
-//! the int16 grid of the positions (96 µrad) would reach tens of rad/s².
+//! points. The acceleration is interpolated linearly between both points. Velocity and acceleration are not the derivatives of the
+//! position, because derivatives of the int16 grid of the positions (96 µrad) would reach tens of rad/s².
 use core::array::from_fn;
 
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
@@ -41,36 +41,38 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// Largest increase of a value between two points due to rounding, in rad and rad/s. This increase is too small to be relevant for any
-/// limit.
+/// Largest increase of a value between two points due to rounding, in rad and rad/s. An increase due to rounding is too small to matter for
+/// any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
-/// Returns a smooth value that rises from 0 to 1 with zero slope at both ends.
+/// Returns a value that rises smoothly from 0 to 1 for `u` from 0 to 1, with zero slope at both ends.
 pub(crate) fn smooth(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Weights of the samples of both points in position, velocity and acceleration at one time between the points (Hermite basis). The weights
-/// apply to all joints.
+/// Weights of the samples of both points in the position, velocity and acceleration at one time between the points (Hermite basis). The
+/// weights are the same for all joints.
 struct Weights {
-    /// Weights of the positions, the velocities and the accelerations in the position.
+    /// Weights of the positions, velocities and accelerations of both points in the interpolated position.
     position: [[f64; 2]; 3],
-    /// Weights of the velocities and the accelerations in the velocity.
+    /// Weights of the velocities and accelerations of both points in the interpolated velocity.
     velocity: [[f64; 2]; 2],
-    /// Weights of the accelerations in the acceleration.
+    /// Weights of the accelerations of both points in the interpolated acceleration.
     acceleration: [f64; 2],
 }
 
-/// Units of the samples, and the changes that one unit causes in a step. Units and changes are constant for a trajectory.
+/// Units of the samples, and the changes that one unit causes within a step between two points. The units and the changes are constant for
+/// a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
-    /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one unit.
+    /// Position (rad), velocity (rad/s) and acceleration (rad/s²) that one unit of a sample represents.
     position: f64,
     velocity: f64,
     acceleration: f64,
-    /// Changes in a step. `way` is the distance (rad) due to one unit of velocity, and `half_way` is half of the distance (rad) due to one
-    /// unit of acceleration. `change` is the change of the velocity (rad/s) due to one unit of acceleration.
+    /// Changes that one unit of a sample causes within a step between two points. `way` is the distance (rad) due to one unit of velocity,
+    /// and `half_way` is half of the distance (rad) due to one unit of acceleration. `change` is the change of the velocity (rad/s) due to
+    /// one unit of acceleration.
     way: f64,
     half_way: f64,
     change: f64,
@@ -106,7 +108,7 @@ impl Weights {
         }
     }
 
-    /// Interpolates position, velocity and acceleration between the samples of both points.
+    /// Interpolates position, velocity and acceleration between the samples `a` and `b`.
     #[inline(always)]
     fn between(&self, a: [f64; 3], b: [f64; 3]) -> (f64, f64, f64) {
         let of = |weights: &[f64; 2], channel: usize| weights[0] * a[channel] + weights[1] * b[channel];
@@ -119,10 +121,10 @@ impl Weights {
     }
 }
 
-/// The step between the points of a trajectory.
+/// Step between two points of a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
-    /// Length of the step in ms, and the reciprocal of the length.
+    /// Length of the step, ms, and reciprocal of the length.
     pub ms: u16,
     pub per_ms: f64,
     units: Units,
@@ -138,7 +140,7 @@ impl Step {
         Self { ms, per_ms: 1.0 / f64::from(ms), units }
     }
 
-    /// Writes the set values at the fraction `u` (0..1) between one point and the next to `out`.
+    /// Writes the set values at the fraction `u` (0..1) between the points `a` and `b` to `out`.
     #[inline(always)]
     pub(crate) fn between(&self, a: &RawPoint, b: &RawPoint, u: f64, out: &mut SetPoint) {
         let weights = Weights::at(u, &self.units);
@@ -160,8 +162,8 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Returns the derivative of the position (rad/s) at the time of [`interpolate`]. The derivative is the velocity of the cubic polynomial,
-/// plus the part due to the distance that the velocities of both points do not explain.
+/// Returns the derivative of the position (rad/s) at the same time as [`interpolate`]. The derivative of the position is the velocity of
+/// the cubic polynomial, plus a term for the distance that the velocities of both points do not explain.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {
@@ -224,7 +226,7 @@ mod tests {
             let knot = |t: f64| { let (p, v, a) = at(t); SetPoint { position: [p; 6], velocity: [v; 6], acceleration: [a; 6] } };
             let got = interpolate(&knot(0.0), &knot(h), h, u);
             prop_assert!((got.position[3] - at(u * h).0).abs() < 1e-12);
-            // Compares the velocity with a motion whose velocity is a cubic polynomial.
+            // The velocity of this motion is a cubic polynomial.
             let cubic = |t: f64| (c[1] + t * (c[2] + t * (c[3] + t * c[4])), c[2] + t * (2.0 * c[3] + t * 3.0 * c[4]));
             let knot = |t: f64| SetPoint { position: [0.0; 6], velocity: [cubic(t).0; 6], acceleration: [cubic(t).1; 6] };
             let got = interpolate(&knot(0.0), &knot(h), h, u);
@@ -232,8 +234,8 @@ mod tests {
             prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
         }
 
-        /// Points in the wire format give the result of the real numbers, except for a rounding error far below the tolerance of the
-        /// limits.
+        /// Points in the wire format give the same result as points with real numbers, except for a rounding error far below the tolerance
+        /// of the limits.
         #[test]
         fn j32_points_of_the_wire_are_interpolated_alike(
             (a, b) in (raw(), raw()), ms in prop::sample::select(&[1, 2, 7, 10, 100, u16::MAX][..]), u in 0.0..1.0f64,
@@ -241,7 +243,7 @@ mod tests {
             let wanted = interpolate(&SetPoint::from(&a), &SetPoint::from(&b), f64::from(ms) * 1e-3, u);
             let mut got = SetPoint::default();
             Step::new(ms).between(&a, &b, u, &mut got);
-            // In a step of one minute, the values between the points differ greatly from the values at both ends of the step.
+            // In a step of one minute, the set values between the points differ greatly from the set values at both points.
             let rounding = 0.01 * ROUNDING * (1.0 + f64::from(ms) * 1e-3).powi(2);
             for j in 0..JOINTS {
                 prop_assert!((got.position[j] - wanted.position[j]).abs() < rounding);
@@ -250,7 +252,8 @@ mod tests {
             }
         }
 
-        /// At a trajectory point, the result is identical to the point in every bit. A point at rest gives zero velocity and acceleration.
+        /// At a trajectory point, the interpolated set values are equal to the point in every bit. At a point at rest, the set velocity and
+        /// the set acceleration are zero.
         #[test]
         fn j32_points_of_the_wire_are_met(a in raw(), b in raw(), ms in 1..=u16::MAX) {
             let (step, mut at) = (Step::new(ms), SetPoint::default());
@@ -260,7 +263,7 @@ mod tests {
             prop_assert_eq!(at, SetPoint::from(&b));
         }
 
-        /// The computed position speed equals the derivative of the position.
+        /// The result of `position_speed` is equal to the derivative of the position.
         #[test]
         fn j32_the_speed_of_the_position_is_its_slope(a in point(), b in point(), h in 0.01..0.5f64, u in 0.01..0.99f64) {
             let at = |u| interpolate(&a, &b, h, u).position[2];

@@ -7,7 +7,7 @@ use crate::bit_codec::bit_codec;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LastStop {
     pub(crate) cause: StopCause,
-    /// Tick in which the stop began; 0 without a stop.
+    /// Tick in which the held stop began; 0 if no held stop is stored.
     pub(crate) tick: u64,
 }
 

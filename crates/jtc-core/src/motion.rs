@@ -1,4 +1,4 @@
-//! Motion of the arm (J-40 to J-44): set values, the control law, and the limits of the control law.
+//! Motion of the arm (J-40 to J-44): set values, control law and limiter.
 //!
 //! Each part has its own state and runs one step per tick. [`Motion`] connects the parts, and applies a change of the controller's state to
 //! all of them.
@@ -50,7 +50,7 @@ pub(crate) use torque::JointTorque;
 #[cfg(test)]
 pub(crate) type Ramp = PathRamp;
 
-/// Time in which joints without a contact find their loads, ms.
+/// Time within which the controller learns the loads of joints, if nothing touches the arm, ms.
 const KNOWN_MS: u32 = 2_000;
 
 /// State of all parts of the motion.
@@ -67,8 +67,8 @@ pub(crate) struct Motion {
 bit_codec!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
-    /// Turns the torque off, so that no joint is held and no torque is stored. Each part is reset in place, because a new part would be
-    /// built on the stack and copied.
+    /// Switches the torque off. After the torque was switched off, no joint is held, and no torque is stored. Each part is reset in place,
+    /// because a new value would be built on the stack and copied.
     pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
@@ -79,8 +79,8 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia is taken from the
-    /// ramp.
+    /// Makes the joints in `yields` yield from the next tick on (J-68), and the joints in `lowers` lower their loads (J-70). The function
+    /// takes the inertia of the arm from the ramp.
     pub(crate) fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
@@ -104,7 +104,7 @@ impl Motion {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Returns two values for each joint: `true` if the joint is at its torque limit, and `true` if its position error is above half of the
+    /// Returns two flags for each joint: `true` if the joint is at its torque limit, and `true` if its position error is above half of the
     /// maximum.
     pub(crate) fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let (due, q) = (self.set.due(config), nodes.positions());
@@ -112,9 +112,9 @@ impl Motion {
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may press on the arm, and the
-    /// controller does not wait for the end of this pressure. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the controller
-    /// does not wait for the loads either.
+    /// Returns `true` if the arm is held at rest and the loads of its joints are known. In a held stop, a `contact` may press on the arm,
+    /// and the controller does not wait for the end of this contact. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the
+    /// controller does not wait for the loads either.
     pub(crate) fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
@@ -122,15 +122,15 @@ impl Motion {
             && (overdue || self.law.knows_loads(&self.set.holding, config, contact))
     }
 
-    /// Runs one tick of Teaching. Updates the inertia for a ramp, because Teaching may end during a motion.
+    /// Executes one tick of Teaching. Updates the inertia for a ramp of path time, because Teaching may end during a motion.
     pub(crate) fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
             self.ramp.begin(nodes, config, dynamics);
         }
     }
 
-    /// Ends Teaching. The arm comes to rest and is held, and the integral takes over the load that Teaching carried. Moving joints stop
-    /// within `ramp_ms`. If the torque limits require it, they take longer, up to `stop_ms` (J-33).
+    /// Ends Teaching. The arm comes to rest and is held, and the integral continues the torque that Teaching used for the load. Moving
+    /// joints stop within `ramp_ms`. If the torque limits require it, these joints take longer, up to `stop_ms` (J-33).
     pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let mut length_ms = f64::from(config.ramp_ms);
         if nodes.velocities().iter().any(|v| moves(*v)) {
@@ -148,7 +148,7 @@ impl Motion {
         self.law.latch(&latched);
     }
 
-    /// Runs one tick of HoldPos, which is a tick of the position hold or of a jog.
+    /// Executes one tick in HoldPos, which is a tick of the position hold or of a jog.
     pub(crate) fn hold(&mut self, config: &Config) {
         let Self { set, law, ramp, .. } = self;
         if set.jogging() {
@@ -158,7 +158,8 @@ impl Motion {
         }
     }
 
-    /// Runs one tick on the path or during the approach. `at` contains the set values for full speed at the time of the clock (J-33).
+    /// Executes one tick on the path or during the approach. `at` contains the set values at the time of the `clock`, for full speed
+    /// (J-33).
     pub(crate) fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);
@@ -168,8 +169,8 @@ impl Motion {
         self.set.follow(at, clock.rate, clock.slope);
     }
 
-    /// Runs one tick of the control law and of the limits. Returns the torques to command and the findings of the limits.
-    // A single function does the work of every tick, because calls of inner functions would copy the torques repeatedly.
+    /// Executes one tick of the control law and of the limiter. Returns the torques to command and the findings of the limiter.
+    // A single function does the work of every tick, because calls of inner functions would copy the torques several times.
     #[inline(never)]
     pub(crate) fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();

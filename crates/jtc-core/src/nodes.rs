@@ -24,7 +24,7 @@ use speed_check::SpeedCheck;
 pub(crate) const GRIPPER: usize = 6;
 /// CAN flag of the gripper's receive timeout.
 const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
-/// Highest number of frames that one tick reads.
+/// Highest number of bus frames that the controller reads in one tick.
 pub(crate) const FRAMES_MAX: usize = 32;
 
 /// State of all nodes, and of the frames that the controller sends to the nodes.
@@ -35,24 +35,24 @@ pub(crate) struct Nodes {
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
     gripper: bool,
-    /// At least one joint is marked as absent (J-53).
+    /// `true` if at least one joint is marked as absent (J-53).
     some_absent: bool,
     gripper_lost: bool,
     /// Number of ticks for which every joint has been slow enough to be enabled (J-16).
     still_ms: u16,
-    /// Number of ticks in which the drives must still rest after the torque was removed.
+    /// Remaining number of ticks in which the drives must rest after the torque was switched off.
     rest_ms: u16,
-    /// Torque was requested in the last tick.
+    /// `true` if torque was requested in the last tick.
     powered: bool,
-    /// Measured state of the gripper.
+    /// Measured state of the gripper: its pump and its two pressure signals.
     pub pump: bool,
     pub pressure: [bool; 2],
-    /// Number of ignored frames (J-15).
+    /// Number of frames that the controller has ignored (J-15).
     pub ignored: u32,
     /// Number of consecutive Moves without acknowledgement.
     unacknowledged: u8,
     sent_move: bool,
-    /// Number of Moves since the last frame that replaced a Move.
+    /// Number of Moves since the last frame that the controller sent instead of a Move.
     moves: u8,
     configured_last: bool,
     /// Check that compares the positions and speeds of the drives (J-35).
@@ -83,7 +83,7 @@ bit_codec!(Nodes {
 });
 
 impl Nodes {
-    /// Creates the nodes. Each node must be reset once (J-20).
+    /// Creates the nodes in their state at the start of the controller. The controller must reset each node once (J-20).
     pub(crate) fn new(config: &Config) -> Self {
         let mut node = Node::default();
         node.restart(config);
@@ -132,7 +132,7 @@ impl Nodes {
         self
     }
 
-    /// Returns the number of configured nodes, with or without the gripper.
+    /// Returns the number of configured nodes, including the gripper if the arm has one.
     fn present(&self) -> usize {
         if self.gripper { NODES } else { JOINTS }
     }
@@ -155,14 +155,14 @@ impl Nodes {
         self.gripper_node().is_some_and(|node| node.silent < config.missed_moves_max)
     }
 
-    /// Returns `true` if the gripper is enabled and, according to the configuration, keeps holding its part when the arm loses its torque.
+    /// Returns `true` if the gripper is enabled and, according to the settings, keeps its workpiece when the arm loses its torque.
     pub(crate) fn gripper_keeps_part(&self, config: &Config) -> bool {
         !config.pump_off_on_error
             && self.gripper_node().is_some_and(|node| node.report.state == NodeState::ENABLED)
     }
 
     /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick. A pump that was commanded earlier does
-    /// not start again by itself (J-23).
+    /// not start again without a new command (J-23).
     pub(crate) fn gripper_lost(&self) -> bool {
         self.gripper_lost
     }
@@ -173,7 +173,8 @@ impl Nodes {
     }
 
     pub(crate) fn node(&self, n: usize) -> &Node {
-        // The index comes from this crate. If the index were out of range, node 0 would be returned instead of a panic.
+        // The node index always comes from this crate and is valid. If the index were out of range, the function would return node 0 and
+        // not panic.
         self.nodes.get(n).unwrap_or(&self.nodes[0])
     }
 
@@ -188,18 +189,18 @@ impl Nodes {
         (!self.fallen_back()).then_some(&self.position)
     }
 
-    /// Returns a mask of the joints whose encoders were found to disagree in this tick (J-35).
+    /// Returns a mask of the joints whose two encoders were found to disagree in this tick (J-35).
     pub(crate) fn misfits(&self) -> u8 {
         self.misfits
     }
 
-    /// Returns the disagreement of the two encoders of a joint that was found since its drive was configured (J-35). The value is the size
-    /// of a jump (rad) or the factor of a speed.
+    /// Returns the disagreement of the two encoders of a joint since its drive was configured (J-35). The second element is the size of a
+    /// jump (rad) or the factor of a speed.
     pub(crate) fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
         self.node(joint).measured.misfit()
     }
 
-    /// Returns a mask of the joints whose encoders disagree. A joint stays in this mask until its drive is configured again (J-35).
+    /// Returns a mask of the joints whose two encoders disagree. A joint stays in this mask until its drive is configured again (J-35).
     pub(crate) fn untrusted(&self) -> u8 {
         (0..JOINTS).fold(0, |mask, j| mask | u8::from(self.misfit(j).is_some()) << j)
     }
@@ -211,7 +212,8 @@ impl Nodes {
 
     /// Processes the frames that the bus has received since the last tick. `commanded` contains the set values of the last ticks.
     pub(crate) fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
-        // Masks of nodes. If a configuration is accepted in this tick, the answer to the next Move comes in a later tick.
+        // `answered` and `configured_before` are masks of nodes. If a node accepts its configuration in this tick, its answer to the next
+        // Move comes in a later tick.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         if self.some_absent {
             self.nodes.iter_mut().for_each(|node| node.unasked = None);
@@ -247,8 +249,8 @@ impl Nodes {
                         node.refused = !accepted;
                     }
                 }
-                // Depending on the drive, the byte of this answer is the state before or after the change. Therefore only Move answers set
-                // the state.
+                // Depending on the drive, the state in this answer is the state before or after the change. Therefore the controller takes
+                // the state of a node only from Move answers.
                 Ok(Answer::State { .. }) => {}
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
@@ -267,7 +269,7 @@ impl Nodes {
         }
     }
 
-    /// Sets the substitutes of the joints that are marked as absent, and detects drives of such joints that still answer (J-53).
+    /// Replaces the state of absent joints by a fixed state, and detects drives of absent joints that still answer (J-53).
     #[inline(never)]
     fn stand_in(&mut self, config: &Config) {
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
@@ -288,14 +290,14 @@ impl Nodes {
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
-            // When the position becomes valid, it may have any value.
+            // When the position becomes valid, it may differ from earlier positions by any distance.
             node.measured.forget();
         }
         node.report = *report;
         node.seen = true;
         if node.starting() {
             if !before.is_starting() || report.state == NodeState::START {
-                // The node has fallen back to Start or Init, so its configuration is lost and must be accepted again.
+                // The node has changed back to Start or Init, so it has lost its configuration and must accept a configuration again.
                 node.lose_configuration();
             }
             if report.state != NodeState::START_TO_INIT {
@@ -356,13 +358,13 @@ impl Nodes {
         usable
     }
 
-    /// Returns `true` if joints may be enabled, because the arm is at rest or slow and the drives have rested (J-16).
+    /// Returns `true` if joints may be enabled, because the arm is slow enough and the drives have rested (J-16).
     fn may_enable(&self, config: &Config) -> bool {
         self.still_ms >= config.enable_still_ms && self.rest_ms == 0
     }
 
-    /// Returns the node init word. Bit n is set while node n is not initialised. The bit of the gripper is also set if the gripper does not
-    /// answer.
+    /// Returns the node init word of the status. Bit n is set while node n is not initialised. The bit of the gripper is also set if the
+    /// gripper does not answer.
     pub(crate) fn init_word(&self, config: &Config) -> u8 {
         let mut word = 0;
         for (n, node) in self.all().iter().enumerate() {
@@ -375,13 +377,13 @@ impl Nodes {
         word
     }
 
-    /// Returns `true` if a joint has lost its configuration or fallen back to Start or Init (J-20).
+    /// Returns `true` if a joint has lost its configuration or changed back to Start or Init (J-20).
     pub(crate) fn fallen_back(&self) -> bool {
         self.joints().iter().any(Node::fallen_back)
     }
 
-    /// Returns `true` when Init is completed, so that every node is initialised and reports ReadyToOperate. A gripper that keeps holding
-    /// its part stays enabled.
+    /// Returns `true` when Init is completed: every node is initialised and reports ReadyToOperate. A gripper that keeps its workpiece
+    /// stays enabled instead.
     pub(crate) fn all_ready(&self, config: &Config) -> bool {
         let ready = |node: &Node| node.report.state == NodeState::READY;
         self.init_word(config) == 0
@@ -389,9 +391,9 @@ impl Nodes {
             && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))
     }
 
-    /// Executes ClearCurrentErrors for the nodes in `mask`. Nodes with an error to clear are commanded to Init until the nodes follow. An
-    /// error that is only in the word of occurred errors is not a reason to drop the arm, so this error is cleared only while the torque is
-    /// off. Returns `true` if any node has an error to clear.
+    /// Executes ClearCurrentErrors for the nodes in `mask`. The controller requests Init from the nodes with an error until these nodes
+    /// report Init. An error that is only in the word of occurred errors is not a reason to switch the torque off. Such an error is
+    /// therefore cleared only while the torque is off. Returns `true` if any node has an error to clear.
     pub(crate) fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;
@@ -415,8 +417,8 @@ impl Nodes {
 }
 
 impl Nodes {
-    /// Applies new settings, in a state without torque. Returns `true` if the changed settings must be sent to the nodes, which are then
-    /// configured again.
+    /// Applies new settings, in a state without torque. Returns `true` if the changed settings must be sent to the nodes. The controller
+    /// then configures these nodes again.
     pub(crate) fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
         self.some_absent = config.absent.contains(&true);
@@ -428,7 +430,7 @@ impl Nodes {
                 node.stand_in();
                 (self.position[j], self.velocity[j]) = (config.absent_position[j], 0.0);
             } else if before.absent[j] {
-                // The joint is brought up like any other joint.
+                // A joint that was absent before is brought up like any other joint.
                 node.restart(config);
             }
         }

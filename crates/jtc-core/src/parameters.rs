@@ -35,17 +35,17 @@ pub struct TableOf<T> {
 pub enum Friction {
     /// Coefficients c0..c5 of each joint, in ascending order. With c4 = 0 the torque does not depend on the temperature.
     Polynomial([[f64; 6]; JOINTS]),
-    /// One friction table for each joint.
+    /// A friction table for each joint.
     Table([TableOf<f32>; JOINTS]),
 }
 
 /// Parameters from the host, or the default parameters (section 7).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
-    /// Kinematics and masses.
+    /// Kinematics and masses of the arm.
     pub model: ArmModel,
     /// Gains of each joint.
     pub pid: [PidGains; JOINTS],
-    /// Friction compensation.
+    /// Friction compensation of each joint.
     pub friction: Friction,
 }

@@ -1,14 +1,14 @@
-//! Reactions of the controller to findings about a joint while the controller can still act, instead of a removal of the torque (J-66).
+//! Reactions of the controller to findings about a joint (J-66), for cases in which the controller need not switch the torque off.
 //!
 //! | finding | reaction |
 //! |---|---|
 //! | a torque of NaN; an overloaded joint if `torque_reaction` is 1 | release: the torque of all joints becomes zero (J-21) |
-//! | any other finding in Teaching | none: Teaching adds a bounded torque, and a joint that is led too fast ends it (J-25) |
+//! | any other finding in Teaching | none: Teaching adds a bounded torque, and ends if a hand moves a joint too fast (J-25) |
 //! | an unstable loop: torque jumping between limits, or a growing swing | earlier or softer gains are used; the joint yields (J-68) |
 //! | the same joint is unstable again within 500 ms | release |
 //! | an overloaded joint that has not settled since it was enabled | the joint lowers its load (J-70) |
-//! | a joint that is pushed, or overloaded by its feedback torque; a position error | the joint yields (J-68), the others stop |
-//! | any other overloaded joint, on the path or the approach | path time is held back (J-75); if that does not help, the arm stops |
+//! | a joint that is pushed, or overloaded by its feedback torque; a position error | the joint yields (J-68), the other joints stop |
+//! | any other overloaded joint, on the path or the approach | path time is held back (J-75); if the overload continues, the arm stops |
 //! | any other overloaded joint, in a jog | the jog ends (J-33) |
 //! | any other overloaded joint, at rest, or still moving at the end of the time for a stop | the joint lowers its load |
 //! | a set value outside a limit of the path | the arm stops on its path, or its jog ends |
@@ -28,7 +28,7 @@ use crate::{JOINTS, TrajectoryState, joint_error};
 const PATH: u16 =
     joint_error::POSITION | joint_error::VELOCITY | joint_error::ACCELERATION | joint_error::FRICTION_TABLE;
 
-/// Reaction of the controller.
+/// Reaction of the controller to the findings about a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reaction {
     /// The torque of all joints becomes zero.
@@ -37,11 +37,11 @@ enum Reaction {
     Yield,
     /// The joint lowers its load.
     Lower,
-    /// The arm stops if a motion is commanded.
+    /// The arm stops if it executes a commanded motion.
     Stop,
 }
 
-/// Returns the reaction to the findings of a joint, the cause of the reaction, and the joint errors of this cause. `again` means that the
+/// Returns the reaction to the findings of a joint, the cause of the reaction, and the joint errors of this cause. `again` is `true` if the
 /// joint was already unstable shortly before.
 fn reaction(
     found: &Found,
@@ -62,7 +62,7 @@ fn reaction(
     } else if overloaded && !settled {
         Some((Reaction::Lower, StopKind::Overload, torque))
     } else if (pushed && !releases) || (overloaded && strained) {
-        // A push appears in the feedback torque of the joint, or only in the joint speed.
+        // A push is visible in the feedback torque of the joint, or only in the speed of the joint.
         Some((Reaction::Yield, if strained { StopKind::Push } else { StopKind::Shove }, torque))
     } else if errors & joint_error::POSITION_ERROR != 0 {
         Some((Reaction::Yield, StopKind::PositionError, joint_error::POSITION_ERROR))
@@ -80,7 +80,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
         let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
-        // Masks of the joints that fail with their gains, and of the failed joints with unstable loops (J-71).
+        // Masks of the joints that fail with their gains, and of the failed joints with unstable control loops (J-71).
         let (mut failed, mut unstable) = (0u8, 0u8);
         // With a loop over the index, the compiler can see that the index is in range.
         for j in 0..JOINTS {
@@ -118,7 +118,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.hold_stop(&causes, kind);
         }
         if yields != lowers {
-            // If a stop has just begun, the inertia is already computed. One tick has time for the computation of one mass matrix.
+            // If a stop has just begun, the inertia of the arm is already computed. A tick has time for the computation of a single mass
+            // matrix.
             if self.braking_ms == before {
                 self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
             }
@@ -127,15 +128,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         release
     }
 
-    /// Uses gains that the controller has chosen. These are the gains before a failed trial, or softer gains (J-66, J-71).
+    /// Replaces the gains by gains that the controller has chosen. The controller chooses the gains before a failed trial, or softer gains
+    /// (J-66, J-71).
     fn use_other_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.parameters.pid = *gains;
         self.motion.change_gains(gains);
         self.extensions.forget_hash();
     }
 
-    /// Ends a trial when the arm is not held any more. Gains on trial have not held the arm long enough, so the arm is not enabled again
-    /// with these gains.
+    /// Ends a trial of gains when the controller stops holding the arm. Gains on trial have not held the arm long enough, so the controller
+    /// does not enable the arm again with these gains.
     pub(crate) fn end_trial(&mut self) {
         let Some(gains) = self.parameters.trial.end() else { return };
         self.parameters.pid = gains;
@@ -143,7 +145,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.keep_cause(StopCause { kind: StopKind::Gains, ..StopCause::default() });
     }
 
-    /// Returns `true` if the controller is still reacting, so that the cause must not be cleared yet (J-69).
+    /// Returns `true` if the controller is still reacting to a finding, so that the host must not clear the cause yet (J-69).
     pub(crate) fn is_reacting(&self) -> bool {
         let moves = self.trajectory == TrajectoryState::Execute || self.motion.set.jogging();
         self.motion.law.is_yielding() || (self.errors.held_stop() && (moves || self.motion.set.is_led()))
@@ -213,7 +215,8 @@ mod tests {
             let taught = reaction(&found, ControlMode::Teach, false, false);
             assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
-            // With the reaction in the manual, an overload alone releases the arm. Before the overload, the torque does not count as a push.
+            // With the reaction in the manual, every overload releases the arm. Before a joint is overloaded, its feedback torque does not
+            // count as a push.
             let released = reaction(&found, mode, true, false);
             if found.overloaded {
                 assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");

@@ -1,14 +1,14 @@
-//! Flight recorder (J-56), which stores the last seconds before an error, tick by tick, in memory that survives a reset.
+//! Flight recorder (J-56): stores the last seconds before an error, tick by tick, in memory that survives a reset.
 //!
 //! The recorder stores the *inputs* of each tick, usually in eight words, and a check value of the *outputs* of each tick. Every
 //! [`SNAPSHOT_MS`], the recorder stores a *snapshot* of the controller state. A [`Replay`] of the log through the controller reproduces all
-//! computed values: commanded and measured motion, the parts of the torques, states, and errors. The arm and the points of the trajectory
-//! are identified by their hashes.
+//! computed values: commanded and measured motion, the parts of the torques, states, and errors. A log identifies the arm and the points of
+//! the trajectory by their hashes.
 //!
 //! A log *stops* [`AFTER_ERROR_MS`] after the first error and stays in memory until a command clears the log. [`Recorder::record`] executes
-//! the commands that clear and read the log. The log is also kept if the device was reset because of a failure. A log in which the
-//! controller never had torque is replaced by a new log when the torque is switched on. So an error at the start of a day does not replace
-//! a relevant error.
+//! the commands that clear and read the log. The log also stays in memory if the device was reset because of a failure. If the controller
+//! never had torque during a log, the recorder replaces this log by a new log when the torque is switched on. An error before the first
+//! torque of a day therefore does not keep the recorder from recording a later error.
 mod block;
 mod inputs;
 mod memory;
@@ -48,10 +48,12 @@ pub const SNAPSHOT_MS: u16 = 500;
 pub const AFTER_ERROR_MS: u16 = 300;
 /// Number of ticks from one snapshot to the next, if a replay cannot repeat an input between the two snapshots.
 const EARLY_SNAPSHOT_MS: u16 = 250;
-/// Number of ticks for which recording pauses after the request for a page, so that the block that is being read is not overwritten.
+/// Number of ticks for which recording pauses after a host has requested a page, so that the recorder does not overwrite the block that is
+/// being read.
 const HELD_MS: u16 = 2_000;
 
-/// The recorder. `P` is a piece of its memory: blocks that keep their contents during a reset and are not cached.
+/// Flight recorder of a controller. `P` is a piece of the recorder's memory: blocks that keep their contents during a reset and are not
+/// cached.
 ///
 /// The board creates a recorder at its start, for any content of the memory, and calls [`record`](Self::record) after every tick.
 pub struct Recorder<P, const N: usize> {
@@ -60,19 +62,19 @@ pub struct Recorder<P, const N: usize> {
     /// Check value of the outputs since the last snapshot.
     chain: u32,
     since_snapshot: u16,
-    /// A replay cannot repeat an input since the last snapshot, so a snapshot is due earlier.
+    /// `true` if a replay cannot repeat an input since the last snapshot, so that the next snapshot is due earlier.
     uncertain: bool,
-    /// An error was latched in the last tick.
+    /// `true` if an error was latched in the last tick.
     was_in_error: bool,
     /// Number of ticks until the log stops.
     stops_in: Option<u16>,
-    /// Number of ticks for which recording still pauses.
+    /// Remaining number of ticks for which recording pauses.
     held: u16,
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
-    /// Creates a recorder with this memory. A log in the memory is kept if the log had stopped, or if the device was reset because it
-    /// `failed`. Otherwise a new log begins.
+    /// Creates a recorder with these `pieces` of memory. The recorder keeps a log in the memory if this log had stopped, or if the device
+    /// was reset because it `failed`. In all other cases, a new log begins.
     pub fn new(pieces: [P; N], failed: bool) -> Self {
         let mut writer = Writer::new(pieces);
         if writer.state == LogState::Recording {
@@ -94,12 +96,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         }
     }
 
-    /// Returns the memory, for the recorder after a reset.
+    /// Returns the memory of the recorder. A simulation or a test creates the recorder after a reset from this memory.
     pub fn into_memory(self) -> [P; N] {
         self.writer.into_memory()
     }
 
-    /// Returns the present memory.
+    /// Returns the memory of the recorder.
     pub fn memory(&self) -> &[P; N] {
         self.writer.memory()
     }
@@ -110,13 +112,14 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         (oldest..end).filter_map(|block| self.writer.block(block))
     }
 
-    /// Returns the state of the recorder, or the reason why it stopped.
+    /// Returns the state of the recorder, which contains the reason if the recorder has stopped.
     pub fn state(&self) -> LogState {
         self.writer.state
     }
 
-    /// Records a tick that the controller has just executed, and executes the requests of hosts to the recorder. The board calls this after
-    /// every tick. A call takes some hundred instructions. Every [`SNAPSHOT_MS`], a call takes some ten thousand instructions.
+    /// Records a tick that the controller has just executed, and executes the requests of hosts to the recorder. The board calls this
+    /// function after every tick. A call usually takes some hundred instructions. Every [`SNAPSHOT_MS`], a call writes a snapshot and takes
+    /// some ten thousand instructions.
     #[inline(never)]
     pub fn record<M>(&mut self, controller: &mut Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
     where
@@ -139,7 +142,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         controller.extensions.log = self.writer.state;
     }
 
-    /// Records one tick of a log that continues.
+    /// Records one tick in a log that has not stopped.
     fn take<M>(
         &mut self,
         controller: &Controller<M>,
@@ -165,7 +168,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.begin();
             self.snapshot(controller);
         } else if self.writer.is_empty() {
-            // The hash of the arm is available some ticks after the start.
+            // The hash of the arm is known only some ticks after the start of the device.
             if controller.extensions.hash.is_none() && !new_error {
                 return;
             }
@@ -195,8 +198,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         self.uncertain |= !self.reference.write(inputs, outputs.host_done, check, &mut self.writer);
         self.since_snapshot += 1;
         let due = if self.uncertain { EARLY_SNAPSHOT_MS } else { SNAPSHOT_MS };
-        // While the parameters of the arm change, the hash of the arm is not available. This time is short, unless a host sends parameters
-        // again and again.
+        // While the parameters of the arm change, the hash of the arm is not known. The parameters change only for a short time, unless a
+        // host sends parameters again and again.
         let named = controller.extensions.hash.is_some() || self.since_snapshot >= 2 * SNAPSHOT_MS;
         if self.since_snapshot >= due && named {
             self.snapshot(controller);
@@ -217,7 +220,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         (self.since_snapshot, self.uncertain) = (0, false);
     }
 
-    /// Discards the log and begins a new one, as after a ClearLog.
+    /// Discards the log and begins a new log, as after a ClearLog.
     pub fn clear(&mut self) {
         self.writer.clear();
         (self.stops_in, self.held) = (None, 0);
@@ -233,11 +236,11 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         };
         let reads = block != LOG_NO_BLOCK && !self.writer.is_empty();
         if self.writer.state == LogState::Recording && self.stops_in.is_none() && reads {
-            // The ticks after an error are more important, so recording does not pause then.
+            // After an error, recording does not pause, because the ticks after the error are more important than the page.
             self.held = HELD_MS;
         }
         let (oldest, end) = self.writer.range();
-        // Blocks that no longer exist are skipped.
+        // If a host requests a block that no longer exists, the host gets the oldest block.
         let (block, offset) = if block < oldest { (oldest, 0) } else { (block, offset) };
         let mut bytes = [0; LOG_PAGE];
         let read = self.writer.read(block, usize::from(offset) & !3, &mut bytes);
@@ -266,7 +269,7 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     let Some(frame) = &outputs.bus else { return hash };
     let hash = mix(hash, frame.id.into());
     match frame.data().first_chunk::<16>() {
-        // For a Move, all torques and the state of the pump are added.
+        // For a Move, all torques and the command of the pump are added to the check value.
         Some(bytes) => {
             bytes.as_chunks::<4>().0.iter().fold(hash, |hash, word| mix(hash, u32::from_le_bytes(*word)))
         }
@@ -274,8 +277,8 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     }
 }
 
-/// Returns the part of the check value that is recorded. A part is sufficient, because each check value covers all earlier ticks since the
-/// snapshot.
+/// Returns the bits of the check value that the log contains. A part of the check value is sufficient, because each check value covers all
+/// earlier ticks since the snapshot.
 fn check(chain: u32) -> u16 {
     (chain >> 16) as u16
 }

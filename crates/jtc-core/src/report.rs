@@ -11,8 +11,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observed = Observed { tick: self.observed.tick + 1, torque: *torque };
     }
 
-    /// Returns the values that the last tick computed. The tick does not collect these values, because a board needs only a few of the
-    /// values.
+    /// Returns the values that the last tick computed. The tick does not collect all these values, because a board needs only a few of
+    /// them.
     #[inline]
     pub fn telemetry(&self) -> Telemetry {
         Telemetry {
@@ -27,7 +27,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns the index of the current 1 ms point.
+    /// Returns the index of the present point of the trajectory, in a grid of 1 ms.
     fn point(&self) -> u32 {
         self.clock.time as u32
     }
@@ -56,10 +56,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns `true` if a JtcStatus is due. A status is due at once for a response, and otherwise once per period (J-04).
+    /// Returns `true` if a JtcStatus is due. If a response record waits, a status is due at once. Without a waiting record, a status is due
+    /// once per period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        // The result is also computed while the line is busy, so that every tick does the same work.
+        // The function makes the same computation while the line is busy, because every tick must do the same work.
         let wanted = !self.records.is_empty() | (self.since_status_ms >= self.config.status_period_ms);
         let due = wanted && free;
         if due {
@@ -68,7 +69,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         due
     }
 
-    /// Returns the status that a JtcStatus would report now, without a record.
+    /// Returns the status that a JtcStatus would report now, without a response record.
     pub fn current_status(&self) -> Status {
         self.status(Response::NONE)
     }

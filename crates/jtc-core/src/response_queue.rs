@@ -1,7 +1,7 @@
-//! Queues of the response records that wait for their status frames (J-04), one queue for each host line.
+//! Queues of the response records that wait for a status frame (J-04), one queue for each host line.
 use jtc_wire::Response;
 
-/// Highest number of records that wait on a line. Up to this number no record is lost.
+/// Highest number of response records that can wait on a line. No record is lost until this number is exceeded.
 pub const RECORDS_MAX: usize = 64;
 /// Number of host lines.
 pub const HOST_LINES: usize = 2;
@@ -12,7 +12,7 @@ struct ResponseQueue {
     ring: [Response; RECORDS_MAX],
     first: usize,
     len: usize,
-    /// Index of the single record for all noise, counted from the oldest record.
+    /// Index of the single response record for noise, counted from the oldest record.
     noise: Option<usize>,
 }
 
@@ -25,11 +25,12 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Appends a record. Returns `false` if a record is dropped. This is the record of noise if the queue contains one, otherwise the
-    /// oldest record.
+    /// Appends a response record to the queue. Returns `false` if the queue was full, so that a record is lost. If the queue contains a
+    /// record for noise, the queue drops this record. Otherwise, the queue drops a new record for noise, and drops the oldest record for
+    /// any other new record.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
-            // The waiting record of noise also represents this noise.
+            // The record for noise that already waits also represents the new noise.
             return true;
         }
         let full = self.len == RECORDS_MAX;
@@ -62,17 +63,17 @@ impl ResponseQueue {
         let response = *self.slot(0);
         self.first = (self.first + 1) % RECORDS_MAX;
         self.len -= 1;
-        // The record of noise moves forward by one position, or was removed.
+        // The record for noise moves forward by one position, or was removed.
         self.noise = self.noise.and_then(|place| place.checked_sub(1));
         Some(response)
     }
 }
 
-/// Response records of all lines. A full queue does not drop records of another line.
+/// Queues of the response records of all lines. A full queue does not drop records of another line.
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseQueues {
     lines: [ResponseQueue; HOST_LINES],
-    /// Line that is served next.
+    /// Index of the line whose record is sent next.
     turn: usize,
     lost: u32,
 }
@@ -82,23 +83,23 @@ impl ResponseQueues {
         Self { lines: [const { ResponseQueue::new() }; HOST_LINES], turn: 0, lost: 0 }
     }
 
-    /// Returns `true` if no record waits.
+    /// Returns `true` if no response record waits.
     pub(crate) fn is_empty(&self) -> bool {
         self.lines.iter().all(|queue| queue.len == 0)
     }
 
-    /// Returns the number of records lost since the start because too many were waiting.
+    /// Returns the number of response records that were lost since the start because too many records were waiting.
     pub(crate) fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// Adds a record for `line`. `noise` means that the received bytes are not a frame.
+    /// Adds a response record for `line`. `noise` is `true` if the received bytes are not a frame.
     pub(crate) fn push(&mut self, line: usize, response: Response, noise: bool) {
         let kept = self.lines.get_mut(line).is_some_and(|queue| queue.push(response, noise));
         self.lost = self.lost.saturating_add(u32::from(!kept));
     }
 
-    /// Returns the oldest record of a line, and the number of the line. The lines are served in turn.
+    /// Returns the index of a line and its oldest response record. The lines take turns if several lines have a record.
     pub(crate) fn pop(&mut self) -> Option<(usize, Response)> {
         for _ in 0..HOST_LINES {
             let line = self.turn;
@@ -161,7 +162,7 @@ mod tests {
         assert_eq!(left.iter().filter(|(_, record)| *record == NOISE).count(), 2, "one a line");
         assert_eq!(left[0], (0, NOISE));
         assert_eq!((records.lost(), left.len()), (0, 7));
-        // The next noise gets a new record.
+        // The previous record for noise was sent, so the next noise gets a new record.
         records.push(0, good(9), false);
         records.push(0, NOISE, true);
         assert_eq!(all(&mut records), [(0, good(9)), (0, NOISE)]);
@@ -174,13 +175,13 @@ mod tests {
         records.push(0, NOISE, true);
         records.push(0, good(63), false);
         assert_eq!(records.lost(), 1);
-        // Now 64 records of frames wait, so noise is not queued.
+        // Now 64 records of frames wait, so the queue does not accept a record for noise.
         records.push(0, NOISE, true);
         assert_eq!(records.lost(), 2);
         assert_eq!(all(&mut records), (0..64).map(|n| (0, good(n))).collect::<Vec<_>>());
     }
 
-    /// The index must not grow without a limit, because it would overflow.
+    /// The index of the ring must not grow without a limit, because it would overflow.
     #[test]
     fn j04_the_ring_stays_a_ring() {
         let mut queue = ResponseQueue::new();
@@ -191,7 +192,7 @@ mod tests {
         }
     }
 
-    /// For any position of the record of noise, the other records move forward in order.
+    /// The other response records move forward in order, for any position of the record for noise.
     #[test]
     fn j04_what_goes_for_another_leaves_the_others_in_order() {
         for place in [0, 1, 30, 62, 63] {

@@ -1,4 +1,4 @@
-//! Safety input (J-22). The value 0 removes the torque, at once or after a stop.
+//! Safety input (J-22). If the input is 0, the controller switches the torque off, at once or after a stop.
 use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::controller::Controller;
@@ -9,14 +9,14 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 const OVER: u16 = u16::MAX;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Runs a tick in which the safety input is 0, or has been 0 before. If `safety_input_ramp_ms` is set, a commanded motion comes to rest
-    /// first (stop category 1 of IEC 60204-1), even if the input returns to 1 meanwhile. The error is raised in every case, even if the
-    /// torque has already been removed.
+    /// Executes a tick in which the safety input is 0, or has been 0 before. If `safety_input_ramp_ms` is set, a commanded motion comes to
+    /// rest first (stop category 1 of IEC 60204-1), even if the input returns to 1 before the arm is at rest. The controller raises the
+    /// error in every case, even if the torque is already off.
     #[cold]
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
         self.safety_stop_ms = match self.safety_stop_ms {
-            // The error was raised in the last tick.
+            // The controller raised the error in the last tick.
             Some(OVER) => None,
             Some(_) if !self.powered() || self.stands_still() || self.motion.law.is_yielding() => Some(OVER),
             Some(ms) => {
@@ -31,7 +31,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
     }
 
-    /// Returns `true` if the safety input removes the torque in this tick.
+    /// Returns `true` if the safety input switches the torque off in this tick.
     pub(crate) fn safety_input_releases(&self, level: bool) -> bool {
         match self.safety_stop_ms {
             Some(ms) => ms == OVER,
@@ -49,7 +49,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Returns `true` if a command or a hand moves the arm, and every joint has torque. If a drive is not enabled yet, a joint yields, or
-    /// the arm moves for another reason, a stop would only delay the removal of the torque.
+    /// the arm moves for another reason, a stop would only delay switching the torque off.
     fn has_to_stop(&self) -> bool {
         let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
         let moves = match self.state {

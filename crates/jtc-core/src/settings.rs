@@ -1,4 +1,4 @@
-//! Settings that a host reads and changes (J-53). The module contains the table of settings, and functions that apply a list of values
+//! Settings that a host can read and change (J-53). This module contains the table of settings, and functions that apply a list of values
 //! completely or not at all.
 use jtc_dynamics::{Payload, PayloadError};
 use jtc_wire::SettingValue;
@@ -28,47 +28,49 @@ pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 /// States in which a setting may be changed, in addition to Init and Error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Live {
-    /// No other state. The setting is part of the arm, so it is stored with the arm and included in the hash of the arm.
+    /// The setting can change only in Init and Error. A setting with `No` is part of the arm, so it is stored with the arm and included in
+    /// the hash of the arm.
     No,
-    /// No other state, like `No`, but the setting is not part of the arm.
+    /// The setting can change only in Init and Error, like a setting with `No`. A setting with `Unpowered` is not part of the arm.
     Unpowered,
-    /// HoldPos, Teaching and Pause, but not during a motion. The setting is not part of the arm.
+    /// The setting can also change in HoldPos, Teaching and Pause, but not during a motion. A setting with `Standing` is not part of the
+    /// arm.
     Standing,
-    /// Every state, also while the arm moves. The setting is not part of the arm.
+    /// The setting can change in every state, even while the arm moves. A setting with `Always` is not part of the arm.
     Always,
 }
 
 /// Kind of a setting, which determines the storage of its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A number for each joint.
+    /// A number for each joint that belongs to the joint limits.
     Joint,
     /// A number for each joint that does not belong to the joint limits.
     Each,
-    /// A switch for each joint, 0 or 1.
+    /// A switch for each joint, with the value 0 or 1.
     EachSwitch,
     /// A number for the arm.
     Number,
     /// A whole number for the arm.
     Whole,
-    /// A switch for the arm, 0 or 1.
+    /// A switch for the arm, with the value 0 or 1.
     Switch,
 }
 
-/// Row of the table of settings.
+/// Setting, as a row of the table of settings.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
-    /// Number in the wire format.
+    /// Number of the setting in the wire format.
     pub number: u8,
-    /// Name in arm files, including the unit.
+    /// Name of the setting in arm files, including the unit.
     pub name: &'static str,
     /// Unit of the setting. The text is empty if the setting has no unit.
     pub unit: &'static str,
-    /// Lowest value.
+    /// Lowest allowed value of the setting.
     pub low: f64,
-    /// Highest value.
+    /// Highest allowed value of the setting.
     pub high: f64,
-    /// `true` if only whole numbers are allowed.
+    /// `true` if the setting allows only whole numbers.
     pub whole: bool,
     /// States in which the setting may be changed.
     pub live: Live,
@@ -77,23 +79,23 @@ pub struct Setting {
     pub(crate) kind: Kind,
 }
 
-/// Reason why a value is refused.
+/// Reason why the controller refuses the value of a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingError {
     /// The setting does not exist, or does not exist for this joint.
     Unknown {
         /// Number of the refused setting.
         setting: u8,
-        /// Number of the joint, from 1. The number is 0 for a setting of the arm.
+        /// Number of the joint, from 1. The joint number is 0 for a setting of the arm.
         joint: u8,
     },
     /// The value is out of range, NaN, or not a whole number.
     Value {
         /// Name of the setting.
         name: &'static str,
-        /// Number of the joint, from 1. The number is 0 for a setting of the arm.
+        /// Number of the joint, from 1. The joint number is 0 for a setting of the arm.
         joint: u8,
-        /// The value.
+        /// The value that was refused.
         value: f64,
         /// Lowest allowed value.
         low: f64,
@@ -133,7 +135,7 @@ impl core::fmt::Display for SettingError {
 impl core::error::Error for SettingError {}
 
 impl Setting {
-    /// Returns `true` if each joint has a value of its own.
+    /// Returns `true` if the setting has a separate value for each joint.
     pub const fn of_joint(&self) -> bool {
         matches!(self.kind, Kind::Joint | Kind::Each | Kind::EachSwitch)
     }
@@ -143,23 +145,24 @@ impl Setting {
         matches!(self.live, Live::No)
     }
 
-    /// Returns the number of values, which is 1 or the number of joints.
+    /// Returns the number of values of the setting, which is 1 or the number of joints.
     const fn count(&self) -> usize {
         if self.of_joint() { JOINTS } else { 1 }
     }
 
-    /// Returns the value in `config`. `joint` is the number of the joint, from 1, or 0 for a setting of the arm. Returns `None` if the
-    /// setting has no such value.
+    /// Returns the value of the setting in `config`. `joint` is the number of the joint, from 1, or 0 for a setting of the arm. Returns
+    /// `None` if the setting has no value for this joint.
     pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
         table::get(config, self.number, self.index(joint)?)
     }
 
-    /// Returns the index of the value for a joint, from 1, or 0 for a setting of the arm. Returns `None` if the setting has no such value.
+    /// Returns the index of the value for `joint`, which is the number of a joint, from 1, or 0 for a setting of the arm. Returns `None` if
+    /// the setting has no value for this joint.
     fn index(&self, joint: u8) -> Option<usize> {
         if self.of_joint() { usize::from(joint).checked_sub(1) } else { (joint == 0).then_some(0) }
     }
 
-    /// Returns the values in `config`, beginning with index `first`.
+    /// Returns the values of the setting in `config`, beginning with index `first`.
     fn values_from(&self, config: &Config, first: usize) -> impl Iterator<Item = SettingValue> + use<'_> {
         let (start, end) = if self.of_joint() { (1, JOINTS as u8) } else { (0, 0) };
         let values = core::array::from_fn::<f64, JOINTS, _>(|j| {
@@ -172,9 +175,9 @@ impl Setting {
         })
     }
 
-    /// Changes the value in `config`.
+    /// Changes the value of the setting in `config`.
     fn set(&self, config: &mut Config, joint: u8, value: f64) -> Result<(), SettingError> {
-        // The comparison also refuses NaN. The cast is exact for every whole number in a range.
+        // The comparison also rejects NaN. The conversion to `i32` is exact for every whole number in a range.
         let taken = value >= self.low && value <= self.high && (!self.whole || value == value as i32 as f64);
         if !taken {
             let Self { name, low, high, .. } = *self;
@@ -185,7 +188,7 @@ impl Setting {
     }
 }
 
-/// Returns the row of a setting.
+/// Returns the row of the setting with this number.
 pub fn setting(number: u8) -> Option<&'static Setting> {
     TABLE.iter().find(|setting| setting.number == number)
 }
@@ -195,13 +198,13 @@ pub fn named(name: &str) -> Option<&'static Setting> {
     TABLE.iter().find(|setting| setting.name == name)
 }
 
-/// Returns the number of values in the table. `arm_only` selects only the values that are part of the arm.
+/// Returns the number of values in the table. If `arm_only` is `true`, the function counts only the values that are part of the arm.
 pub fn count(arm_only: bool) -> usize {
     TABLE.iter().filter(|setting| !arm_only || setting.of_arm()).map(Setting::count).sum()
 }
 
-/// Returns the values of a configuration in the order of the table, beginning with index `first`. `arm_only` selects only the values that
-/// are part of the arm.
+/// Returns the values of a configuration in the order of the table, beginning with index `first`. If `arm_only` is `true`, the function
+/// returns only the values that are part of the arm.
 pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<Item = SettingValue> {
     let mut skip = first;
     TABLE.iter().filter(move |setting| !arm_only || setting.of_arm()).flat_map(move |setting| {
@@ -214,7 +217,7 @@ pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<It
 /// Sets one value in a configuration, without a check of the whole configuration.
 ///
 /// # Errors
-/// Returns an error if the value is refused.
+/// Returns an error if this value is refused.
 pub fn apply(config: &mut Config, value: SettingValue) -> Result<(), SettingError> {
     let SettingValue { setting: number, joint, value } = value;
     setting(number).ok_or(SettingError::Unknown { setting: number, joint })?.set(config, joint, value)
@@ -230,7 +233,7 @@ pub fn payload_values(payload: &Payload) -> impl Iterator<Item = SettingValue> {
     })
 }
 
-/// Returns a copy of the configuration with these values.
+/// Returns a copy of the configuration in which these values are changed.
 ///
 /// # Errors
 /// Returns an error for the first value that is refused, or if the resulting configuration is not valid.
@@ -243,8 +246,8 @@ pub fn with_values(
         apply(&mut next, value)?;
     }
     next.check().map_err(SettingError::Config)?;
-    // The payload is checked only if it changes, because computing its principal moments takes too long for a change of the speed in
-    // motion.
+    // The payload is checked only if it changes. The principal moments of a payload take too long to compute for a change of the speed
+    // during a motion.
     if next.payload != config.payload {
         next.payload.check().map_err(SettingError::Payload)?;
     }

@@ -1,8 +1,8 @@
-//! Two flash slots that preserve one image during any loss of power (J-54).
+//! Two flash slots that keep one image safe during any loss of power (J-54).
 //!
-//! An image, here a stored arm, is a sequence of bytes that this module does not interpret. An image is written to the slot that does not
-//! contain the newest image, so that the previous image stays complete until the new image is complete. A slot is a header of one flash
-//! word followed by the image, filled up to whole words:
+//! An image, here a stored arm, is a sequence of bytes that this module does not interpret. A new image is written to the slot that does
+//! not contain the newest image. The previous image therefore stays complete until the new image is complete. A slot consists of a header
+//! of one flash word and the image, which is filled up to whole words:
 //!
 //! | bytes | content |
 //! |---|---|
@@ -10,40 +10,40 @@
 //! | 4..6 | version of this layout, 1 |
 //! | 6..8 | 0 |
 //! | 8..12 | length of the image, bytes |
-//! | 12..16 | sequence number: the newer image has the higher one, modulo 2³² |
+//! | 12..16 | sequence number: the newer image has the higher number, modulo 2³² |
 //! | 16..28 | 0 |
 //! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words after them |
-//! | 32.. | the image; the rest of its last word is 0xFF |
+//! | 32.. | the image; the remaining bytes of its last word are 0xFF |
 //!
-//! The header is written last, so a slot whose writing was interrupted has no header. After a loss of power, a word that was being
-//! programmed, or a sector that was being erased, may contain any data. The CRC detects this. All numbers are little-endian.
+//! The header is written last, so a slot has no header if the write was interrupted. If the power fails, a word that was being programmed,
+//! or a sector that was being erased, may contain any data. The CRC detects such data. All numbers in the header are little-endian.
 //!
 //! This module does not access hardware. [`Storing`] returns the next action, and the owner of the flash executes this action. A flash word
-//! can be programmed once after it was erased, which is sufficient for [`Storing`].
+//! can be programmed only once after each erase. [`Storing`] programs each word once.
 use core::cmp::Ordering;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 pub use jtc_wire::IMAGE_MAX;
 
-/// Bytes that the flash of the STM32H7 programs at once.
+/// Number of bytes that the flash of the STM32H7 programs at once.
 pub const WORD: usize = 32;
 /// Number of slots.
 pub const SLOTS: usize = 2;
 
-/// Unit of programming.
+/// Unit in which the flash is programmed.
 pub type Word = [u8; WORD];
 
 const MAGIC: [u8; 4] = *b"JTCA";
 const VERSION: u16 = 1;
-/// Byte value of erased flash. This byte also fills the last word of an image.
+/// Byte value of erased flash. The byte of erased flash also fills the last word of an image.
 const ERASED: u8 = 0xFF;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 const _: () = assert!(IMAGE_MAX.is_multiple_of(WORD), "a buffer of IMAGE_MAX takes whole words");
 
-/// First word of a slot.
+/// Header of a slot, which is its first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     length: u32,
@@ -52,7 +52,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Creates the header of this image. Returns `None` if the image is longer than [`IMAGE_MAX`].
+    /// Creates the header for this image. Returns `None` if the image is longer than [`IMAGE_MAX`].
     pub fn new(image: &[u8], sequence: u32) -> Option<Self> {
         let length = u32::try_from(image.len()).ok().filter(|_| image.len() <= IMAGE_MAX)?;
         let header = Self { length, sequence, crc: 0 };
@@ -63,7 +63,7 @@ impl Header {
         Some(Self { crc: digest.finalize(), ..header })
     }
 
-    /// Parses a word as a header. [`Header::accepts`] decides whether the slot of this header is complete.
+    /// Parses a word as a header. [`Header::accepts`] decides whether the slot with this header is complete.
     pub fn parse(word: &Word) -> Option<Self> {
         let field = |at: usize| Some(u32::from_le_bytes(*word.get(at..)?.first_chunk()?));
         let header = Self { length: field(8)?, sequence: field(12)?, crc: field(28)? };
@@ -78,7 +78,7 @@ impl Header {
         word
     }
 
-    /// Returns the bytes before the CRC.
+    /// Returns the bytes of the header before the CRC.
     fn checked_bytes(&self) -> [u8; 28] {
         let mut bytes = [0; 28];
         let [version, length, sequence] =
@@ -93,7 +93,7 @@ impl Header {
         self.length as usize
     }
 
-    /// Returns the sequence number.
+    /// Returns the sequence number of the image.
     pub fn sequence(&self) -> u32 {
         self.sequence
     }
@@ -103,7 +103,7 @@ impl Header {
         1 + self.length().div_ceil(WORD)
     }
 
-    /// Returns the image if `rest` matches the header. `rest` begins with the words after the header.
+    /// Returns the image if the words in `rest` match the header. `rest` begins with the first word after the header.
     pub fn accepts<'a>(&self, rest: &'a [u8]) -> Option<&'a [u8]> {
         let words = rest.get(..(self.words() - 1) * WORD)?;
         let mut digest = CRC.digest();
@@ -125,17 +125,17 @@ pub fn newer(a: u32, b: u32) -> bool {
     (a.wrapping_sub(b).cast_signed()).cmp(&0) == Ordering::Greater
 }
 
-/// Content of the slots, stored as the sequence number of each complete slot.
+/// State of the slots: the sequence number of each complete slot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slots([Option<u32>; SLOTS]);
 
 impl Slots {
-    /// Creates the slots from the sequence numbers that were found.
+    /// Creates the state of the slots from the sequence numbers in the flash.
     pub const fn new(found: [Option<u32>; SLOTS]) -> Self {
         Self(found)
     }
 
-    /// Returns the slot of the newest image, and the sequence number of the image. Returns `None` if no slot is complete.
+    /// Returns the slot and the sequence number of the newest image. Returns `None` if no slot is complete.
     pub fn current(&self) -> Option<(usize, u32)> {
         match self.0 {
             [Some(a), Some(b)] if newer(b, a) => Some((1, b)),
@@ -145,7 +145,7 @@ impl Slots {
         }
     }
 
-    /// Returns the slot for the next image, and the sequence number of the image. The returned slot never contains the newest image.
+    /// Returns the slot and the sequence number for the next image. The slot for the next image never contains the newest image.
     pub fn next(&self) -> (usize, u32) {
         self.current().map_or((0, 1), |(slot, sequence)| (1 - slot, sequence.wrapping_add(1)))
     }
@@ -162,23 +162,23 @@ impl Slots {
 pub enum Action {
     /// Erase the slot.
     Erase {
-        /// Number of the slot.
+        /// Number of the slot to erase.
         slot: usize,
     },
     /// Program a word, read the word back and compare it.
     Program {
-        /// Number of the slot.
+        /// Number of the slot to program.
         slot: usize,
-        /// Index of the word in the slot. The header has index 0.
+        /// Index of the word in the slot. The header has the index 0.
         word: usize,
-        /// Content to program.
+        /// Content of the word to program.
         bytes: Word,
     },
     /// No further action is needed, because the image is stored and can be found.
     Stored,
 }
 
-/// An image that is being written into its slot.
+/// State of an image that is being written into its slot.
 ///
 /// ```
 /// use jtc_core::slots::{Action, Header, Slots, Storing, WORD};
@@ -217,7 +217,7 @@ impl Storing {
         Some(Self { slot, header, done: 0 })
     }
 
-    /// Returns the next action. `image` must be the image that was passed to [`begin`](Self::begin).
+    /// Returns the next action on the flash. `image` must be the image that was passed to [`begin`](Self::begin).
     pub fn action(&self, image: &[u8]) -> Action {
         let slot = self.slot;
         let Some(before) = self.done.checked_sub(1) else { return Action::Erase { slot } };
@@ -233,17 +233,17 @@ impl Storing {
         }
     }
 
-    /// Marks the present action as done. A word must have been read back and compared first.
+    /// Marks the present action as completed. The caller must have read a programmed word back and compared it before this call.
     pub fn done(&mut self) {
         self.done = self.done.saturating_add(1).min(self.header.words() + 1);
     }
 
-    /// Returns the slot, and the sequence number of the image in the slot.
+    /// Returns the slot, and the sequence number of the image that is written into the slot.
     pub fn target(&self) -> (usize, u32) {
         (self.slot, self.header.sequence)
     }
 
-    /// Records the new image if every action is completed. Otherwise the call has no effect.
+    /// Records the new image in `slots` if every action is completed. If an action is missing, the call has no effect.
     pub fn finish(&self, slots: &mut Slots) {
         if self.done > self.header.words() {
             slots.set(self.slot, Some(self.header.sequence));

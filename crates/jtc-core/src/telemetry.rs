@@ -1,4 +1,4 @@
-//! Values that a tick has computed, for recordings and tests.
+//! Values that a tick has computed, for recordings and for tests.
 use jtc_bus::NodeState;
 
 use crate::bit_codec::bit_codec;
@@ -7,46 +7,46 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 /// Telemetry of one joint in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointTelemetry {
-    /// Commanded position, rad.
+    /// Commanded position of the joint, rad.
     pub set_position: f64,
-    /// Commanded velocity, rad/s.
+    /// Commanded velocity of the joint, rad/s.
     pub set_velocity: f64,
-    /// Commanded acceleration, rad/s².
+    /// Commanded acceleration of the joint, rad/s².
     pub set_acceleration: f64,
     /// Position that was commanded for the time of the measurement, rad. The control law compares the measurement with this position
     /// (J-62).
     pub due_position: f64,
-    /// Measured position, rad.
+    /// Measured position of the joint, rad.
     pub position: f64,
-    /// Measured velocity, rad/s.
+    /// Measured velocity of the joint, rad/s.
     pub velocity: f64,
-    /// Position and velocity were measured for this tick. Otherwise both values are predicted (J-63).
+    /// `true` if position and velocity were measured for this tick. If `false`, position and velocity are predicted (J-63).
     pub fresh: bool,
     /// Bearing temperature, °C.
     pub temperature: f64,
     /// Model torque (inverse dynamics and rotor), N·m.
     pub torque_model: f64,
-    /// Proportional part, N·m.
+    /// Proportional part of the torque, N·m.
     pub torque_p: f64,
-    /// Integral part, N·m.
+    /// Integral part of the torque, N·m.
     pub torque_i: f64,
-    /// Derivative part, N·m.
+    /// Derivative part of the torque, N·m.
     pub torque_d: f64,
-    /// Friction compensation, N·m.
+    /// Torque of the friction compensation, N·m.
     pub torque_friction: f64,
-    /// Torque that blends out a step at a change of state, plus the load and braking torque of Teaching, N·m.
+    /// Torque that blends out a step at a change of state, plus the load torque and the braking torque of Teaching, N·m.
     pub torque_other: f64,
-    /// Torque commanded on the bus, N·m.
+    /// Commanded torque at the joint, N·m. The Move frame contains this torque multiplied by the torque gain (J-61).
     pub torque: f64,
     /// State of the drive.
     pub state: NodeState,
-    /// Internal errors.
+    /// Internal error word of the joint.
     pub internal: u16,
 }
 
 impl JointTelemetry {
-    /// Returns the position error, rad. The error is the position that was commanded for the time of the measurement, minus the measured
-    /// position.
+    /// Returns the position error, rad. The position error is the position that was commanded for the time of the measurement, minus the
+    /// measured position.
     pub fn position_error(&self) -> f64 {
         self.due_position - self.position
     }
@@ -59,15 +59,15 @@ pub struct Telemetry {
     pub tick: u64,
     /// Controller state in this tick.
     pub state: ControllerState,
-    /// Trajectory execution state.
+    /// Execution state of the trajectory.
     pub trajectory: TrajectoryState,
-    /// Index of the current 1 ms point.
+    /// Index of the present point of the trajectory, in a grid of 1 ms.
     pub point: u32,
-    /// A pause or stop brakes with all available torque (J-33).
+    /// `true` if a pause or stop brakes with all available torque (J-33).
     pub braking: bool,
-    /// Current error word.
+    /// Current error word of the controller.
     pub errors: u16,
-    /// Number of response records lost since the start because too many were waiting (J-04).
+    /// Number of response records that were lost since the start because too many records were waiting (J-04).
     pub records_lost: u32,
     /// Telemetry of each joint.
     pub joints: [JointTelemetry; JOINTS],
@@ -78,7 +78,7 @@ pub struct Telemetry {
 pub(crate) struct Observed {
     /// Number of ticks since the start of the device.
     pub tick: u64,
-    /// Commanded torques, N·m.
+    /// Commanded torques at the joints, N·m.
     pub torque: [f64; JOINTS],
 }
 
@@ -88,7 +88,7 @@ bit_codec!(Observed { tick, torque });
 mod tests {
     use super::*;
 
-    /// The error is positive if the joint lags a motion upwards, like the proportional part of the torque.
+    /// If the joint lags an upward motion, the position error is positive, like the proportional part of the torque.
     #[test]
     fn j41_the_position_error_is_commanded_minus_measured() {
         let joint = JointTelemetry { due_position: 0.5, position: 0.25, ..JointTelemetry::default() };

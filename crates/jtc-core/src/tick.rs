@@ -1,4 +1,4 @@
-//! Control tick, in the order of docs/architecture.md.
+//! Control tick, with the steps in the order of docs/architecture.md.
 use jtc_bus::Frame;
 use jtc_wire::{RawPoint, Response};
 
@@ -10,11 +10,12 @@ use crate::trajectory::check::PathRange;
 use crate::{ControllerState, JOINTS, joint_error};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Runs one control tick (1 ms). The amount of work is bounded for any inputs.
+    /// Executes one control tick (1 ms). The amount of work is bounded for any inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
-        // 1. Inputs. The error flags are computed before the commands of the host are executed, so that a clear cannot hide a fault that
-        //    appears in the same tick. In Start, commands are not executed yet, and the board offers the events again later.
+        // 1. Evaluate the inputs. The controller sets the error flags before it executes the commands of the host, so that a clear cannot
+        //    hide a fault of the same tick. In Start, the controller does not execute commands yet, and the board passes the events again
+        //    in the next tick.
         self.take_answers(inputs);
         if !inputs.safety_input || self.safety_stop_ms.is_some() {
             self.watch_safety_input(inputs);
@@ -26,27 +27,27 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let host_done = if before == ControllerState::Start { 0 } else { self.serve_host(inputs) };
         self.watch_hosts(inputs, host_done);
 
-        // 2. The next state. An error that persists is raised again, because a host may have cleared it.
+        // 2. Choose the next state. An error whose cause persists is raised again, because a host may have cleared the error.
         if !inputs.host.is_empty() {
             self.form_error_flags(inputs);
         }
         self.choose_state();
 
-        // 3. The work of this state is executed.
+        // 3. Execute the work of this state.
         let (torque, found) = self.work();
 
-        // 4. An error found in step 3 sets the torque of the present tick to zero.
+        // 4. An error that was found in step 3 sets the torque of the present tick to zero.
         let torque = self.form_error_flags_again(torque, &found);
 
-        // 5. The frame for the bus.
+        // 5. Make the frame for the bus.
         let bus = self.frame(before, torque);
         self.observe(&torque);
 
-        // 6. Outputs for the board and the hosts. J-22: the safety output is 0 in Start and while an internal error is latched.
+        // 6. Set the outputs for the board and the hosts. J-22: the safety output is 0 in Start and while an internal error is latched.
         let safety_output = self.state != ControllerState::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
         let record_line = if status { self.prepare_status() } else { None };
-        // J-50: a waiting status is sent first.
+        // J-50: a status that is due is sent before an answer.
         let answer_line = if inputs.status_free && !status { self.extensions.answers.send() } else { None };
         let store = core::mem::take(&mut self.extensions.store_requested);
         Outputs { bus: Some(bus), safety_output, status, record_line, answer_line, store, host_done }
@@ -72,7 +73,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises errors from outside the control law. Errors from outside the control law are latched (J-21).
+    /// Raises errors whose cause is outside the control law. Errors from outside the control law are latched (J-21).
     fn form_error_flags(&mut self, inputs: &Inputs<'_>) {
         if self.safety_input_releases(inputs.safety_input) {
             self.errors.raise_emergency_input();
@@ -88,7 +89,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
-                // All other parts of the motion were reset when the state began.
+                // All other parts of the motion were already reset when this state began.
                 self.motion.set.release(&self.nodes);
                 self.parameters.end_blend();
                 ([0.0; JOINTS], [0; JOINTS])
@@ -100,7 +101,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A pending teach request times out, because the operator no longer expects the arm to become compliant.
+        // A pending teach request times out. After the timeout, the operator no longer expects the arm to become compliant.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         if self.parameters.blend_left_ms() > 0 {
@@ -120,13 +121,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return self.rest();
         }
         if jogged {
-            // The arm has come to rest after the jog.
+            // After the jog, the arm has come to rest.
             self.motion.law.change_mode();
         }
         self.control(ControlMode::Hold)
     }
 
-    /// Runs one tick in which the arm comes to rest after a hand has led it.
+    /// Executes one tick in which the arm comes to rest after a hand has moved it.
     fn rest(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         let mode = if self.motion.set.led_to_rest(&self.config) {
             self.motion.law.change_mode();
@@ -141,15 +142,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.keep_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
         self.motion.set.follow_measured(&self.nodes);
         if self.parameters.blend_left_ms() > 0 {
-            // The model takes over a part of the mass that Teaching had found.
+            // The model now contains a part of the mass that Teaching has estimated.
             self.motion.law.give_way_to_payload(self.parameters.next_mass());
             self.parameters.blend_payload();
         }
         self.control(ControlMode::Teach)
     }
 
-    /// Runs the control step in Operate. This step is a separate function so that its instructions can be counted. On the path, the number
-    /// of instructions is the same in every tick.
+    /// Executes the control step in Operate. The control step is a separate function, so that a test can count its instructions. On the
+    /// path, the number of instructions is the same in every tick.
     #[inline(never)]
     fn operate(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.latch(&self.nodes, &self.config);
@@ -160,10 +161,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// Runs the control law and its limits. Returns the torques to command, and the joint errors for which the controller must release the
-    /// arm (J-66).
+    /// Executes the control law and the limiter. Returns the torques to command, and the joint errors for which the controller must release
+    /// the arm (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A joint above its over-speed limit is out of control. The only possible reaction is to remove the torque.
+        // A joint above its over-speed threshold is out of control. If a joint is out of control, the controller switches the torque off.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
         let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {
@@ -197,7 +198,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises the joint errors in `found`. Returns the torque to command, which is zero if an error is latched (J-21).
+    /// Raises the joint errors in `found`. Returns the torques to command, which are zero if an error is latched (J-21).
     pub(crate) fn form_error_flags_again(
         &mut self,
         torque: [f64; JOINTS],
@@ -213,10 +214,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Returns the frame of this tick (J-12).
     pub(crate) fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
-        // Drives keep their last torque, so the removal of the torque has priority over all other frames.
+        // Drives keep their last torque, so the Move that switches the torque off has priority over all other frames.
         let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
         let must_move = new_error || (before.has_torque() && !self.powered());
-        // J-61: before this line, all torques are torques at the joints.
+        // J-61: up to this line, all torques are torques at the joints.
         let torque = core::array::from_fn(|j| torque[j] * self.config.joints[j].torque_gain);
         self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move)
     }
@@ -235,8 +236,8 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// An accepted teach request waits at most as long as enabling may take. After that, the operator would not expect the arm to become
-    /// compliant.
+    /// An accepted teach request waits at most as long as enabling may take. After the timeout, the operator no longer expects the arm to
+    /// become compliant.
     #[test]
     fn j25_teaching_waits_for_a_while_only() {
         let most = Config::avena().enable_timeout_ms;

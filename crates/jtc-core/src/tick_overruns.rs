@@ -1,16 +1,17 @@
 //! Late and missing ticks (J-12). A few late ticks are tolerated, but ten within a second are a failure of the device.
 use crate::bit_codec::bit_codec;
 
-/// Number of late ticks that counts as a failure of the device.
+/// Number of late ticks within the window that counts as a failure of the device.
 const COUNT: usize = 10;
-/// Length of the window, ms. The time between the first and the last of the late ticks must be shorter than the window.
+/// Length of the window, ms. If the time between the first and the last of [`COUNT`] late ticks is shorter than the window, the device has
+/// failed.
 const WINDOW_MS: u64 = 1_000;
 
 /// Times of the last late or missing ticks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TickOverruns {
     now_ms: u64,
-    /// Ring of the last times. Empty slots contain times that are far enough in the past.
+    /// Ring buffer with the times of the last late ticks. Empty entries contain times that are outside the window.
     at_ms: [u64; COUNT],
     next: usize,
 }
@@ -33,7 +34,7 @@ impl TickOverruns {
                 *slot = self.now_ms;
             }
             self.next = (self.next + 1) % COUNT;
-            // This slot now contains the oldest of the last ten times.
+            // The entry `next` now contains the oldest of the last ten times.
             too_many |= self.at_ms.get(self.next).is_some_and(|oldest| self.now_ms - oldest < WINDOW_MS);
         }
         too_many
@@ -44,7 +45,7 @@ impl TickOverruns {
 mod tests {
     use super::*;
 
-    /// Returns the tick in which the number of late ticks is too high, if every `n`-th tick comes after `missed` missing ticks.
+    /// Returns the tick in which the number of late ticks becomes too high, if every `n`-th tick comes after `missed` missing ticks.
     fn until_too_many(n: u32, missed: u16) -> Option<u32> {
         let mut late = TickOverruns::default();
         (1..20_000).find(|tick| late.count(if tick % n == 0 { missed } else { 0 }))
@@ -58,7 +59,7 @@ mod tests {
         // With a late tick every 112 ms, the first and the tenth late tick are 1008 ms apart.
         assert_eq!(until_too_many(111, 1), None);
         assert_eq!(until_too_many(109, 1), Some(1090));
-        // Each of several ticks that are missing at once is counted.
+        // If several ticks are missing at once, each of them is counted.
         assert_eq!(until_too_many(50, 5), Some(100));
         assert_eq!(until_too_many(1_500, 9), None);
         assert_eq!(until_too_many(1_500, 10), Some(1_500));
@@ -68,7 +69,7 @@ mod tests {
     #[test]
     fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
         // The first and the ninth late tick are 16 ms apart. The tenth late tick comes 2 ms after the last of the ticks `between`, which
-        // are in time.
+        // are on time.
         for (between, too_many) in [(981, true), (982, false)] {
             let mut late = TickOverruns::default();
             assert!(!(0..9).any(|_| late.count(1)));

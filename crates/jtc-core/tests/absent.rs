@@ -1,4 +1,4 @@
-//! Tests of absent joints (J-53): substitute values, refused commands, and a drive that answers although its joint is absent.
+//! Tests of absent joints (J-53): substitute values, refused commands, and a drive that answers although its joint is declared absent.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -18,7 +18,7 @@ fn set(rig: &mut Rig, values: &[(u8, usize, f64)]) -> DataStatus {
     rig.ask(FrameType::SetSettings, &body)
 }
 
-/// Settings (absent flag and angle) of each joint that is absent.
+/// Returns the settings (absent flag and angle) of each joint that is declared absent.
 fn absent(joints: &[(usize, f64)]) -> Vec<(u8, usize, f64)> {
     joints
         .iter()
@@ -51,7 +51,8 @@ fn is_absent(rig: &Rig, j: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
-    /// For any absent joints, the present joints are brought up and held with the torque that the model of the whole arm requires.
+    /// For any combination of absent joints, the controller brings up the present joints and holds them with the torque that the model of
+    /// the whole arm requires.
     #[test]
     fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
         let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();
@@ -101,7 +102,7 @@ fn j53_absent_is_set_in_init_and_error_only() {
         rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
         assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
         assert!(!is_absent(&rig, j));
-        // In Error, after a drive has stopped answering, these values are accepted.
+        // In Error, after a drive has stopped answering, the controller accepts the settings for absent joints.
         rig.nodes[j].silent = true;
         rig.until(50, |r| r.state() == ControllerState::Error);
         assert_eq!(set(&mut rig, &all), DataStatus::NoError);
@@ -138,11 +139,12 @@ fn j53_absent_joints_forbid_motion_and_teaching_and_are_not_jogged() {
     }
 }
 
-/// Either the drive or the setting is wrong. The arm has no torque until this is corrected.
+/// If a drive of an absent joint answers, either the drive or the setting is wrong. The arm has no torque until the drive or the setting is
+/// corrected.
 #[test]
 fn j53_absent_joints_whose_drives_answer_are_an_error() {
     for j in ALL {
-        // The drive answers from the start, or is connected later.
+        // The drive of the absent joint answers from the start, or is connected later.
         for later in [false, true] {
             let mut rig = if later {
                 let mut rig = bench(&[(j, 0.3)]);
@@ -157,14 +159,14 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
             };
             rig.until(10, |r| r.state() == ControllerState::Error);
             assert_ne!(rig.errors() & error::EXTERNAL_JOINTS, 0);
-            // The state of the drive is shown, so that the operator can identify the joint.
+            // The status shows the state of this drive, so that the operator can identify the joint.
             let shown = rig.status().joints.map(|joint| joint.state);
             assert_eq!(shown[j], rig.nodes[j].report.state);
             rig.clear(true, 0x7F);
             rig.run(500);
             assert_eq!(rig.state(), ControllerState::Error, "it answers still");
             assert!(rig.torque == [0.0; 6]);
-            // The joint is not marked as absent any more.
+            // The joint is now declared present again.
             assert_eq!(set(&mut rig, &[(settings::ABSENT, j, 0.0)]), DataStatus::NoError);
             rig.run(50);
             rig.clear(true, 0x7F);
@@ -176,7 +178,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
     }
 }
 
-/// An enabled drive of an absent joint is disabled, regardless of the cause of its enabling.
+/// The controller disables an enabled drive of an absent joint, for any cause of its enabling.
 #[test]
 fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     let mut rig = bench(&[(2, 0.0)]);
@@ -187,7 +189,7 @@ fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     assert_eq!(rig.state(), ControllerState::Error);
 }
 
-/// The other nodes on the bus are supervised as usual.
+/// The controller supervises the other nodes on the bus as usual.
 #[test]
 fn j53_absent_joints_hide_no_error_of_the_others() {
     for j in ALL {
@@ -199,7 +201,7 @@ fn j53_absent_joints_hide_no_error_of_the_others() {
     }
 }
 
-/// While the only present node starts, no node acknowledges.
+/// While the only present node is starting, no node acknowledges a frame.
 #[test]
 fn j53_absent_joints_acknowledge_nothing() {
     let five: Vec<_> = (1..6).map(|j| (j, 0.0)).collect();
@@ -219,7 +221,7 @@ fn j53_absent_joints_acknowledge_nothing() {
     assert_eq!(resets.count(), 0, "what is not there is not reset");
 }
 
-/// The absent joints are not part of the arm's settings. A payload is carried with and without absent joints.
+/// The list of absent joints is not part of the arm's settings. The controller can use a payload with and without absent joints.
 #[test]
 fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     let mut rig = bench(&[(1, 0.9), (4, -0.3)]);
@@ -238,14 +240,14 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
 
-/// A payload or a model is not refused if only an absent joint would have to hold a load that is too high.
+/// The controller accepts a payload or a model whose load is too high only for an absent joint.
 #[test]
 fn j53_absent_joints_hold_nothing() {
     let payload = |mass: f64| {
         let payload = Payload { mass, ..Payload::NONE };
         settings::payload_values(&payload).flat_map(|value| value.emit()).collect::<Vec<u8>>()
     };
-    // The arm is stretched out, so joint 2 can hold little more than the arm itself.
+    // The arm is stretched out, so joint 2 can hold hardly any load in addition to the arm.
     for there in [true, false] {
         let mut rig = if there { Rig::new(Config::avena()) } else { bench(&[(1, 1.5)]) };
         if there {
@@ -257,7 +259,7 @@ fn j53_absent_joints_hold_nothing() {
         assert_eq!(rig.state(), ControllerState::HoldPos);
         let expected = if there { DataStatus::IncorrectValue } else { DataStatus::NoError };
         assert_eq!(rig.ask(FrameType::SetSettings, &payload(8.0)), expected);
-        // At the end of Init, the load is checked and accepted again.
+        // At the end of Init, the controller checks the load again and accepts the load.
         rig.press_stop(10);
         rig.clear(true, 0x7F);
         rig.run(3_000);

@@ -1,4 +1,4 @@
-//! Tests of the approach to the path, and of leaving the path. The state of a motion must not remain after the motion.
+//! Tests of the approach to a path, and of stops on the path. The state of a motion must not remain stored after this motion.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState, joint_error};
@@ -6,7 +6,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats, model_body, raw, segment_body};
 
-/// Returns a motion with at most 0.1 rad/s, at rest at both ends.
+/// Returns the points of a motion with at most 0.1 rad/s that is at rest at both ends.
 fn points() -> Vec<RawPoint> {
     (0..200)
         .map(|k| {
@@ -19,7 +19,7 @@ fn points() -> Vec<RawPoint> {
         .collect()
 }
 
-/// If the end of a pause was not detected, the pause ends when Teaching begins, because a hand then moves the joints.
+/// A pause that has not ended yet ends when Teaching begins, because a hand then moves the joints.
 #[test]
 fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     let mut rig = Rig::holding();
@@ -40,14 +40,15 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     }
 }
 
-/// A Stop or a Pause requires that the arm is held. Both commands therefore also cancel a teach request that waits for standstill.
+/// After a Stop or a Pause, the controller must hold the arm. A Stop and a Pause therefore also cancel a teach request that waits until the
+/// arm is at rest.
 #[test]
 fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
     for command in [ExecCommand::Stop, ExecCommand::Pause] {
         for taught_ms in [0, 5, 1_000] {
             let mut rig = Rig::holding();
             if taught_ms < 1_000 {
-                // Teaching waits while a joint moves.
+                // Teaching does not begin while a joint moves.
                 rig.nodes[1].report.velocity = 0.05;
             }
             assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
@@ -56,13 +57,13 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
             rig.nodes[1].report.velocity = 0.0;
             rig.run(12_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{command:?} {taught_ms}");
-            // The second command has no effect, because the arm is already stopped.
+            // The second Stop or Pause has no effect, because the arm is already stopped.
             assert_eq!(rig.exec(command), DataStatus::NotAllowed);
         }
     }
 }
 
-/// An operator who stops an arm may also press Pause.
+/// An operator who has stopped an arm may also press Pause.
 #[test]
 fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     for ms in [1, 20, 100, 180] {
@@ -77,7 +78,8 @@ fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     }
 }
 
-/// If a person touches an arm after a pause, the arm is held. Only path time that cannot be stopped is an error.
+/// If a person touches an arm after a pause, the controller continues to hold the arm. Only path time that does not come to rest is an
+/// error.
 #[test]
 fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     let mut rig = Rig::holding();
@@ -113,7 +115,7 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
 }
 
 /// After a Stop or a Pause during the approach, the arm slows down at once and comes to rest before it reaches the first point. The next
-/// Execute begins at that position.
+/// Execute begins an approach at that position.
 #[test]
 fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     for (command, trajectory) in
@@ -142,7 +144,7 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
             });
             let rest = set(&rig).0;
             assert!(ticks <= 230, "{start} after {after_ms} ms: {ticks} ms");
-            // The arm may still accelerate while the ramp begins, as on a path.
+            // While the ramp of path time begins, the arm may still accelerate, as on a path.
             assert!(fastest < speed.abs() + 0.4, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
             assert!(0.0 < rest && rest <= at, "{start} after {after_ms} ms: {at} {rest} rad");
             assert!(at - rest < 0.13 * fastest + 1e-3, "{start} after {after_ms} ms: {at} {rest} rad");
@@ -156,9 +158,9 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     }
 }
 
-/// A simulated arm carries a load that the controller knows, in random poses. The distance from the first point is the highest allowed
-/// distance: 0.02 rad, or 0.3 rad with a wide tolerance. During the approach no torque reaches its limit. If Execute is refused, only a
-/// small torque remains.
+/// A simulated arm has a load that the controller knows, in random poses. The first point is at the largest distance that is allowed: 0.02
+/// rad, or 0.3 rad with a wide tolerance. During the approach, no torque reaches its limit. If Execute is refused, only little torque
+/// remains for an approach.
 #[test]
 fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     let seed = 13;
@@ -206,8 +208,8 @@ fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of 500 refused; at most {:.0} % of a torque limit, {longest} ms", 100.0 * most);
 }
 
-/// A joint holds a position with 98 % of its limit, and its friction needs more than the margin. The joint does not start, because Execute
-/// is refused with status 8, as for an arm at another position.
+/// A joint needs 98 % of its torque limit to hold its position, and its friction needs more than the remaining torque. Execute is refused
+/// with data status 8, as for an arm at another position, so the joint does not move.
 #[test]
 fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     let holds = Parameters::avena().model;
@@ -219,7 +221,7 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
         let mut rig = Rig::held_at(config, pose);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         let mut rest = RawPoint { position: pose.map(|q| raw(q, 3.141592)), ..RawPoint::default() };
-        // The motion goes upwards, against gravity.
+        // The approach goes upwards, against gravity.
         rest.position[1] -= raw(0.015, 3.141592);
         assert_eq!(
             rig.ask(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest; 10])),
@@ -232,8 +234,8 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     }
 }
 
-/// A path may begin outside a limit if the arm is at that position (J-36). For any start tolerance, an arm inside the limits is not moved
-/// beyond a limit to the path.
+/// A path may begin outside a position limit if the arm is at that position (J-36). For any start tolerance, the approach does not move an
+/// arm inside its limits beyond a limit.
 #[test]
 fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     for (at, first, tolerance, answer) in [
@@ -265,8 +267,8 @@ fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     }
 }
 
-/// An arm that is exactly at its paused point continues with any torque margin. In an earlier version, a friction table with torque at
-/// standstill prevented the continuation.
+/// An arm that is exactly at its paused point can continue, however little torque remains. In an earlier version, a friction table with
+/// torque at standstill prevented the continuation.
 #[test]
 fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     let model = Parameters::avena().model;
@@ -303,7 +305,7 @@ fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     rig.until(6_000, |rig| rig.trajectory() == TrajectoryState::Finish);
 }
 
-/// An arm at the first point starts at once.
+/// An arm at the first point starts on the path at once.
 #[test]
 fn j34_without_a_distance_there_is_no_approach() {
     for (aside, counts) in [(0, true), (1, false)] {
@@ -317,7 +319,7 @@ fn j34_without_a_distance_there_is_no_approach() {
     }
 }
 
-/// An arm slightly beyond a position limit can move to a path inside.
+/// An arm that is slightly beyond a position limit can move to a path inside its limits.
 #[test]
 fn j43_an_arm_beyond_a_limit_can_go_to_a_path_inside() {
     let mut config = Config::avena();
@@ -346,7 +348,7 @@ fn j16_an_execute_does_not_wait_for_ever() {
     rig.defaults();
     rig.follow = false;
     rig.run(5);
-    // A hand swings a joint too fast for enabling.
+    // A hand swings a joint too fast for the joint to be enabled.
     let mut phase = 0.0f64;
     let mut swing = |rig: &mut Rig| {
         phase += 0.001;
@@ -376,12 +378,13 @@ fn j16_an_execute_does_not_wait_for_ever() {
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Stop, 0));
 }
 
-/// J-06: a model that is received before the positions are known is checked as soon as the positions are known.
+/// J-06: if a model arrives before the positions of the joints are known, the controller checks this model as soon as the positions are
+/// known.
 #[test]
 fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     let mut rig = Rig::new(Config::avena());
     let mut model = Parameters::avena().model;
-    // The model contains lengths in millimetres instead of metres.
+    // The lengths in this model are in millimetres, but the controller takes them as metres.
     for joint in &mut model.joints {
         joint.xyz = joint.xyz.map(|x| 1000.0 * x);
     }
@@ -402,8 +405,8 @@ fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     rig.until(500, |r| r.state() == ControllerState::HoldPos);
 }
 
-/// With three times the friction of the model, and a torque limit with a small margin, the approach slows down until the torque suffices,
-/// and reaches the point.
+/// The joint has three times the friction of its model, and little torque remains. The approach slows down until the torque suffices, and
+/// reaches the point.
 #[test]
 fn j75_an_approach_that_takes_too_much_torque_is_held_back() {
     let pose = plant::POSES[0];

@@ -1,4 +1,4 @@
-//! Tests of the order of the bring-up: validity of reports, and frames to each node (J-16, J-20, J-21).
+//! Tests of the order of the bring-up: when reports become valid, and which frames each node gets (J-16, J-20, J-21).
 use crate::rig;
 
 use jtc_bus::{Answer, Frame, JointReport, NodeState, Request, Target, warning};
@@ -43,7 +43,7 @@ fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     }
 }
 
-/// An answer that was sent before the node was reset is ignored after the restart.
+/// After a restart, the controller ignores an answer that the node sent before its reset.
 #[test]
 fn j20_late_answers_after_a_reset_do_not_count() {
     let mut rig = Rig::holding();
@@ -73,7 +73,7 @@ fn j20_late_answers_after_a_reset_do_not_count() {
     assert!(rig.nodes[JOINT].configured);
 }
 
-/// Drives of one generation accept their configuration only in Init.
+/// Some drives accept their configuration only in Init.
 #[test]
 fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     let mut rig = Rig::new(Config::avena());
@@ -88,7 +88,8 @@ fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
-/// The controller leaves Error for HoldPos only when the joints are in ReadyToOperate. A joint that is still enabled is disabled first.
+/// The controller changes from Error to HoldPos only when the joints are in ReadyToOperate. The controller first disables a joint that is
+/// still enabled.
 #[test]
 fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     let mut rig = Rig::holding();
@@ -127,20 +128,20 @@ fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
-/// A node is not configured in Error or while the node is being cleared.
+/// The controller does not configure a node in Error, or while it clears this node.
 #[test]
 fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     let mut rig = Rig::holding();
     rig.safety_input = false;
     rig.run(50);
-    // The node has restarted, so its configuration is lost.
+    // The node has restarted, so the node has lost its configuration.
     rig.nodes[JOINT].restart();
     let from = rig.sent.len();
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Error);
     assert!(!rig.sent[from..].iter().any(configures));
 
-    // In Init the node waits in ReadyToOperate without a configuration, and has an error to clear.
+    // In Init, the node waits in ReadyToOperate without a configuration, and has an error that must be cleared.
     let mut rig = Rig::new(Config::avena());
     rig.until(300, |r| r.nodes[JOINT].booting == 0 && r.nodes[JOINT].resets == 1);
     rig.nodes[JOINT].report.state = NodeState::READY;
@@ -157,10 +158,10 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init));
 }
 
-/// The occurred words report past errors. The current words report present errors.
+/// The words of occurred errors report past errors. The words of current errors report present errors.
 #[test]
 fn j21_occurred_errors_are_not_reported_as_current() {
-    // An error of a joint, and a CAN timeout.
+    // The rig causes an error of a joint, and then a CAN timeout.
     let mut rig = Rig::holding_with(Config { torque_release: true, ..Config::avena() });
     rig.push(JOINT, 0.2);
     rig.run(50);
@@ -184,8 +185,8 @@ fn j21_occurred_errors_are_not_reported_as_current() {
     assert!(status.occurred != 0 && status.can_occurred != 0 && status.joints[JOINT].internal_occurred != 0);
 }
 
-/// The drive must go through Init to clear its error. If the last parameter arrives in the very next frame, the arm is held only after the
-/// clear.
+/// The drive must change to Init to clear its error. Even if the last parameter arrives in the next frame, the arm is held only after the
+/// drive has cleared its error.
 #[test]
 fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
     let mut rig = Rig::new(Config::avena());
@@ -211,12 +212,12 @@ fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
 fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
     let mut rig = Rig::new(Config::avena());
     rig.run(500);
-    // Without parameters the controller stays in Init, and no joint is enabled.
+    // Without parameters, the controller stays in Init and does not enable any joint.
     assert_eq!(rig.state(), ControllerState::Init);
     assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.state == NodeState::READY && n.configured));
     let status = rig.status();
     assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
-    // Each received parameter clears its status bit. Then Init ends.
+    // Each received parameter clears its bit in the status. After the last parameter, Init ends.
     for (t, left) in [
         (FrameType::PidParamUseDefault, 0b101),
         (FrameType::FrictionTableUseDefault, 0b100),
@@ -300,13 +301,13 @@ fn j16_enabling_has_a_time_limit() {
     rig.until(200, |r| r.state() == ControllerState::HoldPos);
     rig.run(490);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // The arm must have been still for 50 ms before enabling is requested.
+    // The arm must have been at rest for 50 ms before the controller requests enabling.
     rig.run(80);
     assert_eq!(
         (rig.state(), rig.errors()),
         (ControllerState::Error, error::EXTERNAL | error::EXTERNAL_JOINTS)
     );
-    // The default setting leaves time for the motor alignment, which takes four seconds.
+    // The default enabling timeout leaves time for the motor alignment, which takes four seconds.
     assert_eq!(Config::avena().enable_timeout_ms, 10_000);
 }
 
@@ -324,7 +325,7 @@ fn j16_only_known_states_are_requested_and_positions_count_after_configuration()
         for j in 0..6 {
             let q = t.joints[j].position;
             assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
-            // Before its configuration, a drive reports the position 0, which is never latched as the hold position.
+            // Before its configuration, a drive reports the position 0. The controller never latches this position as the hold position.
             if t.state == ControllerState::HoldPos {
                 assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
             }

@@ -1,4 +1,4 @@
-//! Tests of enabling an arm with a load that the model does not contain (J-43). Every load within the torque limits is caught.
+//! Tests of enabling an arm that carries an unmodelled load (J-43). The controller catches every load within the torque limits.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -8,14 +8,14 @@ use jtc_wire::{ExecCommand, RawPoint};
 use plant::{LuGre, POSES, Plant, loaded};
 use rig::Rig;
 
-/// Friction factors from zero, which does not damp a swing, to the friction of the default arm.
+/// Factors of the friction, from zero, which does not damp a swing, to the friction of the default arm.
 const FRICTIONS: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
 
 fn friction(factor: f64) -> [LuGre; 6] {
     if factor == 0.0 { [LuGre::NONE; 6] } else { LuGre::of_avena_times(factor) }
 }
 
-/// Returns the share of its torque limit that the most loaded joint needs to hold `mass` kg.
+/// Returns the share of its torque limit that the joint with the highest load needs to hold `mass` kg.
 fn share(mass: f64, pose: &[f64; 6]) -> f64 {
     let model = loaded(Parameters::avena().model, mass);
     let gravity = Dynamics::new(&model, Config::avena().gravity).gravity_torque(pose);
@@ -23,7 +23,7 @@ fn share(mass: f64, pose: &[f64; 6]) -> f64 {
     (0..6).map(|j| gravity[j].abs() / limits[j]).fold(0.0, f64::max)
 }
 
-/// An arm with `mass` kg at the flange, whose brakes open in `pose` when its joints are enabled.
+/// An arm with `mass` kg at its flange, whose brakes open in `pose` when its joints are enabled.
 struct Let {
     arm: Plant,
     rig: Rig,
@@ -83,7 +83,8 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
                 it.caught(3000);
                 let about = format!("{mass} kg at {pose:?}, friction times {factor}");
                 assert_eq!((it.rig.state(), it.rig.errors()), (ControllerState::HoldPos, 0), "{about}");
-                // The joints sag until P and the integral carry the load. If the torque reaches its limit, they sag a little further.
+                // The joints sag until the proportional part and the integral hold the load. If the torque reaches its limit, the joints
+                // sag a little further.
                 let sag = if it.saturated > 10 { 0.02 } else { 0.01 };
                 assert!(it.sag < sag, "{about}: {} rad", it.sag);
                 let from = it.arm.q;
@@ -97,14 +98,14 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
     assert!(most > 0.93 && fought >= 6, "no load was near the limit: {most}, {fought}");
 }
 
-/// Without brakes, joint 2 moves when it is enabled, nearly as fast as allowed.
+/// When joint 2 of an arm without brakes is enabled, it moves nearly as fast as allowed.
 #[test]
 fn j43_an_unknown_payload_is_caught_in_motion() {
     for velocity in [-0.2, 0.2] {
         let mut it = Let::new(Config::avena(), 2.5, POSES[1], 0.1);
         it.arm.brakes = false;
         while !it.enabled() {
-            // Hands hold the moving arm back.
+            // Hands slow the moving arm down.
             (it.arm.q, it.arm.v) = (POSES[1], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
             it.run(1);
         }
@@ -140,8 +141,8 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
     assert!(cases > 20, "{cases}");
 }
 
-/// The time for a catch ends one second after a joint was enabled. A load that is added later is again an error according to J-43. A
-/// setting determines this time.
+/// The time for a catch ends one second after a joint was enabled. An overload by a load that is added later is again an error according to
+/// J-43. A setting determines this time.
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {
@@ -156,7 +157,7 @@ fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     }
 }
 
-/// An Execute that waits for a joint also waits until its load is caught.
+/// An Execute that waits for a joint also waits until the load of this joint is caught.
 #[test]
 fn j34_an_execute_waits_until_the_load_is_caught() {
     let mut it = Let::new(Config::avena(), 2.6, POSES[1], 0.1);

@@ -1,5 +1,5 @@
-//! Tests of the check of a trajectory (J-36). A trajectory is checked when it is loaded, and again when it is executed, because conditions
-//! may have changed.
+//! Tests of the check of a trajectory (J-36). The controller checks a trajectory when it is loaded, and again when it is executed, because
+//! conditions may have changed.
 use crate::rig;
 
 use jtc_core::check::Quantity;
@@ -7,7 +7,7 @@ use jtc_core::{Config, ControllerState, TrajectoryState, Violation};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, point, rad, rest, segment_body};
 
-/// Returns a rig with limits that differ in both directions, and without other limits.
+/// Returns a rig whose position limits differ in both directions, and whose other limits have no effect.
 fn rig() -> Rig {
     let mut config = Config::avena();
     for joint in &mut config.joints {
@@ -21,7 +21,7 @@ fn load(rig: &mut Rig, segment: u16, segments: u16, points: &[RawPoint]) -> Data
     rig.ask(FrameType::Trajectory, &segment_body(7, segment, segments, 100, points))
 }
 
-/// Returns the cause of the last refusal, which consists of the point, the joint and the quantity.
+/// Returns the cause of the last refusal: the point, the joint and the quantity.
 fn why(rig: &Rig) -> Option<(u32, usize, Quantity)> {
     rig.controller.violation().map(|v| (v.point, v.joint, v.quantity))
 }
@@ -58,7 +58,7 @@ fn j30_a_refused_segment_0_leaves_the_old_trajectory_as_it_was() {
     let mut rig = rig();
     let good: Vec<_> = (0..40).map(|i| point(2, 0.0005 * f64::from(i), 0.0, 0.0)).collect();
     assert_eq!(load(&mut rig, 0, 1, &good), DataStatus::NoError);
-    // This trajectory is as long as the old trajectory, so it would overwrite every point.
+    // The bad trajectory is as long as the old trajectory, so it would overwrite every point.
     let mut bad = vec![point(2, 0.015, 0.0, 0.0); 39];
     bad.push(point(2, 3.0, 0.0, 0.0));
     assert_eq!(load(&mut rig, 0, 1, &bad), DataStatus::IncorrectValue);
@@ -75,7 +75,7 @@ fn j30_the_right_segment_can_follow_one_that_was_refused() {
     let mut rig = rig();
     let at = |q| point(3, q, 0.0, 0.0);
     assert_eq!(load(&mut rig, 0, 2, &[at(0.0), at(0.02)]), DataStatus::NoError);
-    // The motion from the last point of a segment to the first point of the next segment is part of the path.
+    // The motion from the last point of a segment to the first point of the next segment is also part of the path.
     assert_eq!(load(&mut rig, 1, 2, &[at(0.2), at(0.2)]), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((1, 3, Quantity::PositionSpeed)));
     assert_eq!(load(&mut rig, 1, 2, &[at(0.04), point(3, 0.05, 0.2, 0.0)]), DataStatus::IncorrectValue);
@@ -102,7 +102,7 @@ fn j30_points_of_a_segment_that_loses_holdpos_do_not_count() {
         (rig.trajectory(), rig.exec(ExecCommand::Execute)),
         (TrajectoryState::Null, DataStatus::NotAllowed)
     );
-    // The whole trajectory is discarded, so a later segment cannot continue it.
+    // The controller has discarded the whole trajectory, so a later segment cannot continue it.
     let second = segment_body(7, 1, 2, 100, &[rest(0)]);
     assert_eq!(rig.ask(FrameType::Trajectory, &second), DataStatus::IncorrectSegmentOrder);
 }
@@ -129,7 +129,7 @@ fn table(low: f32, high: f32, cold: f32, warm: f32) -> Vec<u8> {
     )
 }
 
-/// Returns a motion in which joint 4 moves out and back with a peak speed of `v` rad/s, at rest at both ends.
+/// Returns the points of a motion in which joint 4 moves out and back with a peak speed of `v` rad/s, at rest at both ends.
 fn swing(v: f64) -> Vec<RawPoint> {
     [0.0, 0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0].map(|share| point(4, 0.0, share * v, 0.0)).to_vec()
 }
@@ -141,7 +141,7 @@ fn j36_velocities_outside_the_friction_table_are_refused_at_loading_and_at_execu
     assert_eq!(load(&mut rig, 0, 1, &swing(0.35)), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((6, 4, Quantity::FrictionVelocity)), "the table ends sooner below zero");
     assert_eq!(load(&mut rig, 0, 1, &swing(0.25)), DataStatus::NoError);
-    // Narrower tables arrive after the trajectory.
+    // Narrower friction tables arrive after the trajectory.
     assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.3, 0.2, 0.0, 60.0)), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((2, 4, Quantity::FrictionVelocity)));
@@ -151,7 +151,7 @@ fn j36_velocities_outside_the_friction_table_are_refused_at_loading_and_at_execu
         (ControllerState::HoldPos, TrajectoryState::Stop),
         "nothing moves"
     );
-    // The polynomial has no limited range.
+    // The friction polynomial has no limited range of velocities.
     assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
     rig.until(2000, |r| r.trajectory() == TrajectoryState::Finish);
@@ -197,7 +197,7 @@ fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_u
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
         rig.until(1000, |r| r.controller.telemetry().point == 150);
         assert!((rig.controller.telemetry().joints[4].torque_friction - column).abs() < 1e-6);
-        // During the motion, the joint temperature leaves the range of the table.
+        // During the motion, the joint temperature leaves the range of the friction table.
         rig.nodes[4].report.temperature = if temperature == 20 { 251 } else { 70 };
         rig.run(20);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Operate, 0));
@@ -215,14 +215,14 @@ fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_u
 #[test]
 fn j42_friction_acts_at_the_commanded_velocity_not_at_the_measured_one() {
     let mut rig = rig();
-    // The torque in the table depends only on the velocity and is equal to the number of the row.
+    // The torque in the friction table depends only on the velocity, and is equal to the number of the row.
     let rows = floats((0..6).flat_map(|_| {
         let axis = |from: f32, to: f32| (0..20).map(move |i| from + (to - from) * i as f32 / 19.0);
         axis(-0.95, 0.95).chain(axis(0.0, 60.0)).chain((0..400).map(|i| (i / 20) as f32))
     }));
     assert_eq!(rig.ask(FrameType::FrictionTable, &rows), DataStatus::NoError);
     assert_eq!(load(&mut rig, 0, 1, &swing(0.3)), DataStatus::NoError);
-    // This velocity is far outside the table, so the table must not be used.
+    // The measured velocity is far outside the friction table, so the controller must not look this velocity up in the table.
     rig.nodes[4].report.velocity = -1.2;
     rig.exec(ExecCommand::Execute);
     for at in [130, 250, 420, 610] {
@@ -243,7 +243,7 @@ fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
         (-0.025, TrajectoryState::Stop),
     ] {
         let mut rig = Rig::new(Config::avena());
-        // Enabling a drive takes long, and the arm sags meanwhile.
+        // Enabling a drive takes a long time, and the arm sags during this time.
         rig.nodes[5].slow_enable = true;
         rig.defaults();
         rig.until(300, |r| r.state() == ControllerState::HoldPos);
@@ -271,7 +271,7 @@ fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
     }
 }
 
-/// Existing trajectories are accepted or refused as before (19 columns of int16, 10 ms apart).
+/// The check accepts or refuses existing trajectories as before (19 columns of int16, 10 ms apart).
 #[test]
 fn j36_the_existing_trajectories_keep_their_verdicts() {
     for (name, passes) in [("TrajectoryInt.csv", true), ("TrajectoryInt_Long.csv", false)] {
@@ -315,7 +315,7 @@ fn quintic(from: f64, to: f64) -> Vec<RawPoint> {
         .collect()
 }
 
-/// Returns a rig whose joint 2 is at rest at `at`. The position limits are -0.55 and 1.15 rad.
+/// Returns a rig whose joint 2 is at rest at `at`. The position limits of joint 2 are -0.55 and 1.15 rad.
 fn standing(at: f64) -> Rig {
     let mut config = Config::avena();
     (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
@@ -330,7 +330,7 @@ fn standing(at: f64) -> Rig {
     rig
 }
 
-/// Executes the path to its end. Returns the furthest set positions of joint 2.
+/// Executes a path to its end. Returns the lowest and the highest set position of joint 2.
 fn executed(rig: &mut Rig, points: &[RawPoint]) -> (f64, f64) {
     for (n, part) in points.chunks(60).enumerate() {
         let body = segment_body(3, n as u16, points.len().div_ceil(60) as u16, 10, part);
@@ -354,8 +354,8 @@ fn executed(rig: &mut Rig, points: &[RawPoint]) -> (f64, f64) {
     ends
 }
 
-/// The limits are not exactly representable in the wire format. The nearest representable positions are 1.150041 and -0.550044 rad, which
-/// are outside the limits.
+/// The wire format cannot represent these position limits exactly. The nearest positions in the wire format are 1.150041 and -0.550044 rad,
+/// which are outside the limits.
 #[test]
 fn j36_j43_a_path_that_ends_on_a_limit_is_executed() {
     for limit in [1.15, -0.55] {
@@ -370,7 +370,7 @@ fn j36_j43_a_path_that_ends_on_a_limit_is_executed() {
             "{ends:?}"
         );
         assert_eq!(rig.controller.telemetry().joints[1].set_position, last);
-        // The path back from the limit is also executed.
+        // The controller also executes the path back from the limit.
         executed(&mut rig, &quintic(limit, limit - 0.3 * f64::signum(limit)));
     }
 }
@@ -384,12 +384,12 @@ fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
             rig.plain = plain;
             let points = quintic(from, to);
             let (low, high) = executed(&mut rig, &points);
-            // The start position is accurate to one step of the wire format.
+            // The start position has an error of at most one step of the wire format.
             let (lowest, highest) = (from.min(to) - 97e-6, from.max(to) + 97e-6);
             assert!(low >= lowest && high <= highest, "{from} to {to}: {low}..{high}");
         }
     }
-    // A path is refused if it moves further beyond the limit, or begins too far beyond the limit.
+    // The controller refuses a path that moves further beyond the limit, or that begins too far beyond the limit.
     for (from, to) in [(1.165, 1.169), (-0.555, -0.56), (1.175, 0.8), (-0.575, 0.0)] {
         let mut rig = standing(from);
         let body = segment_body(3, 0, 1, 10, &quintic(from, to));
@@ -400,11 +400,11 @@ fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
     }
 }
 
-/// The controller detects in motion an error that the check cannot detect, because the points in memory change after the check.
+/// The points in memory change after the check. The check cannot detect this error, but the controller detects the error in motion.
 #[test]
 fn j43_beyond_what_is_tolerated_a_position_ends_the_motion() {
     let mut points = quintic(0.8, 1.15);
-    // The points are moved by two steps after the check, so that only the supervision in motion can detect it.
+    // The points are moved by two steps after the check, so that only the supervision in motion can detect the error.
     let mut rig = standing(0.8);
     assert_eq!(rig.ask(FrameType::Trajectory, &segment_body(3, 0, 1, 10, &points)), DataStatus::NoError);
     points.iter_mut().skip(140).for_each(|point| point.position[1] += 2);

@@ -1,4 +1,4 @@
-//! Tests of the control law in the loop of the controller (section 6), and of torque without steps.
+//! Tests of the control law as a part of the controller (section 6), and of torque without steps.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, joint_error};
@@ -14,7 +14,7 @@ fn model(rig: &Rig) -> [f64; 6] {
     rig.controller.telemetry().joints.map(|j| j.torque_model)
 }
 
-/// Runs `ticks` and asserts that no torque steps by more than its model part and `slack` N·m.
+/// Executes `ticks` and asserts that the torque of each joint changes per tick by at most its model part plus `slack` N·m.
 fn run_without_steps(rig: &mut Rig, ticks: usize, slack: f64) {
     for _ in 0..ticks {
         let (t0, m0) = (torques(rig), model(rig));
@@ -41,7 +41,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
     let points: Vec<_> = (0..100i16)
         .map(|i| RawPoint {
             position: [i; 6],
-            // The velocity rises and falls again, because the motion must end at rest.
+            // The velocity of the path rises and falls again, because the motion must end at rest.
             velocity: [50 * i.min(99 - i), 0, 30 * i.min(99 - i), 0, 0, 0],
             acceleration: [300, 0, 200, 0, 0, 100],
         })
@@ -71,7 +71,7 @@ fn j40_gravity_is_a_setting() {
     for j in 0..6 {
         assert!((model(&down)[j] + model(&up)[j]).abs() < 1e-9);
     }
-    // At position zero the arm is stretched vertically. Joint 1 is loaded only if gravity is horizontal.
+    // At position zero, the arm is stretched vertically. Joint 1 is loaded only if gravity is horizontal.
     assert!(model(&down)[1].abs() < 1.0);
     assert!(model(&sideways)[1].abs() > 50.0);
 }
@@ -97,7 +97,7 @@ fn j41_no_derivative_kick_when_holding_begins() {
 fn j43_an_error_zeroes_the_torque_of_the_same_tick() {
     let config = Config { torque_release: true, torque_over_ms: 0, catch_ms_max: 0, ..Config::avena() };
     let mut rig = Rig::holding_with(config);
-    rig.push(5, 0.02); // 80 N·m computed, 40 N·m allowed
+    rig.push(5, 0.02); // The computed torque is 80 N·m, the limit is 40 N·m.
     rig.run(2);
     assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
@@ -125,7 +125,7 @@ fn j43_the_torque_saturates_at_its_limit_for_a_while_at_most_and_j41_holds_the_i
 
 #[test]
 fn j42_polynomial_order_and_lengths() {
-    // The wire format begins with the highest index, so the order is c3, c2, c1, c0.
+    // The wire format begins with the coefficient of the highest index, so the order is c3, c2, c1, c0.
     let mut rig = Rig::holding();
     let four = floats((0..6).flat_map(|_| [0.0, 0.0, 0.0, 5.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &four), DataStatus::NoError);
@@ -151,7 +151,7 @@ fn j42_polynomial_order_and_lengths() {
 fn j44_no_torque_step_at_any_switch() {
     let mut rig = Rig::holding();
     rig.follow = false;
-    // A permanent position error is set, so that the PID controller has torque that must be continued.
+    // The rig has a permanent position error, so that the PID controller has a torque that must be continued.
     for j in 0..6 {
         rig.nodes[j].report.position = 0.0003;
     }
@@ -161,7 +161,7 @@ fn j44_no_torque_step_at_any_switch() {
     let points: Vec<_> = (0..60).map(|_| rest(0)).collect();
     rig.upload(&points, 10);
     rig.send(FrameType::TrajSetExecStatus, &[3]);
-    // The slack is for the integral and for the blend of 100 ms.
+    // The slack covers the integral and the blend of 100 ms.
     run_without_steps(&mut rig, 1200, 1.5);
     assert_eq!(rig.trajectory(), TrajectoryState::Finish);
     rig.send(FrameType::TeachingModeEnable, &[]);
@@ -170,7 +170,7 @@ fn j44_no_torque_step_at_any_switch() {
     rig.send(FrameType::TeachingModeDisable, &[]);
     run_without_steps(&mut rig, 300, 1.5);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // New gains are set while the arm is held.
+    // The host sets new gains while the arm is held.
     rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, -1.0, 1.0])));
     run_without_steps(&mut rig, 300, 1.5);
 }
@@ -182,14 +182,14 @@ fn j25_teaching_compensates_gravity_and_damps_what_moves() {
     rig.run(150);
     rig.run(100);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
-    // The joint itself has more friction than Teaching adds. Teaching compensates half of the Coulomb part.
+    // The joint itself has more friction than Teaching would add. Teaching compensates half of the Coulomb friction.
     rig.nodes[2].report.velocity = 0.2;
     rig.run(3);
     let t = rig.controller.telemetry().joints[2];
     assert!((t.torque_other + 60.0 * 0.2).abs() < 0.01, "{t:?}");
     assert!(t.torque_friction > 1.0 && t.torque_friction < 6.0, "{t:?}");
     assert!((t.torque - t.torque_model - t.torque_friction - t.torque_other).abs() < 1e-9, "{t:?}");
-    // The torque never exceeds the limit of the joint.
+    // In Teaching, the torque never exceeds the torque limit of the joint.
     rig.nodes[2].report.velocity = -1.999;
     rig.nodes[5].report.velocity = 1.999;
     rig.run(5);
@@ -214,7 +214,7 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
 
 #[test]
 fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
-    // In the rig, the joint moves without torque, so the torque must not reach its limit.
+    // In the rig, a joint moves without torque, so the torque must not reach its limit.
     let mut config = Config::avena();
     config.joints[1].torque_max = 360.0;
     let limits = config.joints[1];
@@ -241,7 +241,7 @@ fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
                 let t = rig.controller.telemetry().joints[1];
                 assert!(side * (limit - t.set_position) >= 0.0, "{} beyond {limit}", t.set_position);
                 assert!((t.set_velocity - last.set_velocity).abs() < 0.01, "{last:?} {t:?}");
-                // J-40: the torque consists of gravity and the torque that decelerates the joint.
+                // J-40: the commanded torque is the sum of gravity and the torque that decelerates the joint.
                 let now = rig.controller.telemetry().joints;
                 let q = now.map(|j| j.position + (j.set_position - j.due_position));
                 let (v, a) = (now.map(|j| j.set_velocity), now.map(|j| j.set_acceleration));
@@ -269,13 +269,13 @@ fn j06_refused_parameters_change_nothing() {
     let mut polynomial = vec![0.0f32; 24];
     polynomial[23] = f32::NEG_INFINITY;
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &floats(polynomial)), DataStatus::IncorrectValue);
-    // In this table, an axis of the last joint does not increase.
+    // In this table, the values of an axis of the last joint do not increase.
     let mut table: Vec<f32> = (0..6)
         .flat_map(|_| (0..20).map(|i| i as f32).chain((0..20).map(|i| i as f32)).chain((0..400).map(|_| 1.0)))
         .collect();
     table[5 * 440 + 7] = table[5 * 440 + 6];
     assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table.clone())), DataStatus::IncorrectValue);
-    // All values are zero, so the masses of links 1..5 are zero.
+    // All values of this model are zero, so the masses of links 1..5 are zero.
     assert_eq!(rig.ask(FrameType::ArmModel, &vec![0; 532]), DataStatus::IncorrectValue);
     let status = rig.status();
     assert_eq!((status.jtc_init, status.friction_type), (0b111, 0));

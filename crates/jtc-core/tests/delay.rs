@@ -1,5 +1,5 @@
-//! A measurement is older than the command of the same tick. The controller compares the measurement with the set value that was due at the
-//! time of the measurement (J-62).
+//! A measurement is older than the set value of the same tick. The controller compares each measurement with the set value for the time of
+//! the measurement (J-62).
 use crate::{plant, rig};
 
 use std::collections::VecDeque;
@@ -12,20 +12,20 @@ use proptest::prelude::*;
 use rig::{Rig, floats, pieces, put};
 
 const DT: f64 = 1e-3;
-/// Highest delay setting.
+/// Highest allowed delay setting.
 const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
-    // The deviation that a wrong delay causes in an exact motion must not be considered a push.
+    // The deviation that a wrong delay causes in an exact motion must not count as a push.
     let mut config = Config { delay_ticks: ticks, torque_release: true, ..Config::avena() };
     if ticks > 3 {
-        // With the longest delays, the gains need joints with more inertia (J-71).
+        // With the longest delays, the gains require joints with more inertia (J-71).
         config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 1.8);
     }
     config
 }
 
-/// Returns motions of all joints (rad), out and back in `seconds` each.
+/// Returns the points of a motion of all joints by `ways` (rad) and back, in `seconds` for each direction.
 fn there_and_back(ways: &[f64; 6], seconds: f64) -> Vec<RawPoint> {
     let steps = (100.0 * seconds) as u32;
     let point = |k: u32| {
@@ -47,13 +47,13 @@ fn there_and_back(ways: &[f64; 6], seconds: f64) -> Vec<RawPoint> {
 struct LateArm {
     arm: Plant,
     rig: Rig,
-    /// True positions of the last ticks, newest first.
+    /// True positions of the joints in the last ticks, newest first.
     past: VecDeque<[f64; 6]>,
     late: usize,
 }
 
 impl LateArm {
-    /// Creates an arm that equals the model, without friction, so that the remaining deviation comes from late measurements.
+    /// Creates an arm that is equal to its model and has no friction, so that late measurements cause the only deviation.
     fn holding(late: u8, config: Config) -> Self {
         let arm = Plant::new(&Parameters::avena().model, [LuGre::NONE; 6], [0.0; 6]);
         let mut rig = Rig::new(config);
@@ -68,15 +68,15 @@ impl LateArm {
         all
     }
 
-    /// Advances one millisecond. The controller receives an answer of the rig in the next tick, when it is one tick old.
+    /// Advances one millisecond. The controller receives an answer of the rig in the tick after the answer was sent.
     fn tick(&mut self) {
         self.past.pop_back();
         self.past.push_front(self.arm.q);
         self.arm.tick_seen_at(&mut self.rig, &self.past[self.late - 1]);
     }
 
-    /// Executes `points`. Returns two values for each joint: the RMS of the difference between commanded and true position, and the RMS of
-    /// the commanded velocity.
+    /// Executes a path with these `points`. Returns two values for each joint: the RMS of the difference between commanded and true
+    /// position, and the RMS of the commanded velocity.
     fn follow(&mut self, points: &[RawPoint]) -> [(f64, f64); 6] {
         self.rig.upload(points, 10);
         self.rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
@@ -106,8 +106,8 @@ impl LateArm {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() })]
 
-    /// If the delay setting is wrong by some ticks, the arm deviates by its motion in these ticks. With the right setting, only a small
-    /// part of the deviation remains.
+    /// If the delay setting is wrong by some ticks, the arm deviates by the distance that it moves in these ticks. With the correct
+    /// setting, only a small part of this deviation remains.
     #[test]
     fn j62_the_true_position_follows_best_with_the_delay_that_the_answers_have(
         late in 1..=4u8,
@@ -128,8 +128,8 @@ proptest! {
     }
 }
 
-/// Simulated arm that is exactly at its commanded position in each tick, or at the position to which a hand leads it. The answers of the
-/// arm are at least two ticks old.
+/// Simulated arm that is exactly at its commanded position in each tick, or at the position to which a hand has moved it. The answers of
+/// the arm are at least two ticks old.
 struct ExactArm {
     rig: Rig,
     here: [f64; 6],
@@ -140,11 +140,12 @@ impl ExactArm {
     fn holding(late: u8) -> Self {
         let mut rig = Rig::holding_with(delayed(late));
         rig.follow = false;
-        // The controller receives an answer of this tick in the next tick. The answer reflects the command of the last tick.
+        // The controller receives an answer of this tick in the next tick. The answer of this tick shows the effect of the command of the
+        // last tick.
         Self { rig, here: [0.0; 6], past: vec![[0.0; 6]; usize::from(late) - 2].into() }
     }
 
-    /// Runs one tick, in which a hand leads a taught arm at this velocity (rad/s).
+    /// Executes one tick. In Teaching, a hand moves the arm at the velocity `led` (rad/s).
     fn tick(&mut self, led: f64) -> [JointTelemetry; 6] {
         self.past.push_front(self.here);
         let seen = self.past.pop_back().expect("as many as before");
@@ -162,7 +163,7 @@ impl ExactArm {
         now
     }
 
-    /// Runs ticks until `done`. Checks that the torque of the PID controller is zero in every tick.
+    /// Executes ticks until `done` returns `true`. Checks that the torque of the PID controller is zero in every tick.
     fn run(&mut self, what: &str, led: f64, mut done: impl FnMut(&Rig) -> bool) {
         for tick in 0..5_000 {
             if done(&self.rig) {
@@ -185,7 +186,7 @@ impl ExactArm {
         panic!("{what}: it goes on for ever: {:?}", self.rig.controller.telemetry());
     }
 
-    /// Sends a command and runs until it has taken effect.
+    /// Sends a command and executes ticks until the command has taken effect.
     fn command(&mut self, what: &str, frame: FrameType, body: &[u8], done: fn(&Rig) -> bool) {
         self.rig.send(frame, body);
         let mut ticks = 0;
@@ -196,7 +197,7 @@ impl ExactArm {
     }
 }
 
-/// If an arm follows exactly, the torque of the PID controller is zero when a motion begins, continues or ends.
+/// If an arm follows its set values exactly, the torque of the PID controller is zero when a motion begins, continues or ends.
 #[test]
 fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
     const EXEC: FrameType = FrameType::TrajSetExecStatus;
@@ -223,7 +224,7 @@ fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
             });
             arm.rig.send(FrameType::TeachingModeDisable, &[]);
             arm.run("teaching ends", led, held);
-            // The joint has moved further, and comes to rest from its present position.
+            // The joint has moved since the measurement, and comes to rest from its present position.
             let from = arm.here[0];
             for _ in 0..400 {
                 arm.tick(0.0);
@@ -239,7 +240,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
     const JOINT: usize = 1;
     for (late, velocity) in [(2, 0.6), (3, -0.4), (5, 1.1), (DELAY_MAX, -1.2)] {
         let mut arm = ExactArm::holding(late);
-        // Enabling a drive takes long, and the joint begins to fall meanwhile.
+        // Enabling a drive takes a long time, and the joint begins to fall during this time.
         arm.rig.nodes[JOINT].slow_enable = true;
         arm.rig.press_stop(1);
         arm.rig.clear(true, 0x7F);
@@ -255,7 +256,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
         }
         arm.rig.nodes[JOINT].report.velocity = velocity;
         arm.rig.nodes[JOINT].report.state = jtc_bus::NodeState::ENABLED;
-        // The joint continues its motion until its answer has arrived.
+        // The joint continues its motion until the controller has received its answer.
         for _ in 0..900 {
             arm.past.push_front(arm.here);
             let seen = arm.past.pop_back().expect("as many as before");
@@ -273,12 +274,12 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
     }
 }
 
-/// A motion of joint 1 at 1 rad/s for half a second.
+/// Returns the points of a motion of joint 1 at 1 rad/s for half a second.
 fn steady() -> Vec<RawPoint> {
     pieces(0, &[(5.0, 20), (0.0, 50), (-5.0, 20)])
 }
 
-/// At this speed a joint moves by 1 mrad per tick.
+/// At 1 rad/s, a joint moves by 1 mrad per tick.
 #[test]
 fn j43_j62_the_position_error_is_that_of_the_same_time() {
     for late in 2..=DELAY_MAX {
@@ -305,8 +306,8 @@ fn j43_j62_the_position_error_is_that_of_the_same_time() {
     }
 }
 
-/// The reported position error is the position error that the control law uses. With a delay, the error belongs to the time that is earlier
-/// by the number of delay ticks.
+/// The reported position error is the position error that the control law uses. With a delay, the reported position error belongs to a time
+/// that is earlier by the number of delay ticks.
 #[test]
 fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     for delay in 0..=DELAY_MAX {
@@ -333,8 +334,8 @@ fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     }
 }
 
-/// Without a delay, the control law equals the law of J-40 and J-41 in every bit, because the set value of this tick is compared with the
-/// measured position.
+/// Without a delay, the control law compares the set value of this tick with the measured position. The law is then equal to the law of
+/// J-40 and J-41 in every bit.
 #[test]
 fn j62_without_a_delay_the_present_set_value_is_compared() {
     let config = delayed(0);
@@ -361,8 +362,9 @@ fn j62_without_a_delay_the_present_set_value_is_compared() {
     assert!(moved > 0.2, "{moved} rad/s");
 }
 
-/// The prediction for a lost measurement equals the measurement. For an arm that follows exactly, the torque of the PID controller is zero.
-/// The loss may occur at any time in a motion with corners of the velocity, and the answers may have any age.
+/// The prediction for a lost measurement is equal to this measurement. For an arm that follows its set values exactly, the torque of the
+/// PID controller is therefore zero. The loss may occur at any time in a motion with corners of the velocity, and the answers may have any
+/// age.
 #[test]
 fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
     for late in [2, 4, DELAY_MAX] {
@@ -378,12 +380,12 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
             }
             assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
         }
-        // The prediction uses the rate of the last 5 ms, which contain a velocity corner until 4 ms after the corner.
+        // The prediction uses the rate of the last 5 ms. The window of 5 ms contains a corner of the velocity until 4 ms after the corner.
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }
 
-/// If measurements are lost while position hold begins during a motion, the prediction continues as usual, because the restarted set values
+/// Measurements may be lost while position hold begins during a motion. The prediction continues as usual, because the restarted set values
 /// do not change the true motion.
 #[test]
 fn j63_a_loss_over_the_end_of_teaching_makes_no_step() {

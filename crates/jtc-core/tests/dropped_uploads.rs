@@ -1,5 +1,5 @@
-//! A Stop during an upload drops the upload. The dropped upload is not executed, not even in part, and jogging, teaching and the next
-//! upload are possible (J-30, J-58).
+//! Tests of a Stop during an upload, which drops the upload. The controller does not execute any part of the dropped upload, and jogging,
+//! Teaching and the next upload are possible (J-30, J-58).
 use crate::rig;
 
 use jtc_core::{ControllerState, TrajectoryState};
@@ -19,13 +19,13 @@ fn jog(rig: &mut Rig) -> DataStatus {
     rig.ask(FrameType::Jog, &floats([0.1f32, 0.0, 0.0, 0.0, 0.0, 0.0]))
 }
 
-/// Returns the records of Stop frames.
+/// Returns the data statuses of the Stop frames.
 fn stops(rig: &Rig) -> Vec<DataStatus> {
     let stop = |record: &&Response| record.frame_type == FrameType::TrajSetExecStatus as u8;
     rig.records().iter().filter(stop).map(|record| record.data).collect()
 }
 
-/// Checks that jogging and teaching are possible after the Stop and, with `upload`, the next upload as well.
+/// Checks that jogging and Teaching are possible after the Stop and, if `upload` is `true`, also the next upload.
 fn all_is_free(rig: &mut Rig, upload: bool) {
     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "nothing to execute");
     if upload {
@@ -65,7 +65,8 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
                     (rig.state(), rig.trajectory()),
                     (ControllerState::HoldPos, TrajectoryState::Null)
                 );
-                // A client that continues the upload gets an error for each segment, and no part of the upload is ever executed.
+                // A client that continues the upload gets an error for each segment, and the controller never executes any part of the
+                // upload.
                 for n in received..SEGMENTS {
                     assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NotAllowed, "segment {n}");
                     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed);
@@ -106,7 +107,7 @@ fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     }
 }
 
-/// Segment 0 of an upload was received before the Stop, but not processed yet. The earlier trajectory stays in memory.
+/// The controller received segment 0 of an upload before the Stop, but has not processed it yet. The earlier trajectory stays in memory.
 #[test]
 fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     let mut rig = Rig::holding();
@@ -130,7 +131,7 @@ fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
     rig.tick();
     assert_eq!(rig.controller.telemetry().point, 590);
-    // The next upload is possible, and its order is checked as usual.
+    // The next upload is possible, and the order of its segments is checked as usual.
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 0, 10)), NoError);
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 2, 10)), IncorrectSegmentOrder);
 }
@@ -162,8 +163,8 @@ fn j30_a_pause_drops_no_upload() {
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
 }
 
-/// A host on a plain line cannot handle a refused segment. Therefore the upload is completed, but the Stop still takes effect, so the
-/// trajectory is not executed.
+/// A host on a plain line cannot handle a refused segment. Therefore a host on a plain line can complete the upload. The Stop still takes
+/// effect, so the controller does not execute the trajectory.
 #[test]
 fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
     // The test varies the line of the Stop, the segment that is being processed, and the ticks since this segment was sent.
@@ -172,7 +173,7 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
             for ticks in [0, 1, 5, 19, 23] {
                 let case = format!("line {line}, segment {at}, {ticks} ms");
                 let mut rig = Rig::holding();
-                // The earlier trajectory can no longer be executed.
+                // The controller can no longer execute the earlier trajectory.
                 rig.upload(&[rest(0); 60], 10);
                 rig.plain = true;
                 rig.statuses.clear();
@@ -195,7 +196,7 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
                 if at > 0 {
                     assert_eq!(stops(&rig)[0], NoError, "{case}: it has done something");
                 }
-                // The next upload is executed.
+                // The controller executes the next upload.
                 rig.upload(&[rest(0); 60], 10);
                 assert_eq!(rig.exec(ExecCommand::Execute), NoError, "{case}");
                 rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
@@ -205,13 +206,13 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
     }
 }
 
-/// In the opposite case, only a Stop during the upload prevents the execution of the trajectory of a plain host.
+/// On a plain line, only a Stop during the upload prevents the execution of the trajectory.
 #[test]
 fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     for command in [None, Some(UrgentCommand::Pause), Some(UrgentCommand::Stop)] {
         let mut rig = Rig::holding();
         rig.plain = true;
-        // The command comes before the upload. A Pause may also come during the upload.
+        // The Stop or Pause arrives before the upload. A Pause may also arrive during the upload.
         if let Some(command) = command {
             rig.urgent(1, command);
             rig.run(3);
@@ -226,7 +227,7 @@ fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     }
 }
 
-/// An upload that was begun by a client with extensions is dropped, even if its line has become plain.
+/// A Stop drops an upload of a client with extensions, even if the line of this client has become plain.
 #[test]
 fn j30_an_upload_of_a_client_that_knows_extensions_is_dropped_on_a_line_that_became_plain() {
     let mut rig = Rig::holding();
@@ -242,7 +243,7 @@ fn j30_an_upload_of_a_client_that_knows_extensions_is_dropped_on_a_line_that_bec
     );
 }
 
-/// An incomplete upload does not block jogging, and an upload may be completed during a jog.
+/// An incomplete upload does not prevent jogging, and a host may complete an upload during a jog.
 #[test]
 fn j58_joints_are_jogged_during_an_upload() {
     for plain in [true, false] {
@@ -254,10 +255,10 @@ fn j58_joints_are_jogged_during_an_upload() {
             assert_eq!(jog(&mut rig), NoError, "after segment {n}");
             rig.run(100);
         }
-        // J-51: segment 0 of the upload decides which data status is reported.
+        // J-51: the line of segment 0 decides which data status the controller reports.
         let refused = if plain { IncorrectValue } else { NotAllowed };
         assert_eq!(rig.exec(ExecCommand::Execute), refused, "not while joints are jogged");
-        // A Stop ends the jog and drops the upload.
+        // A Stop ends the jog and also drops the upload.
         assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, 0, 100)), NoError);
         assert_eq!(jog(&mut rig), NoError);
         rig.urgent(0, UrgentCommand::Stop);
@@ -267,7 +268,8 @@ fn j58_joints_are_jogged_during_an_upload() {
     }
 }
 
-/// The record of an earlier Stop on the line does not hide a later Stop. Segment 0 between them was sent before the second Stop.
+/// The response record of an earlier Stop on the line does not hide a later Stop. Segment 0 between these two Stops was sent before the
+/// second Stop.
 #[test]
 fn j30_each_of_several_stops_drops_the_upload_before_it() {
     for frames_first in 0..2 {
@@ -278,7 +280,7 @@ fn j30_each_of_several_stops_drops_the_upload_before_it() {
                         format!("{frames_first} long frames, {stops_first} Stops, line {line}, {ticks} ms");
                     let mut rig = Rig::holding();
                     rig.statuses.clear();
-                    // This frame takes some ticks, during which the other frames wait.
+                    // The friction frame takes some ticks, during which the other frames wait.
                     (0..frames_first).for_each(|_| rig.send(FrameType::FrictionTableUseDefault, &[]));
                     (0..stops_first).for_each(|_| rig.urgent(0, UrgentCommand::Stop));
                     rig.send(FrameType::Trajectory, &segment(7, 0, 10));

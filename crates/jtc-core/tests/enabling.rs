@@ -1,5 +1,5 @@
-//! Joints are enabled only while the arm is almost at rest. If a joint moves nevertheless, the joint comes to rest without a torque step
-//! (J-16).
+//! Tests of enabling (J-16): the controller enables joints only while the arm is almost at rest. If a joint moves nevertheless, this joint
+//! comes to rest without a torque step.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -9,12 +9,12 @@ use rig::Rig;
 
 const JOINT: usize = 1;
 
-/// Swings joint 1 in Error, after the cause of the error has ended and was cleared. `report` maps the true position and velocity to the
-/// reported position and velocity.
+/// Swings joint 1 in Error, after the cause of the error has ended and the host has cleared it. `report` maps the true position and
+/// velocity to the reported position and velocity.
 fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     let start = rig.nodes[JOINT].report.position;
     for k in 0..ticks {
-        // The joint moves to and fro, 0.2 s in each direction, so that it stays near its position.
+        // The joint moves for 0.2 s in each direction, so it stays near its position.
         let phase = (k % 400) as f64;
         let (way, sign) = if phase < 200.0 { (phase, 1.0) } else { (400.0 - phase, -1.0) };
         let (position, velocity) = report(speed * way * 0.001, sign * speed);
@@ -33,7 +33,7 @@ fn asked_to_enable(requests: &[Request]) -> bool {
         .any(|r| matches!(r, Request::ChangeFsm { target } if target[..6].contains(&Target::Enable)))
 }
 
-/// Returns a rig in Error after all errors have been cleared.
+/// Returns a rig in Error, after the host has cleared all errors.
 fn stopped(config: Config) -> Rig {
     let mut rig = Rig::new(config);
     rig.defaults();
@@ -55,7 +55,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             swing(&mut rig, 100, speed, report);
             rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
             let from = rig.sent.len();
-            // The time limit of enabling runs only while enabling is requested.
+            // The enabling timeout runs only while the controller requests enabling.
             swing(&mut rig, 3000, speed, report);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{speed} rad/s");
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
@@ -63,7 +63,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
                 rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY),
                 "which the status shows"
             );
-            // The joint must have been slow for 50 ms.
+            // The controller enables a joint only after the joint has been slow for 50 ms.
             let from = rig.sent.len();
             swing(&mut rig, 49, 0.2, report);
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
@@ -92,7 +92,7 @@ fn j16_the_speed_and_the_time_are_settings() {
 #[test]
 fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step() {
     for velocity in [0.2, -0.7, 1.4] {
-        // The motor takes long to start, and the joint begins to fall meanwhile.
+        // Enabling the motor takes a long time, and the joint begins to fall during this time.
         let mut rig = stopped(Config::avena());
         rig.nodes[JOINT].slow_enable = true;
         rig.clear(true, 0x7F);
@@ -107,7 +107,8 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         rig.nodes[JOINT].report.state = NodeState::ENABLED;
         let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
         for tick in 0..900 {
-            // The arm moves as commanded. The controller receives the present answer of the arm two ticks after the command (J-62).
+            // The simulated joint moves as commanded. The controller receives an answer two ticks after the command that this answer
+            // reflects (J-62).
             let t = rig.controller.telemetry().joints[JOINT];
             if t.set_velocity != 0.0 {
                 rig.nodes[JOINT].report.velocity = t.set_velocity;
@@ -128,7 +129,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         let t = rig.controller.telemetry().joints[JOINT];
         let way = t.set_position - start;
         assert_eq!(t.set_velocity, 0.0);
-        // The stop takes 200 ms, or longer if a deceleration of 3 rad/s² requires more time.
+        // The stop takes 200 ms. The stop takes longer if a deceleration of 3 rad/s² requires more time.
         let seconds = f64::max(0.2, 1.5 * f64::abs(velocity) / 3.0);
         assert!(
             (way - 0.5 * seconds * velocity).abs() < 0.01,
@@ -137,8 +138,8 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
     }
 }
 
-/// The motor control of a drive pauses after a stop. If enabling were requested earlier, the joint would be enabled at the end of that
-/// pause, regardless of the motion of the arm at that time.
+/// After a stop, the motor control of a drive pauses. If the controller requested enabling earlier, the drive would enable the joint at the
+/// end of this pause, during any motion of the arm.
 #[test]
 fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     let mut rig = Rig::holding();
@@ -150,7 +151,7 @@ fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     assert!((400..=410).contains(&ticks), "{ticks} ms");
 }
 
-/// A joint that leaves OperationEnable after it has been enabled is still an error, whether the arm moves or not.
+/// If a joint leaves OperationEnable after it was enabled, this is still an error, whether the arm moves or not.
 #[test]
 fn j16_the_gate_hides_no_joint_that_leaves_operation_enable() {
     let mut rig = Rig::holding();

@@ -4,7 +4,7 @@ use crate::rig::{Rig, floats, pieces};
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, StopCause, StopKind, error, joint_error};
 
-/// Returns the shipped arm in a pose, with its friction times `friction`.
+/// Returns the default arm in a pose, with its friction multiplied by `friction`.
 fn arm(pose: [f64; 6], friction: f64) -> Plant {
     let friction = if friction == 0.0 { [LuGre::NONE; 6] } else { LuGre::of_avena_times(friction) };
     Plant::new(&Parameters::avena().model, friction, pose)
@@ -33,14 +33,14 @@ fn cause(rig: &mut Rig) -> Option<StopCause> {
     rig.info().reactions.expect("reported").stop.map(|(cause, _)| cause)
 }
 
-/// A held arm does not follow an encoder that jumps. The jump causes a held stop, and the cause is shown.
+/// A held arm does not move when an encoder jumps. The jump causes a held stop, and the status shows the cause.
 #[test]
 fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     let mut random = Random(35);
     for trial in 0..60 {
         let joint = trial % 6;
         let size = random.between(0.005, 0.3) * if trial % 4 < 2 { 1.0 } else { -1.0 };
-        // Without friction only the controller holds the joint.
+        // Without friction, only the controller holds the joint.
         let friction = if trial % 3 == 0 { 0.0 } else { 1.0 };
         let (mut arm, mut rig) = held(POSES[trial % 4], friction);
         rig.nodes[joint].glitch = size;
@@ -59,7 +59,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// An arm in motion also does not follow the jump. The arm comes to rest on its true path.
+/// An arm in motion does not follow a jump of an encoder either. The arm comes to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -87,8 +87,8 @@ fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     }
 }
 
-/// Tests which commands are accepted until the drive has been configured again. The controller has the correct positions, the drive does
-/// not.
+/// After a jump, tests which commands the controller accepts until the drive is configured again. The controller knows the correct
+/// positions, but the drive reports wrong positions.
 #[test]
 fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);
@@ -108,7 +108,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert_eq!(rig.state(), ControllerState::Teaching);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     arm.run(&mut rig, 1_000);
-    // The drive is configured again, after which its position is used.
+    // The drive is configured again, and the controller then uses the position of this drive without a correction.
     rig.send(FrameType::Disable, &[]);
     arm.run(&mut rig, 100);
     assert_eq!(rig.state(), ControllerState::Init);
@@ -120,7 +120,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert!((position - arm.q[0] - 0.05).abs() < 2e-4, "{position} of {}", arm.q[0]);
 }
 
-/// A short wrong reading of an encoder is not a jump.
+/// A wrong reading of an encoder that is shorter than five answers is not a jump.
 #[test]
 fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     for ticks in 1..5 {
@@ -134,7 +134,7 @@ fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     }
 }
 
-/// A person who leads the arm does not feel the jump. Teaching ends, and the arm is held at its present position.
+/// A person who moves the arm by hand does not feel the jump. Teaching ends, and the controller holds the arm at its present position.
 #[test]
 fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -148,7 +148,7 @@ fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     assert_eq!(cause(&mut rig).map(|cause| cause.kind), Some(StopKind::EncoderJump));
 }
 
-/// If the speed of a drive has another full scale than configured, this is detected in the first motion, and the factor is reported.
+/// If the speed of a drive has another full scale than configured, the controller detects this in the first motion and reports the factor.
 #[test]
 fn j35_a_speed_of_another_scale_is_a_held_stop() {
     for (scale, reported) in
@@ -170,7 +170,8 @@ fn j35_a_speed_of_another_scale_is_a_held_stop() {
     }
 }
 
-/// A joint cannot be held if its encoder moves while the motor is at rest. The drive misbehaves, which is an error.
+/// The controller cannot hold a joint whose encoder moves while the motor is at rest. The drive of such a joint misbehaves, which is an
+/// error.
 #[test]
 fn j35_an_encoder_that_slips_is_an_external_error() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -186,7 +187,7 @@ fn j35_an_encoder_that_slips_is_an_external_error() {
     panic!("not found: {:?}", rig.controller.telemetry().joints[3]);
 }
 
-/// If the check is switched off, positions and speeds are not compared.
+/// If the speed window is 0, the controller does not compare positions and speeds.
 #[test]
 fn j35_without_a_window_nothing_is_compared() {
     let mut arm = arm([0.0; 6], 1.0);
@@ -197,12 +198,12 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump is rarely a single step. The jump may pass through a value in between, come in two parts, coincide with lost answers or a jump of
-/// another joint, and go back.
+/// A jump is rarely a single step. The jump may pass through a value in between, consist of two parts, coincide with lost answers or a jump
+/// of another joint, and go back.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
-    // Each row contains the offsets of joints 2 and 4 from the true position (rad), each with its start time (ms), and the ticks whose
-    // answers are lost.
+    // Each course contains offsets of joints 2 and 4 from the true position (rad), each with its start time (ms). The second element of a
+    // course contains the ticks whose answers are lost.
     type Course = (&'static [(usize, f64, f64)], &'static [usize]);
     let courses: [Course; 7] = [
         (&[(0, 0.3, 0.0), (1, 0.02, 0.0)], &[]),
@@ -235,8 +236,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer with a wrong position and a wrong speed is not a jump. An answer with both errors is not used, like a wrong position without a
-/// speed for comparison.
+/// An answer with a wrong position and a wrong speed is not a jump. The controller does not use such an answer, just as it does not use a
+/// wrong position without a speed for comparison.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {
@@ -259,8 +260,8 @@ fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     }
 }
 
-/// Drives have their own clocks. Near the boundary of a tick, an answer contains the reading of this millisecond or of the previous
-/// millisecond. This difference is neither a jump nor another scale, even at full speed.
+/// Each drive has its own clock. Near the boundary of a tick, an answer contains the reading of this millisecond or of the previous
+/// millisecond. A difference of one reading does not count as a jump or as another scale, even at full speed.
 #[test]
 fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     for seed in 0..6u64 {
@@ -284,7 +285,7 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
                 *last = now;
             }
         }
-        // The position controller gets much noise, which may look like a push and end the jog.
+        // The position controller gets much noise in this test, which may look like a push and end the jog.
         let kind = cause(&mut rig).map(|cause| cause.kind);
         let alarm = matches!(kind, Some(StopKind::EncoderJump | StopKind::SpeedScale));
         assert!(!alarm && rig.state() == ControllerState::HoldPos, "seed {}: {kind:?}", seed + 1);
@@ -292,8 +293,7 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     }
 }
 
-/// In Teaching, a hand twists the gears before the motors start to turn. The controller must not interpret this twist as a slipping
-/// encoder.
+/// In Teaching, a hand twists the gears before the motors begin to turn. The controller must not take this twist for a slipping encoder.
 #[test]
 fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     for stiffness in [3_400.0, 10_000.0] {
@@ -304,7 +304,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
         rig.send(FrameType::TeachingModeEnable, &[]);
         arm.run(&mut rig, 500);
         assert_eq!(rig.state(), ControllerState::Teaching);
-        // Readings of the link's encoder, which moves to and fro within 60 ms while the motor is at rest.
+        // The encoder of the joint moves back and forth within 60 ms while the motor is at rest.
         for k in 0..600 {
             let part = 0.5 - 0.5 * (f64::from(k) * core::f64::consts::TAU / 120.0).cos();
             for (node, breakaway) in rig.nodes.iter_mut().zip([18.0, 18.0, 16.0, 8.0, 8.0, 8.0]) {
@@ -320,7 +320,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     }
 }
 
-/// After a wrong scale was found, fast motions are refused until the drives have been configured with the right scale.
+/// After a wrong scale was found, the controller refuses fast motions until the drives have been configured with the correct scale.
 #[test]
 fn j35_a_speed_of_another_scale_is_not_trusted_until_the_setting_is_right() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);

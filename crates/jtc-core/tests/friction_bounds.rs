@@ -1,5 +1,5 @@
-//! Tests of the bounds of friction from a host. All values of arms with these drives are accepted, and values that would throw an arm are
-//! refused (J-06, J-42).
+//! Tests of the bounds of friction parameters from a host (J-06, J-42). The controller accepts all values of arms with these drives, and
+//! refuses values that would throw an arm.
 use crate::rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};
@@ -18,7 +18,7 @@ fn tables() -> [Table; 6] {
     tables
 }
 
-/// Returns the coefficients c0, c1.. in the wire format, which begins with the highest index.
+/// Returns the coefficients c0, c1.. in the order of the wire format, which begins with the highest index.
 fn wire<const N: usize>(joints: &[[f64; N]; 6]) -> Vec<u8> {
     floats(joints.iter().flat_map(|c| c.iter().rev().map(|c| *c as f32)))
 }
@@ -29,7 +29,7 @@ fn table_wire(tables: &[Table; 6]) -> Vec<u8> {
     }))
 }
 
-/// A table of the torques `torque`, which begins at `velocity` and has steps of 0.1 rad/s.
+/// Returns a friction table with the torques `torque`, which begins at `velocity` and has steps of 0.1 rad/s.
 fn table_of(velocity: f32, torque: impl Fn(f32) -> f32) -> Table {
     let velocity: [f32; 20] = core::array::from_fn(|i| velocity + 0.1 * i as f32);
     Table {
@@ -39,7 +39,7 @@ fn table_of(velocity: f32, torque: impl Fn(f32) -> f32) -> Table {
     }
 }
 
-/// Executes a path through standstill. Returns the friction torques of all joints on it.
+/// Executes a path through standstill. Returns the friction torques of all joints on this path.
 fn friction_on_a_path(rig: &mut Rig) -> Vec<[u64; 6]> {
     let points: Vec<_> = (0..60i16)
         .map(|i| {
@@ -49,7 +49,7 @@ fn friction_on_a_path(rig: &mut Rig) -> Vec<[u64; 6]> {
         .collect();
     rig.execute(&points);
     let mut torques = Vec::new();
-    // The list begins with the first torque, because the number of ticks until a record comes may differ.
+    // The list begins with the first friction torque, because the number of ticks until a response record arrives may differ.
     while torques.len() < 500 {
         rig.tick();
         let torque = rig.controller.telemetry().joints.map(|j| j.torque_friction.to_bits());
@@ -67,7 +67,7 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&known)), DataStatus::NoError);
     let four = known.map(|[c0, c1, c2, c3, ..]| [c0, c1, c2, c3]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&four)), DataStatus::NoError);
-    // An existing host sends the rows of its file from left to right, which is the reverse order.
+    // An existing host sends the rows of its file from left to right, so the coefficients have the reverse order.
     let reversed = known.map(|[a, b, c, d, e, f]| [f, e, d, c, b, a]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&reversed)), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::NoError);
@@ -83,7 +83,7 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     }
 }
 
-/// The frame is refused, and the friction on a path is the friction without the frame.
+/// The controller refuses the frame, and the friction torque on a path is the same as without the frame.
 fn refused_whole(what: &str, frame_type: FrameType, body: &[u8]) {
     let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
     assert_eq!(asked.ask(frame_type, body), DataStatus::IncorrectValue, "{what}");
@@ -105,7 +105,7 @@ fn j06_a_polynomial_that_would_throw_the_arm_is_refused_whole() {
         ("a huge negative cube", 3, -3e38),
         ("no number", 1, f64::NAN),
     ] {
-        // Only the last joint has a wrong value, but the friction of the other joints must also not change.
+        // Only the last joint has a wrong coefficient, but the friction of the other joints must not change either.
         let mut body = good.map(|c| c.map(|c| 0.5 * c));
         body[5] = good[5];
         body[5][place] = value;
@@ -141,11 +141,11 @@ fn j06_the_bounds_of_friction_are_settings() {
     assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::IncorrectValue);
 }
 
-/// A cubic polynomial that exceeds the bounds between the checked speeds, at slow speeds at which arms often move.
+/// The cubic polynomial of this test exceeds the bounds between the checked speeds, at slow speeds at which arms often move.
 #[test]
 fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     let limits = Config::avena().joints.map(|joint| joint.torque_max);
-    // Shares of the torque limit at 0.02 rad/s are 1.7 against the motion and 0.78 along the motion.
+    // At 0.02 rad/s, the torque is 1.7 times the torque limit against the motion, and 0.78 times this limit along the motion.
     for shares in [
         [1.946984127, -12.050370370, 21.744197531, -10.161740153],
         [-1.017777778, 12.327407407, -22.332839506, 10.155720165],
@@ -156,7 +156,7 @@ fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     }
 }
 
-/// A table may have friction at standstill. This friction is blended in during the approach, not in one tick.
+/// A friction table may contain a torque at standstill. The controller blends this torque in during the approach, not in one tick.
 #[test]
 fn j44_the_friction_of_a_table_at_standstill_makes_no_step() {
     let tables = Config::avena().joints.map(|joint| {

@@ -1,5 +1,5 @@
-//! Tests of changing the gains of a simulated arm while the arm is held. Gains that would drop the arm are refused, and gains that make the
-//! arm unstable are replaced by the earlier gains (J-71).
+//! Tests of a simulated arm whose gains change while the arm is held (J-71). The controller refuses gains that would drop the arm. The
+//! controller replaces gains that make the arm unstable by the earlier gains.
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
 use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
@@ -33,7 +33,7 @@ fn body(gains: &Gains) -> Vec<u8> {
     floats(gains.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|x| x as f32)))
 }
 
-/// Returns an arm without brakes that is held at rest, with 2 kg that the model does not contain.
+/// Returns an arm without brakes that is held at rest, with an unmodelled load of 2 kg.
 fn held_with(friction: f64) -> (Plant, Rig) {
     let model = loaded(Parameters::avena().model, 2.0);
     let friction = if friction > 0.0 { LuGre::of_avena_times(friction) } else { [LuGre::NONE; 6] };
@@ -84,8 +84,8 @@ fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     }
 }
 
-/// Without an integral the position error must hold the load that the integral had found. Gains without an integral are accepted if this
-/// error is small.
+/// Without an integral, the position error must hold the load that the integral has held. The controller accepts gains without an integral
+/// if this error is small.
 #[test]
 fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     for (kp, expected) in [(1.0, DataStatus::NoError), (0.08, DataStatus::IncorrectValue)] {
@@ -100,7 +100,7 @@ fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     }
 }
 
-/// Gains that are used on these arms, and the same gains on an arm for which they are not suitable.
+/// Tests gains that are used on these arms, and the same gains on an arm for which they are not suitable.
 #[test]
 fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
     let stronger = of([
@@ -136,7 +136,7 @@ fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
     }
 }
 
-/// Position gain that acts in a joint, N·m/rad.
+/// Returns the effective position gain of a joint, N·m/rad.
 fn stiffness(rig: &Rig, joint: usize) -> f64 {
     let joint = rig.controller.telemetry().joints[joint];
     joint.torque_p / (joint.due_position - joint.position)
@@ -147,16 +147,16 @@ fn found(rig: &Rig) -> StopKind {
     rig.controller.reactions().stop.expect("a held stop").0.kind
 }
 
-/// Returns the causes of a held stop that the status shows now.
+/// Returns the causes of a held stop that the status contains now.
 fn causes(rig: &mut Rig) -> u16 {
     rig.status().joints.iter().fold(0, |all, joint| all | joint.internal)
 }
 
-/// The swing has no external cause. The integral is too strong for the inertia, and the checks of the controller cannot detect this in
-/// advance. The arm swings within the two seconds of the trial, and the earlier gains are restored.
+/// The swing has no external cause. The integral is too strong for the inertia of the joint, and the checks of the controller cannot detect
+/// this in advance. The arm swings within the two seconds of the trial, and the controller restores the earlier gains.
 #[test]
 fn j71_gains_that_make_the_arm_swing_are_taken_back() {
-    // The last gains cause so little torque that only the swing is detected.
+    // The last gains in this list cause so little torque that only the growth of the swing is detected.
     for [kp, ki, kd] in
         [[8000.0, 50_000.0, 20.0], [2000.0, 50_000.0, 20.0], [8000.0, 14_000.0, 5.0], [400.0, 4000.0, 0.0]]
     {
@@ -164,7 +164,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         let from = arm.q;
         let swinging = of([[kp, ki, kd]; 6]);
         assert_eq!(give(&mut arm, &mut rig, &swinging), DataStatus::NoError);
-        // The trial begins at rest. A touch is sufficient to start the swing.
+        // The trial begins at rest. A touch is sufficient to start a swing.
         arm.run(&mut rig, 550);
         arm.push = [10.0, 20.0, 15.0, 5.0, 4.0, 4.0];
         arm.run(&mut rig, 30);
@@ -175,7 +175,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         assert_eq!(rig.state(), ControllerState::HoldPos, "{kp} {ki} {kd}");
         assert_eq!(found(&rig), StopKind::Gains, "{kp} {ki} {kd}: causes {causes:#x}");
         assert!(farthest < 0.05, "{kp} {ki} {kd}: {farthest} rad");
-        // The arm is held again with the earlier gains.
+        // The controller holds the arm again with the earlier gains.
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
         arm.run(&mut rig, 1_000);
         let before = shipped();
@@ -188,8 +188,8 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
     }
 }
 
-/// If a push overloads a joint while gains are on trial, the controller must not keep these gains. After the trial, a push does not affect
-/// the gains.
+/// If a push overloads a joint while gains are on trial, the controller must restore the earlier gains. After the trial, a push does not
+/// change the gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     for (wait, taken_back) in [(600, true), (1_700, true), (2_300, false)] {
@@ -205,7 +205,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
         let kind = if taken_back { StopKind::Gains } else { StopKind::Push };
         assert_eq!(found(&rig), kind, "after {wait} ms");
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
-        // A push causes a position error, from which the stiffness is measured.
+        // The push causes a position error, from which the test computes the stiffness.
         arm.push[0] = 15.0;
         arm.run(&mut rig, 20);
         let expected = if taken_back { 8000.0 } else { 4000.0 };
@@ -213,8 +213,8 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     }
 }
 
-/// A joint swings with a growing amplitude, far below its torque limit. Gains on trial are replaced by the earlier gains. Gains that have
-/// passed their trial are kept.
+/// A joint swings with a growing amplitude, far below its torque limit. The controller replaces gains on trial by the earlier gains. The
+/// controller keeps gains that have passed their trial.
 #[test]
 fn j71_a_swing_that_grows_ends_the_trial() {
     for (wait, taken_back) in [(600, true), (2_300, false)] {
@@ -258,14 +258,15 @@ fn j71_gains_come_in_without_a_step_of_the_torque() {
         println!(
             "{worst:.2} N·m a tick, {quiet:.2} without new gains; integral {integral:.1}, then {kept:.1} N·m"
         );
-        // A step of the encoder causes the same change of torque, with gains that are one and a half times as high.
+        // With gains that are one and a half times as high, a step of the encoder causes the same change of torque.
         let encoder = 1.5 * (8000.0 + 80.0 / 0.005) * plant::ENCODER_STEP;
         assert!(worst <= encoder + 0.1, "{worst} N·m, a step of the encoder makes {encoder}");
         assert!((kept - integral).abs() < 1.0, "{integral}, then {kept} N·m");
     }
 }
 
-/// A loop is unstable when the joints are enabled. No earlier gains exist, and softer gains hold the arm.
+/// The control loop of a joint is unstable when the joints are enabled. No earlier gains exist, so the controller uses softer gains, which
+/// hold the arm.
 #[test]
 fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     let model = Parameters::avena().model;
@@ -299,7 +300,7 @@ fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     assert!(speeds.iter().all(|v| *v < 0.02), "{speeds:?}");
 }
 
-/// Returns the Kp that acts in joint 1 after a small push, N·m/rad.
+/// Returns the effective Kp of joint 1 after a small push, N·m/rad.
 fn stiffness_when_pushed(arm: &mut Plant, rig: &mut Rig) -> f64 {
     arm.push[0] = 15.0;
     arm.run(rig, 20);
@@ -307,7 +308,8 @@ fn stiffness_when_pushed(arm: &mut Plant, rig: &mut Rig) -> f64 {
     stiffness(rig, 0)
 }
 
-/// The operator presses the safety input because the arm shakes, or a drive reports a fault. The arm is not enabled again with these gains.
+/// During a trial, the operator presses the emergency stop because the arm shakes, or a drive reports a fault. The controller does not
+/// enable the arm again with the gains on trial.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
     for (wait, taken_back) in [(1_000, true), (2_300, false)] {
@@ -339,7 +341,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
     }
 }
 
-/// Teaching does not test the gains, so the trial continues after it.
+/// Teaching does not test the gains, so their trial continues after Teaching.
 #[test]
 fn j71_teaching_does_not_end_a_trial() {
     let (mut arm, mut rig) = held_with(1.0);
@@ -363,8 +365,8 @@ fn j71_teaching_does_not_end_a_trial() {
     assert_eq!(found(&rig), StopKind::Gains);
 }
 
-/// If the remaining parts do not match after Disable, the arm is not stored, because its joints have too little inertia for its gains with
-/// the present settings.
+/// After Disable, gains, model and settings possibly do not match. The controller does not store an arm whose joints have too little
+/// inertia for its gains with the present settings.
 #[test]
 fn j71_an_arm_that_would_be_refused_is_not_stored() {
     use FrameType::{Disable, SetSettings, StoreArm};
@@ -379,8 +381,8 @@ fn j71_an_arm_that_would_be_refused_is_not_stored() {
     assert_eq!(rig.ask(StoreArm, &[]), DataStatus::IncorrectValue);
 }
 
-/// If gains, model and settings do not match, the last of them to arrive is refused and has no effect. After Disable another arm can be
-/// uploaded in any order.
+/// If gains, model and settings do not match, the controller refuses the last of these frames, which then has no effect. After Disable, a
+/// host can upload another arm in any order.
 #[test]
 fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     use FrameType::{
@@ -394,14 +396,15 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     let mut rig = Rig::holding();
     rig.press_stop(5);
     assert_eq!(rig.state(), ControllerState::Error);
-    // Light rotors are refused with the gains in use. Lower gains must be set first.
+    // The controller refuses rotors with low inertia while the gains in use are too high for these rotors. The host must set lower gains
+    // first.
     assert_eq!(rig.ask(SetSettings, &rotors(0.05)), bad);
     assert_eq!(rig.ask(PidParam, &body(&times(3.0))), bad);
     assert_eq!(rig.ask(PidParam, &body(&times(0.1))), good);
     assert_eq!(rig.ask(SetSettings, &rotors(0.05)), good);
     assert_eq!(rig.ask(PidParamUseDefault, &[]), bad);
     assert_eq!(rig.ask(ArmModelUseDefault, &[]), good);
-    // After Disable, a comparison is not possible until gains and model have both been received again.
+    // After Disable, the controller cannot compare gains and model until it has received gains and model again.
     assert_eq!(rig.ask(Disable, &[]), good);
     assert_eq!(rig.ask(PidParamUseDefault, &[]), good);
     assert_eq!(rig.ask(ArmModelUseDefault, &[]), bad);
@@ -410,14 +413,14 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     assert_eq!(rig.ask(FrictionPolynomialUseDefault, &[]), good);
     rig.clear(true, 0);
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // Each slice of a model takes a tick of its own, so that no tick becomes too long.
+    // Each slice of a model takes a separate tick, so that no tick becomes too long.
     rig.send(ArmModelUseDefault, &[]);
     let ticks = rig.until(100, |rig| rig.waiting() == 0);
     assert!((18..=20).contains(&ticks), "{ticks}");
 }
 
-/// Simulates jerks of the first joint of an arm without physics. Each jerk takes the torque to both limits, but is too short to overload
-/// the joint.
+/// Simulates jerks of joint 1 of an arm without physics. In each jerk, the torque reaches both limits, but for a time that is too short to
+/// overload the joint.
 fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     rig.follow = false;
     for pause in pauses_ms {
@@ -428,8 +431,8 @@ fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     }
 }
 
-/// Two joints swing under new gains. The earlier gains are restored. The restored gains are not made softer because of the swing of the
-/// second joint before that.
+/// Two joints swing with new gains. The controller restores the earlier gains. The controller does not reduce these gains because of the
+/// earlier swing of the second joint.
 #[test]
 fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
     let mut config = Config::avena();
@@ -465,13 +468,13 @@ fn j66_a_torque_that_goes_from_limit_to_limit_gets_softer_gains() {
     let holding = || {
         let mut config = Config::avena();
         config.joints[0].torque_max = 10.0;
-        // With these bounds, a joint may have more friction than torque.
+        // With these parameter bounds, a joint may have more friction than its torque limit.
         (config.parameter_bounds.friction_max, config.parameter_bounds.slow_friction_max) = (10.0, 10.0);
         let mut rig = Rig::holding_with(config);
         rig.run(1_000);
         rig
     };
-    // Single jerks with long pauses are not a swing of the loop.
+    // Single jerks with long pauses do not count as a swing of the control loop.
     let mut rig = holding();
     jerks(&mut rig, &[250, 250, 250]);
     assert_eq!(causes(&mut rig), 0);

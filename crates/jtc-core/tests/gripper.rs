@@ -1,5 +1,5 @@
-//! The gripper is brought up in parallel with the arm. The gripper never removes the torque of the arm, and never starts its pump by itself
-//! (J-14, J-23).
+//! Tests of the gripper (J-14, J-23), which the controller brings up in parallel with the arm. The gripper never causes the arm to lose its
+//! torque, and never starts its pump without a command.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request};
@@ -12,7 +12,7 @@ const FLAG: u32 = 1 << 14;
 const POWERED: [ControllerState; 3] =
     [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching];
 
-/// Returns a rig in a state with torque, with the pump on.
+/// Returns a rig in a state with torque and with its pump on.
 fn powered(state: ControllerState) -> Rig {
     powered_with(Config::avena(), state)
 }
@@ -41,8 +41,8 @@ fn pump(rig: &mut Rig, on: bool) {
     rig.run(2);
 }
 
-/// Runs ticks and checks that the arm is not disturbed. The arm has no error and no change of state, and at most about one of 20 ticks
-/// sends another frame than Move.
+/// Executes ticks and checks that the gripper does not disturb the arm. The arm has no error and does not change its state, and at most
+/// about one of 20 ticks sends another frame than Move.
 fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {
@@ -64,7 +64,7 @@ fn j23_a_gripper_that_falls_silent_is_shown_and_nothing_more() {
         let status = rig.status();
         assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, FLAG, FLAG));
         assert_eq!((status.errors, status.occurred, status.node_init), (0, 0, 1 << GRIPPER));
-        // The gripper and its pump have been on all the time, so the gripper has kept its part.
+        // The gripper and its pump have been on all the time, so the gripper has kept its workpiece.
         rig.nodes[GRIPPER].silent = false;
         undisturbed(&mut rig, 300, state);
         let status = rig.status();
@@ -100,7 +100,7 @@ fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump(
         rig.nodes[GRIPPER].report.state = NodeState::READY;
         undisturbed(&mut rig, 100, state);
         assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::ENABLED, false));
-        // A fault of the gripper is shown, and is cleared like a fault of any other node.
+        // The status shows a fault of the gripper, and a host clears it like a fault of any other node.
         rig.nodes[GRIPPER].fault();
         undisturbed(&mut rig, 100, state);
         assert_eq!(rig.status().gripper.unwrap().state, NodeState::FAULT);
@@ -144,7 +144,7 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         pump(&mut rig, true);
         assert!(rig.pump);
     }
-    // The pump also does not start after a joint has caused a return of the controller to Init.
+    // The pump does not start either after a joint has caused the controller to return to Init.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.state = NodeState::INIT;
@@ -161,13 +161,13 @@ fn j14_a_gripper_that_is_not_there_is_no_error_and_keeps_the_controller_in_init(
     assert_eq!((rig.state(), rig.errors()), (ControllerState::Init, 0));
     let status = rig.status();
     assert_eq!((status.can_error, status.can_current, status.node_init), (0, FLAG, 1 << GRIPPER));
-    // When the gripper begins to answer, it is brought up like the other nodes.
+    // When the gripper begins to answer, the controller brings it up like the other nodes.
     rig.nodes[GRIPPER].silent = false;
     rig.run(200);
     assert_eq!((rig.state(), rig.status().can_current), (ControllerState::HoldPos, 0));
 }
 
-/// Causes an error, and returns to HoldPos.
+/// Causes an error, clears it and returns to HoldPos.
 fn error_and_clear(rig: &mut Rig) {
     rig.safety_input = false;
     rig.run(100);
@@ -210,14 +210,14 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
-        // The gripper still holds the part after Init.
+        // The gripper still holds its workpiece after Init.
         rig.nodes[2].configured = false;
         rig.nodes[2].report.state = NodeState::INIT;
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
         assert!(rig.sent[from..].iter().all(|r| !matches!(r, Request::Move { pump: false, .. })));
-        // The host can release the part in Error.
+        // In Error, the host can make the gripper release its workpiece.
         error_and_clear(&mut rig);
         pump(&mut rig, false);
         assert!(!rig.pump);
@@ -225,7 +225,7 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert!(!rig.pump, "it does not start by itself");
     }
-    // If the pump was not running when the error came, it does not start afterwards.
+    // If the pump was off when the error occurred, the pump does not start after the error.
     let mut rig = Rig::holding_with(config);
     rig.nodes[GRIPPER].report.state = NodeState::new(12);
     rig.nodes[GRIPPER].slow_enable = true;
@@ -241,8 +241,8 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     );
 }
 
-/// A command that arrives during the bring-up of the gripper is executed afterwards. A command from before the reset of the gripper is not
-/// executed.
+/// A pump command that arrives during the bring-up of the gripper is executed after the bring-up. The gripper does not execute a command
+/// that arrived before its reset.
 #[test]
 fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     let mut rig = Rig::new(Config::avena());

@@ -1,5 +1,5 @@
-//! Tests of hand guiding (J-25) with the default arm, and with a UR5 and a Z1 as imported. The true masses and friction of the arms differ
-//! slightly from the models.
+//! Tests of hand guiding (J-25) with the default arm, and with an imported UR5 and an imported Z1. The true masses and friction of these
+//! arms differ slightly from their models.
 use crate::plant::{ArmFile, Plant, Random, heavier, loaded};
 use crate::rig::Rig;
 use jtc_core::ControllerState;
@@ -18,7 +18,7 @@ pub(crate) fn arms() -> [ArmFile; 6] {
     ]
 }
 
-/// Pose in which gravity loads several joints, rad.
+/// Pose in which gravity loads several joints of the arm, rad.
 pub(crate) fn pose(arm: &ArmFile) -> [f64; 6] {
     match arm.name {
         "avena" => [0.0, 0.6, -1.0, 0.3, 0.4, 0.0],
@@ -35,7 +35,7 @@ pub(crate) fn farthest(arm: &Plant, from: &[f64; 6]) -> f64 {
     (0..6).map(|j| (arm.q[j] - from[j]).abs()).fold(0.0, f64::max)
 }
 
-/// Begins Teaching as soon as it is possible.
+/// Requests Teaching, and executes ticks until Teaching has begun.
 pub(crate) fn teach(plant: &mut Plant, rig: &mut Rig) {
     rig.send(FrameType::TeachingModeEnable, &[]);
     for _ in 0..9_000 {
@@ -65,7 +65,7 @@ pub(crate) fn held(
     (plant, rig)
 }
 
-/// Returns the longest motion (rad) and the highest speed (rad/s) of a joint within `ms` of Teaching without contact.
+/// Returns the longest motion (rad) and the highest speed (rad/s) of a joint during `ms` of Teaching without contact.
 pub(crate) fn untouched(plant: &mut Plant, rig: &mut Rig, ms: usize) -> (f64, f64) {
     let (from, mut way, mut speed) = (plant.q, 0.0_f64, 0.0_f64);
     for _ in 0..ms {
@@ -103,8 +103,8 @@ fn j25_an_arm_with_a_payload_that_the_model_lacks_stays_where_it_was_found() {
     }
 }
 
-/// A hand leads the arm to another place at 0.2 rad/s and lets go. Friction holds the torque that is not explained by the found load or the
-/// model in this pose. Otherwise the arm creeps.
+/// A hand moves the arm to another pose at 0.2 rad/s and lets go of it. In this pose, friction holds the torque that neither the learned
+/// load nor the model explains. If friction cannot hold this torque, the arm creeps.
 #[test]
 fn j25_where_a_hand_lets_go_the_arm_stays_or_creeps() {
     for arm in arms() {
@@ -143,7 +143,7 @@ pub(crate) fn highest_speed(plant: &mut Plant, rig: &mut Rig, ms: usize) -> f64 
     speed
 }
 
-/// A person who leans on an arm.
+/// Description of a person who leans on an arm.
 struct Lean {
     mass: f64,
     friction: f64,
@@ -151,8 +151,8 @@ struct Lean {
     ms: usize,
 }
 
-/// Simulates a person who leans on the held arm. Teaching begins, and 50 ms later the push ends. Returns the highest speed after the push,
-/// or `None` if Teaching does not begin because the arm yields.
+/// Simulates a person who leans on the held arm. Teaching begins, and 50 ms later the person lets go of the arm. Returns the highest speed
+/// after the person has let go, or `None` if Teaching does not begin because the arm yields.
 fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     let (mut plant, mut rig) = held(arm, lean.mass, 0.0, lean.friction, q, 1_500);
     plant.push = lean.push;
@@ -169,7 +169,7 @@ fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     None
 }
 
-/// A push of 2 s is not learned as a load, but a push of 12 s is learned.
+/// The controller does not learn a push of 2 s as a load, but learns a push of 12 s.
 #[test]
 fn j25_a_lean_that_ends_drives_no_joint_fast() {
     let (ur5, z1, avena) = (ArmFile::ur5(), ArmFile::z1(), ArmFile::avena());
@@ -194,7 +194,7 @@ fn j25_a_lean_that_ends_drives_no_joint_fast() {
     }
 }
 
-/// All joints are pushed at once, up to the highest torque that is learned as a load.
+/// All joints are pushed at once, up to the highest torque that the controller learns as a load.
 #[test]
 fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     println!("seed 3");
@@ -214,7 +214,8 @@ fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     assert!(taught > 30, "{taught} of 96");
 }
 
-/// A hand pushes a joint and lets go. The joint stays far below the over-speed of the drives, and soon comes to rest.
+/// A hand pushes a joint and lets go of it. The speed of the joint stays far below the over-speed of the drives, and the joint soon comes
+/// to rest.
 #[test]
 fn j25_a_push_dies_out() {
     for (arm, joint, torque, ms) in [
@@ -239,8 +240,8 @@ fn j25_a_push_dies_out() {
     }
 }
 
-/// The push is a quarter of the torque limit, and the highest opposing torque is three tenths of the limit. In wrists the push is an eighth
-/// of the limit, because wrist rotors are so light that a stronger push would cause over-speed.
+/// The push is a quarter of the torque limit, and the highest torque against this push is three tenths of the limit. In wrist joints, the
+/// push is an eighth of the limit. The rotors of wrist joints have so little inertia that a stronger push would cause over-speed.
 #[test]
 fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     for arm in arms() {
@@ -265,7 +266,7 @@ fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     }
 }
 
-/// Teaching ends at the end of a push. The set values are at rest within 500 ms, no joint reaches its torque limit, and no error is raised.
+/// Teaching ends when a push ends. The set values are at rest within 500 ms, no joint reaches its torque limit, and no error is raised.
 #[test]
 fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     for friction in [0.7, 1.0, 1.3] {
@@ -307,7 +308,7 @@ fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     }
 }
 
-/// Returns the highest rate (1/s) at which the damping of the joints (N·m·s/rad) reduces a speed. The rate is computed by power iteration.
+/// Returns the highest rate (1/s) at which the damping of all joints (N·m·s/rad) reduces a speed. The rate is computed by power iteration.
 fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6]) -> f64 {
     let dynamics = jtc_dynamics::Dynamics::new(&arm.model, [0.0; 3]);
     let (mut v, mut rate) = ([1.0, -0.9, 0.8, -0.7, 0.6, 0.5], 0.0);
@@ -320,8 +321,8 @@ fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6
     rate
 }
 
-/// For any load of a joint, and any true rotor inertia of at least a fifth of the proposed value, the damping stays far below 200 1/s. At
-/// 200 1/s the arm would be unstable, because measured speeds are 8 ms old.
+/// The damping rate stays far below 200 1/s. The damping rate is low for any load of a joint, and for a true rotor inertia of at least a
+/// fifth of the proposed value. At 200 1/s, the arm would be unstable, because measured speeds are 8 ms old.
 #[test]
 fn j25_no_damping_is_too_much_for_a_joint() {
     println!("seed 5");

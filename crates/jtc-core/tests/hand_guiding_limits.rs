@@ -1,4 +1,4 @@
-//! Tests of the limits of hand guiding (J-25): joints that are led too fast, lost answers, lifted loads, and clamps.
+//! Tests of the limits of hand guiding (J-25): joints that a hand moves too fast, lost answers, lifted loads, and clamps.
 use jtc_core::{Config, ControllerState};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{FrameType, StopKind};
@@ -8,7 +8,7 @@ use crate::hand_guiding_loads::lead;
 use crate::plant::{ArmFile, Plant};
 use crate::rig::Rig;
 
-/// Behaviour of an arm while a joint was pushed.
+/// Result of a test in which a joint was pushed.
 struct Pushed {
     state: ControllerState,
     fastest: f64,
@@ -29,8 +29,8 @@ fn pushed(plant: &mut Plant, rig: &mut Rig, joint: usize, torque: f64, ms: usize
     Pushed { state: rig.state(), fastest: most, ended_at }
 }
 
-/// A hand pushes any joint with a quarter of the torque limit for a second. A light joint would reach its over-speed before a damper with
-/// delayed speeds could stop it. Therefore Teaching ends earlier, and the position controller stops the joint.
+/// A hand pushes any joint with a quarter of the torque limit for a second. A joint with little inertia would reach its over-speed before a
+/// damper with delayed speeds could stop it. Therefore Teaching ends earlier, and the position controller stops the joint.
 #[test]
 fn j25_a_joint_that_is_led_too_fast_is_held_and_not_released() {
     let (mut ended, mut most) = (0, 0.0_f64);
@@ -60,8 +60,8 @@ fn j25_a_joint_that_is_led_too_fast_is_held_and_not_released() {
     assert!(ended >= 4, "{ended}");
 }
 
-/// If a hand keeps pushing while the arm is held, the push is learned as a load. When the hand lets go, the learned load moves the joint
-/// slowly over a small distance, and fades.
+/// If a hand continues to push while the arm is held, the controller learns the push as a load. When the hand lets go, the learned load
+/// moves the joint slowly over a small distance, and then fades.
 #[test]
 fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
     for (arm, joint, share) in [
@@ -94,8 +94,8 @@ fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
     }
 }
 
-/// Answers of a joint that a hand leads are lost. The torque of the springs fades, followed by damping and friction compensation, because
-/// the last speed is not valid any more. The torque does not step.
+/// Answers of a joint that a hand moves are lost. The torque of the springs fades, followed by damping and friction compensation, because
+/// the last speed is too old. The torque has no step.
 #[test]
 fn j25_the_torque_of_a_joint_that_does_not_answer_fades() {
     let base = ArmFile::avena();
@@ -130,8 +130,8 @@ fn j25_the_torque_of_a_joint_that_does_not_answer_fades() {
     assert!(step < 0.45 * damped.abs() && last < -0.6 * damped.abs(), "{step} N·m, {last} N·m");
 }
 
-/// A hand repeatedly lifts a payload that is not configured, at speeds at which the payload would also rise by itself. The payload is still
-/// carried afterwards.
+/// A hand repeatedly lifts a payload that is not configured, at speeds at which the arm would also rise without the hand. Teaching still
+/// holds the payload after this.
 #[test]
 fn j25_a_payload_that_is_lifted_slowly_is_still_carried() {
     let arm = ArmFile::avena();
@@ -159,8 +159,8 @@ fn j25_a_payload_that_is_lifted_slowly_is_still_carried() {
     assert!(least > 0.5, "{least} of the payload is left");
 }
 
-/// A clamp holds a joint away from its commanded position, with up to a quarter of its torque limit. When Teaching begins, only the part of
-/// this torque that was found is carried. The carried torque fades when a hand leads the joint away.
+/// A clamp holds a joint away from its commanded position, with up to a quarter of its torque limit. At its beginning, Teaching uses only
+/// the part of the clamp torque that was learned. The learned torque fades when a hand moves the joint away from the clamp.
 #[test]
 fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     for (arm, joint, share) in
@@ -168,7 +168,7 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     {
         let limit = arm.config.joints[joint].torque_max;
         let (mut plant, mut rig) = held(&arm, 1.0, 0.0, 1.0, pose(&arm), 1_500);
-        // A spring of 3,000 N·m/rad is displaced so that it causes the torque of the clamp.
+        // A spring of 3,000 N·m/rad acts on the joint. The displacement of this spring causes the torque of the clamp.
         let end = plant.q[joint] + share * limit / 3_000.0;
         let clamp = |plant: &mut Plant| plant.push[joint] = 3_000.0 * (end - plant.q[joint]);
         for _ in 0..14_000 {
@@ -183,10 +183,10 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
             most = most.max(plant.push[joint].abs());
         }
         let about = format!("{} joint {} {share} of the limit", arm.name, joint + 1);
-        // With weak gains, the controller may have detected the clamp as a push before.
+        // With weak gains, the controller may have detected the clamp as a push before Teaching.
         assert_eq!(rig.state(), ControllerState::Teaching, "{about}");
         assert!(most <= (share.abs() + 0.06) * limit, "{about}: {most} N·m");
-        // The clamp is opened, and a hand leads the joint away from the clamp by half a radian.
+        // The clamp is opened, and a hand moves the joint away from the clamp by half a radian.
         let to = plant.q[joint] - 0.5 * share.signum();
         plant.push[joint] = 0.0;
         for k in 0..3_000 {
@@ -206,7 +206,8 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     }
 }
 
-/// The arm hits a person while the arm comes to rest. After the impact, the joint presses with at most its share of the torque limit.
+/// The arm hits a person while the arm comes to rest after Teaching. After the impact, the joint presses against the person with at most
+/// its share of the torque limit.
 #[test]
 fn j25_an_arm_that_comes_to_rest_does_not_clamp_whom_it_meets() {
     for (arm, joint, way, payload) in [
@@ -231,7 +232,7 @@ fn j25_an_arm_that_comes_to_rest_does_not_clamp_whom_it_meets() {
         plant.push[joint] = 0.0;
         rig.send(FrameType::TeachingModeDisable, &[]);
         plant.tick(&mut rig);
-        // The body has a stiffness of 5,000 N·m/rad. `touched_ms` is the time since the first contact.
+        // The simulated body has a stiffness of 5,000 N·m/rad. `touched_ms` is the time since the first contact.
         let (wall, speed) = (plant.q[joint] + 0.02 * way, plant.v[joint]);
         let (mut touched_ms, mut blow, mut most) = (0, 0.0_f64, 0.0_f64);
         for _ in 0..2_000 {

@@ -1,4 +1,5 @@
-//! Tests of loads in hand guiding (J-25): loads that are led to other poses, configured, removed or lifted, and arms with wrong parameters.
+//! Tests of loads in hand guiding (J-25): loads that a hand moves to other poses, configured, removed or lifted loads, and arms with wrong
+//! parameters.
 use jtc_core::{ControllerState, Payload, settings};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
@@ -7,7 +8,7 @@ use crate::hand_guiding::{arms, farthest, fastest, held, highest_speed, pose, te
 use crate::plant::{ArmFile, LuGre, Plant, Random, loaded};
 use crate::rig::{Rig, raw, rest};
 
-/// Pose of the default arm, stretched out by joint 2.
+/// Pose of the default arm that is stretched out, with joint 2 at `q2`.
 fn at(q2: f64) -> [f64; 6] {
     [0.0, q2, 0.0, 0.0, 0.0, 0.0]
 }
@@ -19,7 +20,7 @@ fn give(plant: &mut Plant, rig: &mut Rig, mass: f64) {
     plant.run(rig, 1);
 }
 
-/// Simulates a hand that leads a joint by `way` (rad) at `speed` (rad/s) while the other joints are free, and then lets go.
+/// Simulates a hand that moves a joint by `way` (rad) at `speed` (rad/s) while the other joints are free, and then lets go.
 pub(crate) fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64) {
     let (from, ms) = (plant.q[joint], (way.abs() / speed * 1000.0) as usize);
     for k in 0..ms + 500 {
@@ -31,7 +32,7 @@ pub(crate) fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, spe
     assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
 }
 
-/// Replaces the mass at the flange without changing the state of the arm.
+/// Replaces the mass at the flange of the simulated arm, without changing its positions and velocities.
 fn reload(plant: &mut Plant, arm: &ArmFile, mass: f64) {
     let now = std::mem::replace(plant, Plant::of(arm, &loaded(arm.model, mass), plant.friction, plant.q));
     (plant.v, plant.rotor, plant.speeds, plant.brakes) = (now.v, now.rotor, now.speeds, now.brakes);
@@ -53,8 +54,8 @@ fn j25_j60_a_payload_that_is_given_and_taken_away_leaves_no_load() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// A payload is found in a pose in which its full load acts on a joint. The payload is then configured in the upright pose, in which it
-/// does not cause a load. The payload is carried only once.
+/// The controller learns a payload in a pose in which its full load acts on a joint. The host then configures this payload in the upright
+/// pose, in which the payload does not cause a load. Teaching uses the weight of the payload only once.
 #[test]
 fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.3), 4_000);
@@ -69,7 +70,7 @@ fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// A hand leads the arm over most of its range. The payload needs another torque in each pose.
+/// A hand moves the arm over most of its range. The payload causes another torque in each pose.
 #[test]
 fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     for (mass, from, way, speed) in [
@@ -95,7 +96,7 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// A joint lowered a load of any cause (J-70), and the torque of the damper was learned. Then the load is removed.
+/// A joint has lowered a load of any cause (J-70), and the controller has learned the torque of the damper. Then the load is removed.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -143,7 +144,7 @@ fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_
     assert!(taught >= 10 && lowered >= 3, "{taught}, {lowered}");
 }
 
-/// Arms with lighter rotors than proposed do not swing, even at the soft ends and above the tool speed limit.
+/// Arms whose rotors have less inertia than proposed do not swing, even at the soft ends and above the tool speed limit.
 #[test]
 fn j25_an_arm_with_light_rotors_does_not_swing() {
     let mut ended = 0;
@@ -171,8 +172,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
             let about = format!("{} rotors {rotors} joint {}", arm.name, joint + 1);
             assert!(back < 0.4 && most < 1.8, "{about}: {back} rad/s against the hand, {most} rad/s");
             if rig.state() == ControllerState::HoldPos {
-                // The joint was too fast for the damping. The joint is now held by gains for five times the rotor inertia, and this test
-                // does not cover the hold.
+                // The joint was too fast for the damping, so Teaching has ended. The gains that now hold the joint are for five times its
+                // rotor inertia, and this test does not cover the hold.
                 assert!(rotors < 0.5, "{about} is held");
                 ended += 1;
                 continue;
@@ -192,7 +193,7 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
     assert!(ended <= 4, "{ended} of 144 ended Teaching");
 }
 
-/// A hand lifts a payload that is not configured, and knocks against it.
+/// A hand lifts a payload that is not configured, and knocks against the arm.
 #[test]
 fn j25_a_payload_that_is_lifted_is_still_carried() {
     for (arm, mass, joint, way) in [
@@ -202,13 +203,13 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
         (ArmFile::ur5(), 2.0, 1, 0.5),
     ] {
         let unit = Dynamics::new(&arm.model, arm.config.gravity).flange_torque(&pose(&arm));
-        // The motion goes against gravity.
+        // The hand moves the arm against gravity.
         let way = if unit[joint] > 0.0 { way } else { -way };
         for speed in [0.15, 0.25, 0.4, 0.8] {
             let (mut plant, mut rig) = held(&arm, 1.0, mass, 1.0, pose(&arm), 4_000);
             teach(&mut plant, &mut rig);
             lead(&mut plant, &mut rig, joint, way, speed);
-            // The knock lasts 20 ms.
+            // The knock against the arm lasts 20 ms.
             for _ in 0..20 {
                 plant.push[joint] = 0.5 * arm.config.joints[joint].torque_max * way.signum();
                 plant.tick(&mut rig);
@@ -222,7 +223,7 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
     }
 }
 
-/// A small payload is configured in HoldPos. The remaining load must be found before Teaching begins.
+/// The host configures a small payload in HoldPos. The controller must learn the remaining load before Teaching begins.
 #[test]
 fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.2), 4_000);
@@ -233,7 +234,7 @@ fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     assert!(way < 0.01 && speed < 0.05, "{way} rad, {speed} rad/s");
 }
 
-/// The arm file specifies friction, but the arm has no friction.
+/// The arm file specifies friction, but the simulated arm has no friction.
 #[test]
 fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     for arm in [ArmFile::avena(), ArmFile::z1(), ArmFile::rough_ur5()] {
@@ -259,7 +260,7 @@ fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     }
 }
 
-/// While the arm comes to rest, the next motion and new gains are refused.
+/// While the arm comes to rest, the controller refuses the next motion and new gains.
 #[test]
 fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     let arm = ArmFile::avena();
@@ -281,7 +282,7 @@ fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     assert_eq!(rig.ask(FrameType::PidParamUseDefault, &[]), DataStatus::NoError);
 }
 
-/// A hand leads any payload up to 3 kg that is not configured from any pose to any other pose.
+/// A hand moves an arm from any pose to any other pose, with any payload up to 3 kg that is not configured.
 #[test]
 fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     println!("seed 11");
@@ -322,8 +323,8 @@ fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     assert!(most < 0.6 && worst < 0.2, "{most} rad/s, then {worst} rad/s");
 }
 
-/// A person leans on an arm whose rotors have a fifth of the proposed inertia, and lets go. The contact lasted long enough, so the
-/// controller learned it as a load.
+/// A person leans on an arm whose rotors have a fifth of the proposed inertia, and then lets go of the arm. The contact lasted for a long
+/// time, so the controller learned the contact as a load.
 #[test]
 fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     println!("seed 13");
@@ -337,7 +338,7 @@ fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
             plant.push = arm.config.joints.map(|joint| random.between(-0.29, 0.29) * joint.torque_max);
             plant.run(&mut rig, 12_000);
             if rig.errors() != 0 {
-                // The lean is detected as a push, and the joints yield to it.
+                // The controller detects this contact as a push, and the joints yield to it.
                 continue;
             }
             teach(&mut plant, &mut rig);
@@ -354,7 +355,7 @@ fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     assert!((0.3..1.5).contains(&most), "{most} rad/s");
 }
 
-/// A load that was not found is not carried.
+/// Teaching does not hold a load that the controller has not learned.
 #[test]
 fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     let arm = ArmFile::avena();
@@ -368,7 +369,7 @@ fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     assert!(way > 0.3 && speed < 0.6, "{way} rad, {speed} rad/s");
 }
 
-/// The carried load equals the load that was found, and is complete at rest.
+/// The load torque in Teaching is equal to the learned load, and acts completely at rest.
 #[test]
 fn j25_the_load_that_was_found_is_carried() {
     let arm = ArmFile::avena();
@@ -382,8 +383,8 @@ fn j25_the_load_that_was_found_is_carried() {
     }
 }
 
-/// A payload that is not configured is put down. The arm rises slowly until the controller detects that only the learned load drives the
-/// arm.
+/// The arm puts down a payload that is not configured. The arm then rises slowly until the controller detects that only the learned load
+/// drives the arm.
 #[test]
 fn j25_an_arm_whose_payload_is_put_down_rises_slowly_and_stops() {
     for (mass, friction) in [1.0, 3.0].into_iter().flat_map(|m| [0.7, 1.0, 1.3].map(|f| (m, f))) {

@@ -1,4 +1,4 @@
-//! Situations in which a controller that follows each rule separately would drop, jerk or misplace an arm.
+//! Tests of situations in which a controller that follows each rule separately would drop, jerk or misplace an arm.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, warning};
@@ -6,7 +6,7 @@ use jtc_core::{Config, ControllerState, TrajectoryState, error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, model_body, pieces, rad, rest, segment_body};
 
-/// Returns the configuration with very high limits, except for the tested limits.
+/// Returns a configuration with very high limits, except for the limits under test.
 fn roomy(mut config: Config, acceleration_max: f64) -> Config {
     for j in &mut config.joints {
         j.torque_max = 1e6;
@@ -26,7 +26,7 @@ fn j16_drives_that_lost_their_supply_are_configured_again() {
     rig.defaults();
     rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.state == NodeState::INIT);
     rig.run(1);
-    // An emergency stop also cuts the supply of the drives, which are configured but still in Init.
+    // An emergency stop also cuts the supply of the drives. The drives are configured, but still in Init.
     rig.safety_input = false;
     rig.run(3);
     for node in &mut rig.nodes {
@@ -56,7 +56,7 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
     rig.run(5);
     rig.nodes[0].report.velocity = 0.0;
-    // The request is refused until the arm is at rest after hand guiding.
+    // The controller refuses Execute until the arm is at rest after hand guiding.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     rig.run(500);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
@@ -74,7 +74,8 @@ fn j33_a_stop_after_teaching_never_comes_back_after_a_trajectory() {
     assert_eq!(last.joints[0].set_position, rad(points.last().unwrap().position[0]));
 }
 
-/// A pause or a resume at any time of a valid motion stays within the acceleration limit and ends at rest.
+/// During a pause or a resume at any time of a valid motion, the arm stays within the acceleration limit. After the pause, the arm is at
+/// rest.
 #[test]
 fn j33_pause_and_resume_keep_to_the_acceleration_limit() {
     let braking = pieces(0, &[(10.77, 13), (0.0, 60), (-10.77, 13)]);
@@ -136,7 +137,7 @@ fn j33_a_pause_on_the_way_to_point_0_has_no_step_of_velocity() {
         last = v;
     }
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Pause, 0));
-    // The arm has left point 0.
+    // The arm has already left point 0.
     let set = rig.controller.telemetry().joints[0].set_position;
     assert!(0.0 < set && set < rad(200), "{set}");
     rig.exec(ExecCommand::Execute);
@@ -195,7 +196,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
-    // A trajectory outside the limits is still refused.
+    // The controller still refuses a trajectory outside the limits.
     rig.ask(FrameType::TeachingModeDisable, &[]);
     rig.run(300);
     rig.follow = true;
@@ -207,7 +208,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
 
 #[test]
 fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
-    // While the other joints come to rest after teaching, a joint that has sagged is enabled.
+    // While the other joints come to rest after Teaching, a joint that has sagged is enabled.
     let mut rig = Rig::with_a_slow_drive(roomy(Config::avena(), 100.0));
     rig.run(50);
     rig.ask(FrameType::TeachingModeEnable, &[]);
@@ -226,7 +227,7 @@ fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
         let t = rig.controller.telemetry().joints[2];
         assert!((t.torque - t.torque_model).abs() < 1.0 || t.state != NodeState::ENABLED, "{t:?}");
     }
-    // Bounds of the integral that exclude zero.
+    // The bounds of the integral in this frame exclude zero.
     let mut rig = Rig::new(Config::avena());
     rig.defaults();
     rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, 1.0, 2.0])));
@@ -267,7 +268,7 @@ fn j12_torque_is_taken_away_before_anything_else_is_sent() {
         .iter()
         .skip_while(|r| matches!(r, Request::Move { torque, .. } if *torque != [0.0; 6]));
     assert_eq!(*rest.next().unwrap(), Request::Move { torque: [0.0; 6], pump: false });
-    // Joints that are still enabled are disabled before the configuration of the joint that has fallen back.
+    // The controller disables joints that are still enabled before it configures the joint that has changed back to Init.
     let next = rest.find(|r| !matches!(r, Request::Move { .. })).unwrap();
     assert!(matches!(next, Request::ChangeFsm { .. }), "{next:?}");
 }
@@ -279,7 +280,8 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
         rig.run(ticks);
         rig
     };
-    // Ticks of the bring-up in which a reset, a configuration or a change of state is sent instead of a Move.
+    // `others` contains the ticks of the bring-up in which the controller sends a reset, a configuration or a change of state instead of a
+    // Move.
     let healthy = run(300).sent;
     let others: Vec<usize> =
         (0..300).filter(|&tick| !matches!(healthy[tick], Request::Move { .. })).collect();
@@ -298,7 +300,7 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
             "instead of {:?} in tick {tick}",
             healthy[tick]
         );
-        // The frame was only postponed.
+        // The controller has only postponed the frame.
         rig.safety_input = true;
         rig.clear(true, 0x7F);
         rig.run(300);
@@ -345,7 +347,7 @@ fn j14_a_silent_node_is_seen_within_seven_frames() {
 
 #[test]
 fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
-    // For an arm on a wall, gravity acts on the links sideways. The arm gets a model with heavier links.
+    // For an arm on a wall, gravity acts on the links sideways. The host sends a model with heavier links.
     let mut rig = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
     let mut model = jtc_core::Parameters::avena().model;
     model.links.iter_mut().for_each(|link| link.mass *= 1.2);
@@ -361,29 +363,29 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
 }
 
-/// A torque that alternates between its limits never stays long at one limit.
+/// A torque that alternates between its two limits never stays long at one of them.
 #[test]
 fn j43_torque_that_swings_between_its_limits_is_an_error() {
     for held_ms in [0, 1_000] {
         let swung = swings_until_error(held_ms);
-        // While a load may still be caught, the controller interprets the first half swing as a load.
+        // While the controller may still catch a load, the first half swing counts as a load.
         assert!((10..=40 + 10 * usize::from(held_ms == 0)).contains(&swung), "{swung}");
     }
 }
 
-/// Returns the number of ticks from the start of a swing between the limits until the error. Before the swing, the arm was held for
+/// Returns the number of ticks from the start of a swing between the torque limits until the error. Before this swing, the arm was held for
 /// `held_ms`.
 fn swings_until_error(held_ms: usize) -> usize {
     let mut config = Config { torque_release: true, ..Config::avena() };
     config.joints[0].torque_max = 10.0;
-    // With these bounds, a joint may have more friction than torque.
+    // With these parameter bounds, a joint may have more friction than its torque limit.
     (config.parameter_bounds.friction_max, config.parameter_bounds.slow_friction_max) = (10.0, 10.0);
     let mut rig = Rig::holding_with(config);
     rig.run(held_ms);
     rig.follow = false;
     let mut swung = 0;
     for k in 0..200 {
-        // An error of 4 mrad at a Kp of 8000 causes 32 N·m. The sign changes every 8 ms.
+        // A position error of 4 mrad causes 32 N·m at a Kp of 8000. The sign of this error changes every 8 ms.
         rig.nodes[0].report.position = if (k / 8) % 2 == 0 { 4e-3 } else { -4e-3 };
         rig.tick();
         if rig.state() == ControllerState::Error {

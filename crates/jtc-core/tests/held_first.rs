@@ -1,5 +1,4 @@
-//! Teaching (J-25) and the approach to a path (J-34) begin only when the arm is held, even if the arm carries a load that the model does
-//! not contain.
+//! Teaching (J-25) and the approach to a path (J-34) begin only when the arm is held, even if the arm carries an unmodelled load.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -10,7 +9,7 @@ use rig::{Rig, floats};
 
 const POSE: [f64; 6] = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
 
-/// Returns an arm with `mass` kg that the model does not contain, and its controller, before the joints are enabled.
+/// Returns an arm with an unmodelled load of `mass` kg, and its controller, before the joints are enabled.
 fn carrying(mass: f64, factor: f64) -> (Plant, Rig) {
     let friction = LuGre::of_avena_times(factor);
     let arm = Plant::new(&loaded(Parameters::avena().model, mass), friction, POSE);
@@ -25,7 +24,8 @@ fn way(arm: &Plant) -> f64 {
     (0..6).map(|j| (arm.q[j] - POSE[j]).abs()).fold(0.0, f64::max)
 }
 
-/// In the first tick of HoldPos, or while the load swings, the load of the arm is not known yet, so Teaching must not begin.
+/// In the first tick of HoldPos, or while the load swings, the controller does not know the load of the arm yet, so Teaching must not
+/// begin.
 #[test]
 fn j25_teaching_waits_until_the_load_is_held() {
     for factor in [0.3, 1.0] {
@@ -78,7 +78,8 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
-/// A drive is enabled seconds later than the other drives. The load of its joint swings, and moves the loads of the other joints again.
+/// A drive enables its joint seconds later than the other drives. The load of this joint swings, and moves the loads of the other joints
+/// again.
 #[test]
 fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     for late in [1, 2] {
@@ -97,7 +98,8 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// The gains make a loop unstable although no external load swings. The controller must not tolerate this swing as part of a catch.
+/// The gains of this test make a control loop unstable although no unmodelled load swings. The controller must not tolerate this swing as
+/// part of a catch.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {
@@ -120,12 +122,12 @@ fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
         };
         let (without, with) = (fastest(0), fastest(1_000));
         println!("{kp} {ki} {kd}: {without} without a catch, {with} rad/s with one");
-        // The speed stays below the velocity limit, and far below the speed at which a drive trips.
+        // The speed of the joint stays below the velocity limit, and far below the speed at which a drive trips.
         assert!(with < 1.5, "{kp} {ki} {kd}: {with} rad/s, {without} without a catch");
     }
 }
 
-/// A hand leads the stretched arm downwards, and teaching ends. For some time, stopping the arm needs more torque than the limit.
+/// A hand moves the stretched arm downwards, and Teaching ends. For some time, stopping the arm needs more torque than the torque limit.
 #[test]
 fn j25_leaving_teaching_in_motion_is_no_error_where_the_torque_is_at_its_limit() {
     for speed in [0.4, 0.6, 0.8] {

@@ -1,5 +1,5 @@
-//! Tests with a UR5 and a Z1 as imported, with proposed gains. Both arms are jogged (J-58) and begin paths (J-34) in random poses. The
-//! loads of the arms are known, and the joints do not reach their torque limits.
+//! Tests with an imported UR5 and an imported Z1, with proposed gains. Both arms are jogged (J-58) and begin paths (J-34) in random poses.
+//! The controller knows the loads of the arms, and no joint reaches its torque limit.
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
@@ -7,7 +7,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use crate::plant::{ArmFile, Plant, Random, highest};
 use crate::rig::{Rig, floats, raw, rest};
 
-/// Number of poses of each arm. 500 poses were tested once.
+/// Number of poses of each arm that the test uses. A single longer run of this test has used 500 poses.
 const TRIALS: usize = 120;
 const START_TOLERANCE: f64 = 0.3;
 
@@ -87,7 +87,7 @@ fn j34_an_imported_arm_begins_a_path_within_its_torque_limits_in_any_pose() {
             let about = format!("{} trial {trial}: from {q:.2?} to {first:.2?}", arm.name);
             rig.upload(&[RawPoint { position: first.map(|q| raw(q, 3.141592)), ..rest(0) }; 3], 50);
             if rig.exec(ExecCommand::Execute) != DataStatus::NoError {
-                // The point itself may need more torque than the limit allows.
+                // At the first point itself, the arm may need more torque than the limit allows.
                 let there = Dynamics::new(&arm.model, arm.config.gravity).gravity_torque(&first);
                 let there = highest(&arm.shares(&there));
                 assert!(standing.max(there) > 0.8, "{about}: refused at {standing}, {there}");

@@ -1,4 +1,4 @@
-//! Tests of jogs at the velocity limit with the whole controller (J-58).
+//! Tests of jogs at the velocity limit, with the whole controller (J-58).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState};
@@ -6,7 +6,7 @@ use jtc_wire::{DataStatus, FrameType, UrgentCommand};
 use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats};
 
-/// Number of random poses.
+/// Number of random poses in a test.
 const TRIALS: usize = 500;
 
 /// Event that ends a jog while the joint still accelerates.
@@ -20,10 +20,10 @@ enum End {
 
 /// Jogs a joint at `rate` (rad/s) from standstill for `ms`, ends the jog, and runs until the joint is at rest.
 fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Result<(), String> {
-    // The joints of the rig are at the commanded positions of the previous tick.
+    // In each tick, the joints of the rig are at the commanded positions of the previous tick.
     let mut rig = Rig::new(Config { delay_ticks: 1, ..config.clone() });
     rig.defaults();
-    // The default friction is only valid for slower joints.
+    // The default friction is valid only for slower joints.
     rig.send(FrameType::FrictionPolynomial, &floats([0.0; 24]));
     rig.run(700);
     assert_eq!(rig.state(), ControllerState::HoldPos);
@@ -54,8 +54,8 @@ fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Resu
     Ok(())
 }
 
-/// In an earlier version, a jog of joint 1 of the shipped arm at 1.5 rad/s released the arm if the jog ended between 599 and 695 ms. Other
-/// joints and arms also had this fault.
+/// In an earlier version, a jog of joint 1 of the default arm at 1.5 rad/s released the arm. The arm was released if the jog ended between
+/// 599 and 695 ms. Other joints and arms also had this fault.
 #[test]
 fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_arm() {
     let fast = |velocity_max: f64, acceleration_max: f64| {
@@ -66,7 +66,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
         }
         config
     };
-    // The last two limits are not representable in the wire format. A client sends the nearest value above or below the limit.
+    // The wire format cannot represent the last two limits exactly. A client sends the nearest value above or below the limit.
     for (config, first, last) in
         [(Config::avena(), 590, 700), (fast(3.15, 20.0), 735, 850), (fast(3.2, 20.0), 735, 850)]
     {
@@ -93,7 +93,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
     }
 }
 
-/// A Stop, a Pause, a released key or silence ends a jog within 520 ms, even at the velocity limit, like a Stop on the path.
+/// A Stop, a Pause, a released key or missing Jogs end a jog within 520 ms, even at the velocity limit, like a Stop on a path.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {
@@ -126,7 +126,8 @@ fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     }
 }
 
-/// A Stop arrives on another line while a key is pressed. The arm comes to rest, and moves again only after the key was released.
+/// A Stop arrives on another line while a jog key is pressed. The arm comes to rest, and moves again only after the operator has released
+/// the key.
 #[test]
 fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     for (line, command) in [(0, UrgentCommand::Stop), (1, UrgentCommand::Stop), (1, UrgentCommand::Pause)] {
@@ -150,7 +151,7 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
             let speed = rig.controller.telemetry().joints[0].set_velocity;
             assert!(ms < 520 || speed == 0.0, "{ms} ms: {speed} rad/s");
         }
-        // The command that ends a jog is accepted, and does not count as a pressed key.
+        // The controller accepts the command that ends a jog, and this command does not count as a pressed key.
         rig.run(400);
         assert_eq!(rig.ask(FrameType::Jog, &body(0.0)), DataStatus::NoError);
         rig.run(110);
@@ -160,8 +161,9 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     }
 }
 
-/// A simulated arm with a load that the controller knows is jogged in random poses at any rate. Either one joint moves at its limit, or all
-/// joints move. No torque reaches its limit, and the arm is at rest in time. If a jog is refused, only a small torque remains.
+/// A simulated arm with a load that the controller knows is jogged in random poses at any rate. Either one joint moves at its velocity
+/// limit, or all joints move. No torque reaches its limit, and the arm comes to rest within the permitted time. If the controller refuses a
+/// jog, only little torque remains for a motion.
 #[test]
 fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     let seed = 11;
@@ -221,17 +223,17 @@ fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of {TRIALS} refused; at most {:.0} % of a torque limit", 100.0 * most);
 }
 
-/// Joint 2 needs nearly all of its torque limit to hold its load. Lifting the load, lowering it towards a higher load, and moving joint 3
-/// outwards are refused. Lowering that reduces the load is accepted. With half of the torque limit left, every jog is executed as
-/// commanded.
+/// Joint 2 needs nearly all of its torque limit to hold its load. The controller refuses to lift the load, to lower the load towards a pose
+/// with a higher load, and to move joint 3 outwards. The controller accepts a motion downwards that reduces the load. If half of the torque
+/// limit remains, the controller executes every jog as commanded.
 #[test]
 fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unloads_it_is_taken() {
     let model = Parameters::avena().model;
     let hold = |q: [f64; 6]| plant::standing(&model, &q)[1];
     let moved =
         |q: [f64; 6], j: usize, way: f64| core::array::from_fn(|k| if k == j { q[k] + way } else { q[k] });
-    // In the first pose, the arm is stretched out above the horizontal. In the second pose, the arm is bent below the horizontal, so that
-    // lowering reduces the load of joint 2.
+    // In the first pose, the arm is stretched out above the horizontal. In the second pose, the arm is bent below the horizontal, so a
+    // motion downwards reduces the load of joint 2.
     let (above, below) = ([0.0, 1.2, 0.2, 0.0, 0.0, 0.0], [0.0, 1.4, -1.6, 0.0, 0.0, 0.0]);
     let down = |q: [f64; 6]| -hold(q).signum();
     assert!(hold(moved(above, 1, 0.1 * down(above))).abs() > hold(above).abs());
@@ -268,8 +270,8 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
     }
 }
 
-/// A Stop on a path, or the end of a jog, is completed when the next jog continues, even if a person touches a joint meanwhile. The
-/// controller must not interpret this jog as a failed stop.
+/// When the next jog begins, the Stop or the end of the last jog counts as completed, even if a person touches a joint. The controller must
+/// not take this jog for a failed stop.
 #[test]
 fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     let body = |rate: f32| floats([rate, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -289,7 +291,7 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
             rig.urgent(0, UrgentCommand::Stop);
             rig.until(600, |rig| rig.trajectory() == TrajectoryState::Stop);
         }
-        // This speed is below the speed that releases the arm.
+        // The speed of the touched joint is below the over-speed that releases the arm.
         rig.nodes[4].report.velocity = 0.03;
         for tick in 0..1_500 {
             if tick == 400 {
@@ -306,8 +308,8 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     }
 }
 
-/// A key is held down and moves joint 2 of an arm with 3.5 or 4 kg outwards, until the joint stops by itself. No error occurs, and enough
-/// torque remains for the motion back.
+/// An operator holds a key down, which moves joint 2 of an arm with 3.5 or 4 kg outwards, until the controller stops the joint. No error
+/// occurs, and enough torque remains for the motion back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     for (mass, seconds) in [(3.5, 20), (4.0, 20)] {
@@ -335,7 +337,8 @@ fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     }
 }
 
-/// Computing the margin of a jog takes time. Therefore only one jog is processed per tick, whether the jog is refused or not.
+/// The computation of the torque that remains for a jog takes time. Therefore the controller processes only one Jog per tick, whether it
+/// refuses this Jog or not.
 #[test]
 fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     let pose = [0.0, 1.2, 0.2, 0.0, 0.0, 0.0];
@@ -345,7 +348,7 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
         config.joints[1].torque_max = held.abs() / share;
         let mut rig = Rig::held_at(config, pose);
         rig.run(1_000);
-        // The jog goes upwards.
+        // The jog moves the arm upwards.
         let rate = 0.3 * held.signum() as f32;
         let jog = floats([0.0, rate, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(rig.ask(FrameType::Jog, &jog), answer, "{share}");
@@ -357,7 +360,7 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     }
 }
 
-/// With any model, a joint that is marked as absent does not hold any load.
+/// A joint that is declared absent holds no load, for any model.
 #[test]
 fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
@@ -383,8 +386,8 @@ fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     }
 }
 
-/// Keys of several joints are pressed, changed and released in random poses. The flange never exceeds the tool speed limit, and a single
-/// joint reaches this limit. The speed is computed from the poses of the flange in consecutive ticks.
+/// An operator presses, changes and releases keys of several joints in random poses. The flange never exceeds the tool speed limit, and
+/// reaches this limit if a single joint moves. The test computes the flange speed from the poses of the flange in consecutive ticks.
 #[test]
 fn j58_a_jog_keeps_to_the_tool_speed_limit() {
     const LIMIT: f64 = 0.25;

@@ -1,5 +1,5 @@
-//! Answers of one joint are lost repeatedly, but the number of consecutive lost answers is never sufficient for an error. The position loop
-//! stays closed, and the arm behaves as if no answer were lost (J-14, J-63).
+//! Tests in which answers of one joint are lost repeatedly, but too few consecutive answers for an error (J-14, J-63). The position loop
+//! stays closed, and the arm behaves as if no answer were lost.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
@@ -12,9 +12,10 @@ const JOINT: usize = 1;
 /// Pattern of the lost answers of the joint.
 #[derive(Clone, Copy, Debug)]
 enum Loss {
-    /// One good answer followed by this number of lost answers, repeated for ever.
+    /// A good answer, followed by this number of lost answers. The pattern of good and lost answers repeats for ever.
     Periodic(u32),
-    /// On average every second answer is lost at random, with at most four consecutive losses. The value is the seed.
+    /// On average, every second answer is lost at random, with at most four consecutive losses. The contained number is the seed of the
+    /// random numbers.
     Random(u32),
 }
 
@@ -52,14 +53,14 @@ fn arm(mass: f64, q: [f64; 6]) -> Plant {
     Plant::new(&loaded(Parameters::avena().model, mass), LuGre::of_avena_times(1.0), q)
 }
 
-/// Returns a path that accelerates to 0.25 rad/s in 0.2 s, keeps this speed for 2 s, and stops in 0.2 s. The points of the path contain no
-/// accelerations, so the loop must correct an error.
+/// Returns a path that accelerates to 0.25 rad/s in 0.2 s, keeps this speed for 2 s, and stops in 0.2 s. The points of this path contain no
+/// accelerations, so the position loop must correct an error.
 fn path() -> Vec<RawPoint> {
     let points = pieces(JOINT, &[(1.25, 20), (0.0, 200), (-1.25, 20)]);
     points.into_iter().map(|point| RawPoint { acceleration: [0; 6], ..point }).collect()
 }
 
-/// Largest true error on the path, rad.
+/// Returns the largest error of the true position on the path, rad.
 fn on_the_path(lost: &[bool]) -> f64 {
     let mut arm = arm(0.0, [0.0; 6]);
     let mut rig = arm.holding(Config::avena());
@@ -82,8 +83,7 @@ fn on_the_path(lost: &[bool]) -> f64 {
     worst
 }
 
-/// Holds an arm with 1 kg that the model does not contain, and pushes the arm with 20 N·m for 100 ms. Returns the distance that the arm
-/// moves, rad.
+/// Holds an arm with an unmodelled load of 1 kg, and pushes the arm with 20 N·m for 100 ms. Returns the distance that the arm moves, rad.
 fn pushed(lost: &[bool]) -> f64 {
     let mut arm = arm(1.0, [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);
     let mut rig = arm.holding(Config::avena());
@@ -120,8 +120,8 @@ fn j63_a_push_is_answered_while_answers_are_lost_for_ever() {
     }
 }
 
-/// Returns the time until a joint that is blocked on the path is detected, ms. Also returns the error of the position that the control law
-/// has used before the detection, rad.
+/// Returns the time until the controller detects a joint that is blocked on the path, ms. Also returns the error of the position that the
+/// control law used before the detection, rad.
 fn blocked(velocity: f64, lost: &[bool]) -> (usize, f64) {
     const FROM: usize = 200;
     let mut rig = Rig::holding();
@@ -152,7 +152,7 @@ fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
     }
 }
 
-/// A joint that is stuck has not followed its command. If the arm loses its torque as a result, and the next answers are missing, the
+/// A joint that is stuck does not follow its command. If the arm loses its torque for this reason, and the next answers are missing, the
 /// prediction must not move the joint back.
 #[test]
 fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
@@ -166,7 +166,7 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
         assert_eq!(rig.state(), ControllerState::Error);
         let stuck = rig.nodes[JOINT].report.position;
         for k in 1..=4 {
-            // The answer to the Move of that tick was also lost.
+            // The answer to the Move of this tick was also lost.
             rig.drop_answers(JOINT);
             rig.tick();
             let t = rig.controller.telemetry().joints[JOINT];
@@ -176,8 +176,8 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     }
 }
 
-/// Missing acknowledgements in four of five ticks are not a transmit timeout. If a joint fails meanwhile, it is not predicted for longer
-/// than usual.
+/// Missing acknowledgements in four of five ticks do not cause a transmit timeout. If a joint fails during this time, the controller does
+/// not predict its motion for longer than usual.
 #[test]
 fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
     for start in 0..5 {
@@ -195,7 +195,8 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // In the first tick, the answer to the previous Move still arrives. After that, five Moves are not answered.
+                // In the first tick after the failure, the answer to the previous Move still arrives. After the first tick, five Moves get
+                // no answer.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

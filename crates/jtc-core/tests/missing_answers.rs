@@ -1,5 +1,4 @@
-//! Tests of missing answers, and of answers with impossible positions. The torque does not step when these faults begin or end (J-35,
-//! J-63).
+//! Tests of missing answers, and of answers with impossible positions (J-35, J-63). The torque has no step when these faults begin or end.
 use crate::rig;
 
 use jtc_bus::Request;
@@ -13,10 +12,10 @@ const NODE_ERROR: u16 = error::EXTERNAL | error::EXTERNAL_JOINTS;
 /// Motion of the arm, with its speed in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
-    /// Motion in HoldPos, while the arm is pushed at this velocity.
+    /// Motion in HoldPos, while a hand pushes the arm at this velocity.
     Held(f64),
     Operate(f64),
-    /// Motion in Teaching, while a hand leads the arm at this velocity.
+    /// Motion in Teaching, while a hand moves the arm at this velocity.
     Led(f64),
 }
 
@@ -30,7 +29,7 @@ const MOTIONS: [Motion; 7] = [
     Motion::Led(-0.9),
 ];
 
-/// Fault of the joint's answers.
+/// Fault of the answers of a joint.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,
@@ -51,7 +50,7 @@ fn roomy() -> Config {
     config
 }
 
-/// Returns the joint's telemetry over 400 ticks. The fault occurs in the middle of a motion.
+/// Returns the joint's telemetry over 400 ticks. The fault occurs in the middle of the motion.
 fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     let mut rig = Rig::holding_with(roomy());
     let state = match motion {
@@ -71,7 +70,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     for tick in 0..400 {
         let velocity = match motion {
             Motion::Operate(_) => rig.controller.telemetry().joints[JOINT].set_velocity,
-            // The joint is pushed away and released.
+            // A hand pushes the joint away and releases it.
             Motion::Held(velocity) => {
                 if (170..220).contains(&tick) {
                     velocity
@@ -83,7 +82,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
         };
         match motion {
             Motion::Operate(_) => {}
-            // The joint is pushed away and released.
+            // A hand pushes the joint away and releases it.
             Motion::Held(_) => {
                 rig.follow = velocity == 0.0;
                 rig.nodes[JOINT].report.position += if tick < 220 { velocity * 0.001 } else { 0.0 };
@@ -140,7 +139,7 @@ fn j63_lost_answers_make_no_torque_step() {
             let faulty = run(motion, Fault::Lost { ms });
             let worst = worst_step(&clean, &faulty);
             assert!(worst < 1.0, "{motion:?}, {ms} answers lost: {worst} N·m");
-            // The position was correct throughout.
+            // The position that the control law used was correct all the time.
             for (clean, faulty) in clean.iter().zip(&faulty) {
                 let off = (clean.position - faulty.position).abs();
                 assert!(off < 2e-4, "{motion:?}, {ms} answers lost: {off} rad");
@@ -159,7 +158,8 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
         }
         rig.run(3);
         rig.nodes[JOINT].glitch = 0.3;
-        // An answer arrives one tick later. Four implausible answers are tolerated, and the fifth implausible answer is an error.
+        // An answer arrives one tick after its Move. The controller tolerates four implausible answers, and the fifth implausible answer is
+        // an error.
         rig.run(5);
         assert_eq!((rig.state(), rig.errors()), (state, 0));
         assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);
@@ -176,7 +176,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
     }
 }
 
-/// The setting limits the number of consecutive answers of a joint that are missing or implausible.
+/// The setting `missed_moves_max` limits the number of consecutive answers of a joint that are missing or implausible.
 #[test]
 fn j63_silence_and_implausible_answers_count_together() {
     for max in [3, 5, 20] {
@@ -190,7 +190,7 @@ fn j63_silence_and_implausible_answers_count_together() {
         }
         rig.tick();
         assert_eq!(rig.errors(), NODE_ERROR, "{max}");
-        // A usable answer restarts the count.
+        // After a usable answer, the count of missing answers starts again at zero.
         let mut rig = Rig::holding_with(Config { missed_moves_max: max, ..Config::avena() });
         for tick in 0..500 {
             rig.nodes[JOINT].silent = tick % u32::from(max) != 0;
@@ -200,7 +200,7 @@ fn j63_silence_and_implausible_answers_count_together() {
     }
 }
 
-/// A drive that does not know its exact position yet may later correct it by a sector.
+/// A drive that does not know its exact position yet may later correct its position by a sector.
 #[test]
 fn j35_a_position_that_becomes_accurate_may_jump() {
     let mut rig = Rig::new(Config::avena());
@@ -224,7 +224,7 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         let from = rig.sent.len();
         rig.until(30, |r| r.state() == ControllerState::Error);
         assert_eq!(rig.status().can_current, 1 << (8 + node));
-        // The answer to the last Move before the silence still arrives. After that, five answers are missing.
+        // The answer to the last Move before the silence still arrives. After the answer to the last Move, five answers are missing.
         let moves = rig.sent[from..].iter().take_while(|r| matches!(r, Request::Move { .. })).count();
         assert!(moves >= 5);
         let mut rig = Rig::holding();

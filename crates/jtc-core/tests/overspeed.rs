@@ -1,4 +1,4 @@
-//! Tests of joints that move above their velocity limit, with or without a command (J-35), and of limits that the drives cannot reach
+//! Tests of joints that move above their velocity limit, with or without a command (J-35). Also tests limits that the drives do not support
 //! (J-35, J-43).
 use crate::rig;
 
@@ -6,7 +6,7 @@ use jtc_core::{Config, ConfigError, ControllerState, joint_error};
 use jtc_wire::FrameType;
 use rig::{Rig, rest};
 
-/// Returns a rig in each of the states with torque.
+/// Returns three rigs, one in each state with torque.
 fn powered() -> [Rig; 3] {
     let holding = Rig::holding();
     let mut operating = Rig::holding();
@@ -25,7 +25,7 @@ fn j35_a_joint_above_its_speed_for_5_ms_is_an_error_in_every_state_with_torque()
     for speed in [-1.85, 1.85] {
         for mut rig in powered() {
             rig.nodes[3].report.velocity = speed;
-            // The speed is reported one tick later. After that, four consecutive ticks are above the limit.
+            // The controller receives the speed one tick later. Therefore only four of these five ticks have a speed above the threshold.
             rig.run(5);
             assert_eq!(rig.errors(), 0, "{:?}", rig.state());
             rig.run(1);
@@ -53,7 +53,7 @@ fn j35_a_glitch_or_a_speed_within_the_limit_is_no_error() {
 #[test]
 fn j35_answers_that_are_missing_neither_count_nor_excuse() {
     let mut config = Config { overspeed_ms: 3, ..Config::avena() };
-    // The prediction of the missing answers needs torque, whose limit is not tested here.
+    // The prediction of the missing answers needs torque, and this test does not test the torque limit.
     config.joints[3].torque_max = 1e6;
     let mut rig = Rig::holding_with(config);
     rig.nodes[3].report.velocity = 1.9;
@@ -94,7 +94,7 @@ fn j35_an_arm_that_is_faster_than_its_drives_can_report_or_do_is_refused() {
     let trip = ConfigError::SpeedTrip { joint: 3, value: 1.2 * 1.6, limit: 1.8 };
     assert_eq!(config.check(), Err(trip));
     assert!(trip.to_string().contains("joint 3") && trip.to_string().contains("1.920"), "{trip}");
-    // If the trip of the drives is switched off, the threshold may be as high as the full scale of the reported velocity.
+    // If the speed trip of the drives is switched off, the over-speed threshold may be as high as the full scale of the reported velocity.
     config.joint_config_bits = 0x07;
     assert_eq!(config.check(), Ok(()));
     config.joints[2].velocity_max = 1.7;
@@ -113,7 +113,7 @@ fn j43_position_limits_outside_the_working_area_are_refused() {
         let error = ConfigError::Position { joint: 6, value, limit: 2.9905 };
         assert_eq!(config.check(), Err(error));
         assert!(error.to_string().contains("joint 6"), "{error}");
-        // If the drives do not monitor a working area, this limit does not apply.
+        // If the drives do not keep to a working area, the limits of this area do not apply.
         config.joint_config_bits &= !0x01;
         assert_eq!(config.check(), Ok(()));
     }

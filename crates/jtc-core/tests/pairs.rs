@@ -1,5 +1,5 @@
-//! Tests of pairs that consist of an activity of the controller and an event. Each pair must end in the state that docs/safety.md lists.
-//! `UPDATE_DOCS=1` updates the page.
+//! Tests of all pairs of an activity of the controller and an event. Each pair must end in the state that docs/safety.md lists.
+//! `UPDATE_DOCS=1` updates this page.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_dynamics::Payload;
 use jtc_wire::{ExecCommand, FrameType, UrgentCommand};
@@ -8,20 +8,20 @@ use crate::plant::{LuGre, POSES, Plant, heavier, loaded, standing};
 use crate::pushed;
 use crate::rig::{Rig, floats};
 
-/// Time after which the end state is checked, ms.
+/// Time after which a test checks the end state, ms.
 const WATCH_MS: usize = 6_000;
-/// Silence that host supervision tolerates, ms. The start of each activity takes less time than this silence.
+/// Silence of all hosts that host supervision tolerates, ms. The start of each activity takes less time than this silence.
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
-/// A simulated arm without brakes, and its controller.
+/// Simulated arm without brakes, and its controller.
 pub(crate) struct Bench {
     pub arm: Plant,
     pub rig: Rig,
 }
 
 impl Bench {
-    /// Returns a bench that holds an arm at rest. The true masses are `mass` times the model masses, and the arm carries a `load` (kg) that
-    /// the model does not contain.
+    /// Returns a bench that holds an arm at rest. The true masses are `mass` times the model masses, and the arm has an unmodelled load of
+    /// `load` kg.
     pub(crate) fn holding(config: Config, mass: f64, load: f64) -> Self {
         let model = loaded(heavier(Parameters::avena().model, mass), load);
         let mut arm = Plant::new(&model, LuGre::of_avena_times(1.0), POSES[0]);
@@ -31,7 +31,7 @@ impl Bench {
         Self { arm, rig }
     }
 
-    /// Returns a bench whose joint 2 is pushed and begins to yield.
+    /// Returns a bench whose joint 2 was pushed and begins to yield.
     fn pushed(config: Config) -> Self {
         let mut bench = Self::holding(config, 1.0, 1.0);
         bench.arm.push[1] = -90.0;
@@ -43,7 +43,7 @@ impl Bench {
         self.arm.run(&mut self.rig, ms);
     }
 
-    /// Runs until `is` returns `true`.
+    /// Executes ticks until `is` returns `true`.
     pub(crate) fn until(&mut self, what: &str, is: impl Fn(&Rig) -> bool) {
         for _ in 0..20_000 {
             if is(&self.rig) {
@@ -78,7 +78,7 @@ impl Bench {
         self.send(FrameType::Jog, &floats([0.2f32, 0.0, 0.0, 0.0, 0.0, 0.0]));
     }
 
-    /// Returns the end state in the words of the page.
+    /// Returns the end state in the words of docs/safety.md.
     fn state(&self) -> &'static str {
         use ControllerState::{Error, HoldPos, Init, Operate, Teaching};
         let t = self.rig.controller.telemetry();
@@ -97,7 +97,7 @@ impl Bench {
     }
 }
 
-/// Activity of the controller.
+/// Activity of the controller: a function that begins it.
 pub(crate) type Begin = fn(Config) -> Bench;
 pub(crate) const UNDER_WAY: [(&str, Begin); 11] = [
     ("holds", |config| Bench::holding(config, 1.0, 1.0)),
@@ -108,7 +108,7 @@ pub(crate) const UNDER_WAY: [(&str, Begin); 11] = [
         bench
     }),
     ("slows the path down (J-75)", |mut config| {
-        // The torque is just sufficient for a slow motion.
+        // The torque limit is just sufficient for a slow motion.
         let friction = LuGre::avena(1, 1.2).coulomb;
         config.joints[1].torque_max =
             standing(&Parameters::avena().model, &POSES[0])[1].abs() + friction + 12.0;
@@ -189,7 +189,7 @@ pub(crate) const UNDER_WAY: [(&str, Begin); 11] = [
     }),
 ];
 
-/// Sends half of the arm's gains.
+/// Sends half of the arm's gains to the controller.
 fn gains(bench: &mut Bench) {
     let all = Parameters::avena().pid;
     let numbers =
@@ -197,7 +197,7 @@ fn gains(bench: &mut Bench) {
     bench.send(FrameType::PidParam, &floats(numbers));
 }
 
-/// Event with its name, its action, and `true` if the event releases the arm.
+/// Event: its name, its action, and `true` if it releases the arm.
 type Event = (&'static str, fn(&mut Bench), bool);
 const EVENTS: [Event; 16] = [
     ("nothing", |_| {}, false),

@@ -1,5 +1,5 @@
-//! Tests of the gains and models that are accepted, and of the states in which they are accepted. Accepted parameters must not throw a held
-//! arm (J-06).
+//! Tests of the gains and models that the controller accepts, and of the states in which it accepts these parameters. Accepted parameters
+//! must not throw a held arm (J-06).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -8,7 +8,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use proptest::prelude::*;
 use rig::{Rig, floats, model_body, rest, segment_body};
 
-/// Gravity acts along y, so that the arm in its zero position carries a large load.
+/// Returns a rig in which gravity acts along y, so that the arm in its zero position has a large load.
 fn on_a_wall() -> Rig {
     Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() })
 }
@@ -21,7 +21,7 @@ fn torques(rig: &Rig) -> [u64; 6] {
     rig.controller.telemetry().joints.map(|j| j.torque.to_bits())
 }
 
-/// Checks that the frame is refused, and that the hold of the arm is identical in every bit to the hold without the frame.
+/// Checks that the controller refuses the frame, and that the arm is then held as without the frame, in every bit.
 fn refused_without_a_trace(frame_type: FrameType, body: &[u8], what: &str) {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -54,7 +54,7 @@ fn j06_gains_that_would_throw_the_arm_are_refused_whole() {
         (4, 1001.0),
         (3, 121.0),
         (4, -121.0),
-        // 14 000 N·m/(rad·s) times 0.01 rad·s is more than the torque limit of the joint.
+        // 14 000 N·m/(rad·s) times 0.01 rad·s is 140 N·m, which is more than the torque limit of the joint.
         (3, 0.01),
         (4, -0.01),
         (0, f32::NAN),
@@ -62,7 +62,7 @@ fn j06_gains_that_would_throw_the_arm_are_refused_whole() {
     ] {
         let mut gains = good;
         gains[place] = value;
-        // Only the last joint has a wrong value, but the gains of the other joints must also not change.
+        // Only the last joint has a wrong value, but the gains of the other joints must not change either.
         let body = floats((0..6).flat_map(|j| if j == 5 { gains } else { [100.0, 0.0, 0.0, -1.0, 1.0] }));
         refused_without_a_trace(FrameType::PidParam, &body, &format!("{gains:?}"));
     }
@@ -74,14 +74,14 @@ fn j06_gains_in_use_are_taken() {
         [8000.0, 14000.0, 80.0, -120.0, 120.0],
         [4000.0, 24000.0, 60.0, -40.0, 40.0],
         [420.0, 160.0, 20.0, -10.0, 10.0],
-        // One integral is switched off, and one integral has a fixed value.
+        // The first of these integrals is switched off, and the second has a fixed value.
         [8000.0, 14000.0, 80.0, 0.0, 0.0],
         [8000.0, 10.0, 80.0, 0.5, 0.5],
     ] {
         let mut rig = Rig::holding();
         assert_eq!(rig.ask(FrameType::PidParam, &gains_body(gains)), DataStatus::NoError, "{gains:?}");
     }
-    // For an arm with more joint inertia, these gains are accepted.
+    // The controller accepts these gains for an arm with more joint inertia.
     let mut config = Config::avena();
     config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 2.0);
     let mut rig = Rig::holding_with(config);
@@ -146,14 +146,14 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     };
     let mut rig = Rig::new(Config::avena());
     rig.run(100);
-    // The last of the three parameters would end Init.
+    // The last of these three parameters would end Init.
     assert_eq!(rig.ask(frames[0].0, frames[0].1), DataStatus::NoError);
     assert_eq!(rig.ask(frames[4].0, frames[4].1), DataStatus::NoError);
     assert_eq!(rig.state(), ControllerState::Init);
     let mut rig = Rig::holding();
     check(&mut rig, ControllerState::HoldPos, DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    // First, the integral releases the load that was found with the last model.
+    // First, the integral releases the load that it contained with the last model.
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
@@ -168,7 +168,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
 
 #[test]
 fn j30_a_segment_is_not_copied_on_after_an_error() {
-    // The error occurs at every stage of the copy.
+    // The error occurs at each stage of the copy.
     for ticks in [1, 5, 15, 25, 29, 33, 37] {
         let mut rig = Rig::holding();
         let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
@@ -213,7 +213,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
     }
 }
 
-/// Returns an arm with a drive that takes long to enable, after an Execute was sent.
+/// Returns an arm after an Execute was sent, while one of its drives needs a long time to enable.
 fn waiting_for_a_drive() -> Rig {
     let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(50);
@@ -265,15 +265,15 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
                     "nothing moves later"
                 );
             }
-            // A new Execute is treated differently.
+            // A new Execute is not cancelled, so the path is executed.
             assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
     }
 }
 
-/// Checks that the arm is held during a change of parameters without an error, without torque above the limits, and without a torque step.
-/// A refused change must not have any effect.
+/// Checks that the arm is held during a change of parameters: without an error, without torque above the limits, and without a torque step.
+/// A refused change of parameters must not have any effect.
 fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseError> {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -290,7 +290,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
         for (j, limits) in Config::avena().joints.iter().enumerate() {
             let torque = t.joints[j].torque;
             prop_assert!(torque.abs() <= limits.torque_max);
-            // The change is smooth over 100 ms, and is at most 1.5 times as steep as a straight line over the whole range.
+            // The torque changes smoothly over 100 ms. The slope is at most 1.5 times the slope of a straight line over the whole range.
             let step = (torque - last[j]).abs();
             prop_assert!(step <= 2.0 * limits.torque_max * 0.015 + 0.1, "joint {}: {} N·m", j + 1, step);
             last[j] = torque;
@@ -298,7 +298,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     }
     if !accepted {
         quiet.run(300);
-        // The number of ticks until the record came may differ, but the position hold does not differ.
+        // The number of ticks until the response record arrived may differ, but the position hold does not differ.
         let (a, b) = (asked.controller.telemetry(), quiet.controller.telemetry());
         for j in 0..6 {
             prop_assert!((a.joints[j].torque_model - b.joints[j].torque_model).abs() < 1e-9);
@@ -321,7 +321,7 @@ proptest! {
             *gain *= if sign == 0 { -1.0 } else { 1.0 };
         }
         gains[3] = -gains[3];
-        // The arm is at rest at its commanded position, so the new gains act on an error of zero.
+        // The arm is at rest at its commanded position, so the new gains act on a position error of zero.
         holds(FrameType::PidParam, &gains_body(gains), 0.0)?;
     }
 

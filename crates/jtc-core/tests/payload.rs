@@ -1,5 +1,4 @@
-//! Tests of a payload that the host sets (J-60): the blend into the torque, the states that accept a payload, and the time for which the
-//! payload remains set.
+//! Tests of a payload that the host sets (J-60): its blend into the torque, the states that accept it, and how long it remains set.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -22,7 +21,7 @@ fn set(rig: &mut Rig, payload: &Payload) -> DataStatus {
     rig.ask(FrameType::SetSettings, &body)
 }
 
-/// Returns a rig without physics that is held at `pose`. The joints are at their commanded positions.
+/// Returns a rig without physics whose arm is held at `pose`. The joints are at their commanded positions.
 fn holding_at(pose: &[f64; 6]) -> Rig {
     let mut rig = Rig::new(Config::avena());
     for (node, q) in rig.nodes.iter_mut().zip(pose) {
@@ -43,7 +42,7 @@ fn gravity(payload: &Payload, q: &[f64; 6]) -> [f64; 6] {
     Dynamics::with_payload(&Parameters::avena().model, Config::avena().gravity, payload).gravity_torque(q)
 }
 
-/// Returns cubes at random places.
+/// Returns payloads that are cubes at random positions.
 fn cubes() -> impl Strategy<Value = Payload> {
     (0.0..2.5f64, prop::array::uniform3(-0.1..0.1f64), 0.0..0.1f64).prop_map(|(mass, com, side)| {
         let i = mass * side * side / 6.0;
@@ -54,8 +53,8 @@ fn cubes() -> impl Strategy<Value = Payload> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) })]
 
-    /// Any sequence of payloads is set in HoldPos and in Teaching, also while an earlier one is being blended in. A tick changes the torque
-    /// by at most 1/500 of the requested change, and in the end the joints carry the payload.
+    /// The test sets any sequence of payloads in HoldPos and in Teaching, also while an earlier payload is being blended in. In a tick, the
+    /// torque changes by at most 1/500 of the requested change. At the end, the joints hold the payload.
     #[test]
     fn j60_a_payload_makes_no_step_in_torque(
         q in prop::array::uniform6(-1.2..1.2f64), list in prop::collection::vec((cubes(), 1..700usize), 1..4), taught: bool,
@@ -93,7 +92,7 @@ proptest! {
     }
 }
 
-/// The model takes over the load from the integral, without moving the arm.
+/// The model takes the torque of the load over from the integral, without moving the arm.
 #[test]
 fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     for pose in POSES {
@@ -124,7 +123,7 @@ fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     }
 }
 
-/// If Teaching has found a payload and the host then sets it, the arm stays balanced.
+/// If Teaching uses the estimated mass of a payload and the host then sets this payload, the arm stays balanced.
 #[test]
 fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found() {
     for pose in [POSES[0], POSES[2]] {
@@ -140,7 +139,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
         let from = arm.q;
         arm.run(&mut rig, 3_000);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
-        // The found load is correct except for the friction.
+        // The learned load is correct except for the friction.
         let most = was_found.iter().fold(0.0, |most: f64, found| most.max(found.abs()));
         let telemetry = rig.controller.telemetry();
         for j in 0..6 {
@@ -152,7 +151,8 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
     }
 }
 
-/// A small correction must not drop the remaining load. The test sets half of the found load, and several corrections in succession.
+/// A small payload must not make Teaching drop the remaining load. The test sets half of the learned load, and several small payloads in
+/// succession.
 #[test]
 fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
     for pose in [POSES[0], POSES[2]] {
@@ -161,7 +161,7 @@ fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
         arm.run(&mut rig, 4_000);
         taught(&mut arm, &mut rig);
         arm.run(&mut rig, 1_000);
-        // The second payload arrives while the first one is being blended in.
+        // The second payload arrives while the first payload is being blended in.
         for (mass, wait) in [(0.1, 1_000), (0.5, 200), (1.0, 3_000), (0.8, 3_000)] {
             let way = set_and_wait(&mut arm, &mut rig, &point_mass(mass), wait);
             assert!(way < 0.005 && rig.state() == ControllerState::Teaching, "{mass} kg: {way} rad");
@@ -174,7 +174,7 @@ fn j60_teaching_waits_until_the_payload_is_in_the_model() {
     let mut rig = holding_at(&POSES[0]);
     assert_eq!(set(&mut rig, &point_mass(1.0)), DataStatus::NoError);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    // Teaching also waits until the integral has released the torque that it had found for the payload, 3 s later.
+    // Teaching also waits until the integral has released the torque that it contained for the payload, 3 s later.
     let waited = rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     assert!((BLEND + 2_900..=BLEND + 3_100).contains(&waited), "{waited} ms");
 }
@@ -216,14 +216,14 @@ fn j60_j58_joints_are_not_jogged_on_the_way_and_a_payload_is_not_set_while_they_
     assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
 }
 
-/// A payload is refused if a joint cannot hold it in its present position, or if it is not a valid body. A refused payload is never applied
-/// in part.
+/// The controller refuses a payload that a joint cannot hold in its present position, or that is not a valid body. The controller never
+/// applies a refused payload in part.
 #[test]
 fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);
     let q = rig.controller.telemetry().joints.map(|joint| joint.position);
     let model = Parameters::avena().model;
-    // Highest mass that the torque limits allow, kg, computed from the Jacobian of the flange alone.
+    // `most` is the highest mass that the torque limits allow, kg, computed from the Jacobian of the flange alone.
     let dynamics = Dynamics::new(&model, Config::avena().gravity);
     let (arm, unit) = (dynamics.gravity_torque(&q), dynamics.flange_torque(&q));
     let most = (0..6)
@@ -246,7 +246,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
         assert_eq!(set(&mut rig, &bad), DataStatus::IncorrectValue, "{bad:?}");
         assert_eq!(rig.controller.config().payload, good);
     }
-    // If a payload is too heavy, a reduction of the payload is accepted. The payload is being blended out.
+    // If the present payload is too heavy, the controller accepts a reduction of this payload. The payload is now being blended out.
     rig.run(BLEND);
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
@@ -255,7 +255,8 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     assert_eq!(set(&mut rig, &Payload::NONE), DataStatus::NoError);
 }
 
-/// The payload remains set after errors and new models, changes at once if the arm has no torque, and is not part of the arm.
+/// The payload remains set after errors and new models. If the arm has no torque, the payload changes at once. The payload is not part of
+/// the arm.
 #[test]
 fn j60_the_payload_stays_through_errors_and_new_models() {
     let payload = point_mass(1.5);
@@ -286,7 +287,7 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(rig.ask(FrameType::ArmModel, &body), DataStatus::NoError);
     rig.run(300);
     let model = rig.controller.telemetry().joints.map(|joint| joint.torque_model);
-    // The frame contains values with a precision of six digits.
+    // The frame contains values with a precision of about six digits.
     assert!((0..6).all(|j| (model[j] - wanted[j]).abs() < 1e-3), "{model:?} {wanted:?}");
     assert_eq!(rig.controller.config().payload, payload);
     let arm = |config: &Config| settings::values(config, 0, true).collect::<Vec<_>>();
@@ -294,7 +295,8 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(arm(rig.controller.config()), arm(&of_the_bench));
 }
 
-/// A model that cannot be held with the present payload is refused, like a model that cannot be held without a payload.
+/// The controller refuses a model if the torque limits cannot hold the arm with its present payload, as it refuses such a model without a
+/// payload.
 #[test]
 fn j06_j60_a_model_is_held_with_its_payload() {
     let mut rig = holding_at(&POSES[1]);
@@ -315,7 +317,7 @@ fn j06_j60_a_model_is_held_with_its_payload() {
     assert_eq!(rig.ask(FrameType::ArmModel, &body(low + 2.01)), DataStatus::IncorrectValue);
 }
 
-/// Returns the largest motion of a joint within `ms`, rad.
+/// Returns the longest motion of a joint within `ms`, rad.
 fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     let from = arm.q;
     let mut farthest = 0.0f64;
@@ -326,7 +328,7 @@ fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     farthest
 }
 
-/// Sets a payload. Returns the largest motion of a joint within the following `ms`, rad.
+/// Sets a payload. Returns the longest motion of a joint within the following `ms`, rad.
 fn set_and_wait(arm: &mut Plant, rig: &mut Rig, payload: &Payload, ms: usize) -> f64 {
     let body: Vec<u8> = settings::payload_values(payload).flat_map(|value| value.emit()).collect();
     rig.send(FrameType::SetSettings, &body);
@@ -344,8 +346,8 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// If the found load of the integral has just been set as the payload or in a new model, the load is not carried twice. An arm that is not
-/// led by a hand keeps its position.
+/// The host may set the learned load as a payload, or send this load in a new model. Teaching then does not use this load twice. An arm
+/// that no hand moves keeps its position.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {
@@ -377,7 +379,7 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// A centre of mass without a mass is not a payload, and does not reduce the load that Teaching carries.
+/// A centre of mass without a mass is not a payload, and does not reduce the load in Teaching.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -1,5 +1,5 @@
-//! Tests of plain lines, on which no extension request was received. The hosts on these lines know only the protocol of existing devices
-//! (J-30, J-51).
+//! Tests of plain lines, on which no extension request was received (J-30, J-51). The hosts on these lines know only the protocol of
+//! existing devices.
 use crate::rig;
 
 use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay, SNAPSHOT_MS};
@@ -9,7 +9,7 @@ use rig::{Rig, point, rest, segment_body};
 
 const SEGMENT: FrameType = FrameType::Trajectory;
 
-/// Returns a path of 4 s in which joint 1 follows a cosine and reaches 0.4 rad/s. The points of the path are 10 ms apart.
+/// Returns a path of 4 s in which joint 1 follows a cosine and reaches 0.4 rad/s. The points of this path are 10 ms apart.
 fn path() -> Vec<RawPoint> {
     let w = core::f64::consts::TAU / 4.0;
     (0..=400)
@@ -35,7 +35,7 @@ fn first(rig: &Rig) -> Vec<u8> {
     segment_body(9, 0, 1, 10, &[there; 20])
 }
 
-/// Returns a rig that has been moving along the path for `ms`.
+/// Returns a rig that has moved along the path for `ms`.
 fn moving(ms: u32) -> Rig {
     let mut rig = Rig::holding();
     rig.execute(&path());
@@ -83,8 +83,8 @@ fn places() -> Vec<(&'static str, Rig)> {
     places
 }
 
-/// An existing proxy repeats a refused segment for ever, and does not forward any other frame meanwhile. Therefore the segment stops the
-/// arm, and is accepted when the arm is at rest.
+/// An existing proxy repeats a refused segment for ever, and does not forward any other frame during this time. Therefore segment 0 stops
+/// the arm, and the controller accepts the segment when the arm is at rest.
 #[test]
 fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
     for (n, (name, mut rig)) in places().into_iter().enumerate() {
@@ -109,13 +109,13 @@ fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
             "{name}"
         );
         assert_eq!(rig.errors(), 0, "{name}");
-        // The new trajectory is loaded, and begins at the position of the arm.
+        // The new trajectory is loaded, and begins at the present position of the arm.
         rig.nodes[2].slow_enable = false;
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError, "{name}");
     }
 }
 
-/// In each tick, the segment has the effect of a Stop.
+/// In each tick, segment 0 on a plain line has the same effect as a Stop.
 #[test]
 fn j30_segment_0_on_a_plain_line_acts_as_a_stop_does() {
     for ((name, mut stopped), (_, mut rig)) in places().into_iter().zip(places()) {
@@ -139,7 +139,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
     let empty: &[RawPoint] = &[];
     for (plain, segment, points, stops, data) in [
         (true, 0, &[rest(0); 3][..], true, DataStatus::IncorrectValue),
-        // The segment acts as a Stop even if it contains an error, because its host keeps repeating it.
+        // The segment acts as a Stop even if it contains an error, because the host repeats the segment until the controller accepts it.
         (true, 0, empty, true, DataStatus::IncorrectValue),
         (true, 0, &[rest(32_767); 1500], true, DataStatus::IncorrectValue),
         (true, 1, &[rest(0); 3], false, DataStatus::IncorrectValue),
@@ -154,7 +154,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         let to = if stops { TrajectoryState::Stop } else { TrajectoryState::Execute };
         assert_eq!(rig.trajectory(), to, "plain {plain}, segment {segment}, {} points", points.len());
     }
-    // If the arm does not move, a plain line behaves like any other line.
+    // If the arm does not move, the controller treats a plain line like any other line.
     for (name, leave) in [
         ("Teaching", (|rig: &mut Rig| rig.send(FrameType::TeachingModeEnable, &[])) as fn(&mut Rig)),
         ("Error", |rig| rig.press_stop(1)),
@@ -169,7 +169,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         assert_eq!(rig.ask(SEGMENT, &segment), DataStatus::IncorrectValue, "{name}");
         assert_eq!(rig.state(), before, "{name}");
     }
-    // Paused, stopped and finished paths are replaced as usual.
+    // A host can replace paused, stopped and finished paths as usual.
     for plain in [true, false] {
         let mut rig = moving(1_000);
         rig.exec(ExecCommand::Pause);
@@ -198,7 +198,7 @@ fn j30_j56_a_replay_stops_where_segment_0_on_a_plain_line_has_stopped() {
         rig.run(7);
     }
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // Log of the motion up to the new points.
+    // The log of this recorder contains the motion until the new points arrive.
     let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
     let mut moving = Rig::holding();
     moving.upload(&path(), 10);
@@ -224,7 +224,7 @@ fn j51_numbers_above_6_are_6_on_a_plain_line() {
         rig.run(5);
         assert_eq!(rig.records().last().map(|record| record.data), Some(data), "a Stop with nothing to stop");
     }
-    // Status 8 means that the arm is not at the first point.
+    // Data status 8 means that the arm is not at the first point.
     for plain in [true, false] {
         rig.plain = plain;
         rig.upload(&[rest(5_000); 3], 10);
@@ -238,7 +238,8 @@ fn of_three(segment: u16) -> Vec<u8> {
     segment_body(9, segment, 3, 10, &[rest(5_000); 20])
 }
 
-/// Segment 0 decides which data statuses are used for the whole upload, even if the line changes its kind before later frames.
+/// Segment 0 decides which data statuses are used for the whole upload, even if the line changes between plain and not plain before later
+/// frames.
 #[test]
 fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed, StartPositionMismatch};
@@ -261,11 +262,11 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
                 let data = rig.exec(ExecCommand::Execute);
                 assert_eq!(data, in_words(plain, StartPositionMismatch), "{case}");
             }
-            // The data statuses of other frames depend on the state of the line when they arrive.
+            // The data statuses of other frames depend on whether the line is plain when these frames arrive.
             rig.plain = at(3);
             let data = rig.exec(ExecCommand::Stop);
             assert_eq!(data, in_words(at(3), NotAllowed), "{case}");
-            // In this state, segments of an upload that has already begun are not allowed.
+            // In this state, the controller does not accept segments of an upload that has already begun.
             rig.plain = plain;
             assert_eq!(rig.ask(SEGMENT, &of_three(0)), NoError);
             rig.press_stop(1);
@@ -287,8 +288,8 @@ fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
 }
 
-/// After its Execute, a trajectory may be executed by another client. The controller does not know whether that client can handle values
-/// above 6.
+/// After one client has executed a trajectory, another client may execute the same trajectory again. The controller does not know whether
+/// this other client can handle data statuses above 6.
 #[test]
 fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     for plain in [true, false] {
@@ -304,7 +305,7 @@ fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     }
 }
 
-/// Returns points that violate J-36, with the error that the joint with index 3 would have in motion.
+/// Returns points that violate J-36, each with the error that the joint with index 3 would have in motion.
 fn broken() -> Vec<(&'static str, Vec<RawPoint>, u16)> {
     let (still, at) = (rest(0), |q, v, a| point(3, q, v, a));
     let long = |bad: RawPoint, place: usize| {
@@ -322,7 +323,7 @@ fn broken() -> Vec<(&'static str, Vec<RawPoint>, u16)> {
     ]
 }
 
-/// Uploads the points in this number of segments. Returns the data statuses.
+/// Uploads these points in this number of segments. Returns the data status of each segment.
 fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStatus> {
     let parts: Vec<_> = points.chunks(points.len().div_ceil(segments)).collect();
     assert_eq!(parts.len(), segments);
@@ -332,7 +333,7 @@ fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStat
         .collect()
 }
 
-/// Existing hosts wait for ever if a segment is refused for any reason.
+/// Existing hosts wait for ever if the controller refuses a segment for any reason.
 #[test]
 fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     for (name, points, error) in broken() {
@@ -368,7 +369,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
                 }
             }
             assert!(rig.controller.violation().is_some_and(|v| v.joint == 3), "{case}");
-            // The response to a Stop is the response for any trajectory that is not executed. The next upload is possible.
+            // The response to a Stop is the same as for any trajectory that is not executed. The next upload is possible after this Stop.
             assert_eq!(rig.exec(ExecCommand::Stop), DataStatus::IncorrectValue);
             assert_eq!(uploaded(&mut rig, &vec![rest(0); 60], segments), vec![DataStatus::NoError; segments]);
             assert_eq!(rig.controller.violation(), None);
@@ -378,7 +379,8 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     }
 }
 
-/// Segment 0 decides for the whole upload. The result of the check applies to every client that executes the trajectory.
+/// The line of segment 0 decides for the whole upload whether a refused trajectory is accepted. The result of the check applies to every
+/// client that executes the trajectory.
 #[test]
 fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     let (_, points, error) = broken().remove(0);
@@ -397,7 +399,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
                 continue;
             }
             assert_eq!(rig.ask(SEGMENT, &body(2)), DataStatus::NoError);
-            // The answer is 6 (wrong content) on both lines, also for a client that knows all values.
+            // The data status is 6 (wrong content) on both lines, also for a client that knows all data statuses.
             for (line, plain) in [(0, true), (0, false), (1, true), (1, false)] {
                 rig.plain = plain;
                 rig.statuses.clear();
@@ -412,7 +414,8 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     }
 }
 
-/// Frames that are not a valid trajectory are also refused on a plain line. The counts, the order or the step time is wrong.
+/// Frames that are not a valid trajectory are refused on a plain line as well. In the frames of this test, the counts, the order or the
+/// step time is wrong.
 #[test]
 fn j30_j36_only_content_is_taken_on_a_plain_line() {
     use DataStatus::{
@@ -433,7 +436,7 @@ fn j30_j36_only_content_is_taken_on_a_plain_line() {
     }
 }
 
-/// The snapshots of the flight recorder contain the result of the check, so a replay also refuses the Execute.
+/// The snapshots of the flight recorder contain the result of the check, so a replay refuses the Execute too.
 #[test]
 fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
     let (_, points, error) = broken().remove(0);
@@ -449,7 +452,7 @@ fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
     rig.run(100);
     let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
-    // The log does not contain the points, but contains the result of the check of the points.
+    // The log does not contain the points, but it contains the result of the check of these points.
     let other = Rig::holding().controller;
     let mut last = None;
     let mut replay = Replay::new(Log::new(&blocks), other, None);

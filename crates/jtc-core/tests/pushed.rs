@@ -1,4 +1,4 @@
-//! Tests of pushes, walls and loads that are too heavy (J-66, J-68, J-70). The arm yields and is still held.
+//! Tests of pushes, walls, and loads that are too heavy (J-66, J-68, J-70). The arm yields, and the controller continues to hold the arm.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error, joint_error};
@@ -6,7 +6,7 @@ use jtc_wire::{ExecCommand, FrameType, RawPoint};
 use plant::{ArmFile, LuGre, POSES, Plant, Random, heavier, loaded, standing};
 use rig::{Rig, floats, raw, segment_body};
 
-/// Returns a motion with 100 points from one position to another in `seconds`.
+/// Returns a motion with 100 points from the position `from` to the position `to` in `seconds`.
 pub(crate) fn motion(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> (Vec<RawPoint>, u16) {
     let step = (seconds * 10.0).round() as u16;
     let seconds = f64::from(step) * 0.099;
@@ -48,7 +48,7 @@ fn fastest(arm: &Plant) -> f64 {
     arm.v.iter().fold(0.0, |fastest, v| v.abs().max(fastest))
 }
 
-/// Returns a pose of this arm within its position ranges, rad, in which at most half of each torque limit is needed to hold the arm.
+/// Returns a random pose of this arm within its position ranges, rad, in which each joint needs at most half of its torque limit.
 fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     loop {
         let pose = core::array::from_fn(|j| {
@@ -62,20 +62,20 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     }
 }
 
-/// Random pushes on an arm whose masses are wrong by 10 % and whose friction is wrong by 20 %. Each push lasts 50 ms to 1 s, and its torque
-/// is a `share` of 60 to 100 % of the remaining torque of the joint.
+/// Series of random pushes on an arm whose masses are wrong by 10 % and whose friction is wrong by 20 %. Each push lasts 50 ms to 1 s, and
+/// its torque is a `share` of 60 to 100 % of the remaining torque of the joint.
 #[derive(Clone, Copy)]
 struct Pushes {
     seed: u64,
     moving: bool,
     share: f64,
-    /// Inertias of the rotors as multiples of the inertias in the arm file.
+    /// Factor between the true rotor inertias and the inertias in the arm file.
     rotors: f64,
     /// Stiffness of elastic gears, N·m/rad. `None` for rigid gears.
     gears: Option<f64>,
 }
 
-/// Result of a push.
+/// Result of one push.
 struct Pushed {
     about: String,
     joint: usize,
@@ -87,7 +87,7 @@ struct Pushed {
     aside: f64,
     /// Speed of the fastest joint just before the push, rad/s.
     before: f64,
-    /// The over-speed of the pushed joint released the arm.
+    /// `true` if the over-speed of the pushed joint released the arm.
     released: bool,
 }
 
@@ -95,7 +95,7 @@ const HELD: Pushes = Pushes { seed: 7, moving: false, share: 1.0, rotors: 1.0, g
 const MOVING: Pushes = Pushes { seed: 9, moving: true, ..HELD };
 
 impl Pushes {
-    /// Runs 48 pushes on an arm with rigid gears. Returns the number of pushes that released the arm, and checks that over-speed is the
+    /// Executes 48 pushes on an arm with rigid gears. Returns the number of pushes that released the arm, and checks that over-speed is the
     /// only cause.
     fn released(self, file: &ArmFile) -> usize {
         let checked = self.push(file).map(|mut pushed| {
@@ -164,7 +164,8 @@ impl Pushes {
         Pushed { about, joint, arm, rig, way, aside, before: speed, released }
     }
 
-    /// Checks that an arm that was pushed is still held, at rest, and that the cause contains the pushed joint.
+    /// Checks that the controller still holds an arm that was pushed, and that the arm is at rest. Also checks that the cause of the stop
+    /// contains the pushed joint.
     fn check(self, pushed: &mut Pushed) {
         let Pushed { about, joint, arm, rig, way, aside, before: _, released } = pushed;
         let still = !self.moving && self.rotors == 1.0;
@@ -194,8 +195,8 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
     assert_eq!(MOVING.released(&ArmFile::avena()), 0);
 }
 
-/// The arms are used as imported. The gains of these arms are weak, because the rotors were not measured. A push of 100 to 180 rad/s²
-/// accelerates a joint with weak gains to its over-speed within 12 ms, and the speed that its drive reports is 8 ms old. Without
+/// The test uses the arms as they were imported. The gains of these arms are weak, because the rotors were not measured. A push of 100 to
+/// 180 rad/s² accelerates a joint with weak gains to its over-speed within 12 ms. The speed that its drive reports is 8 ms old. Without
 /// supervision of the speed, more than 80 of these 192 pushes release the arm. With supervision of the reported speed alone, 18 pushes
 /// release the arm.
 #[test]
@@ -206,8 +207,9 @@ fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a
     assert!(released.iter().flatten().sum::<usize>() <= 2, "{released:?}");
 }
 
-/// The rotor inertias are only proposals. If the true rotor inertias are a half or a third of the proposals, the loop of a yielding joint
-/// is too stiff. The joint becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
+/// The rotor inertias in the arm files are only proposals. If the true rotor inertias are a half or a third of the proposals, the control
+/// loop of a yielding joint is too stiff. A yielding joint with low rotor inertia becomes softer and does not swing. Pushes of 24 to 40 %
+/// of the remaining torque do not release the arm.
 #[test]
 fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {
@@ -217,8 +219,8 @@ fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     }
 }
 
-/// The arms with elastic gears get the pushes of the other tests. The results are printed, and over-speed must be the only cause of a
-/// release. In arms without friction, only the controller damps the gears, so some gears swing before the push.
+/// Arms with elastic gears get the same pushes as in the other tests. The test prints the results, and over-speed must be the only cause of
+/// a release. In arms without friction, only the controller damps the gears, so some gears swing before the push.
 #[test]
 fn j66_j68_arms_with_elastic_gears_are_pushed() {
     let slick = [ArmFile::avena(), ArmFile::ur5(), ArmFile::z1()].map(|arm| (arm.slick(), 3e4));
@@ -243,8 +245,8 @@ fn j66_j68_arms_with_elastic_gears_are_pushed() {
     }
 }
 
-/// A person who pushes repeatedly, or to and fro, still feels the full opposing torque. The controller must not interpret the push as the
-/// swing of a joint with less inertia than in the arm file.
+/// A person who pushes repeatedly, or back and forth, still feels the full torque against the push. The controller must not take these
+/// pushes for the swing of a joint with less inertia than in the arm file.
 #[test]
 fn j68_a_joint_that_is_shaken_stays_held() {
     for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
@@ -278,8 +280,8 @@ fn j68_a_joint_that_is_shaken_stays_held() {
     }
 }
 
-/// A joint hits a wall of 3,000 or 20,000 N·m/rad. From 200 ms after the detection, the drive presses the joint against the wall with at
-/// most its share of the torque limit. The stop is a held stop.
+/// A joint hits a wall with a stiffness of 3,000 or 20,000 N·m/rad. From 200 ms after the detection, the drive presses the joint against
+/// the wall with at most its share of the torque limit. The result is a held stop.
 #[test]
 fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     let model = Parameters::avena().model;
@@ -301,7 +303,7 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 arm.tick(&mut rig);
                 noticed = noticed.or((rig.errors() != 0).then_some(k));
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
-                // If a joint bounces off the wall, the controller brakes the joint. Ticks with this braking are not evaluated.
+                // If a joint bounces off the wall, the controller brakes the joint. The test does not evaluate the ticks with this braking.
                 if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
                     most = most.max((rig.torque[joint] - standing(&model, &arm.q)[joint]) * sign);
                 }
@@ -315,15 +317,15 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 "{about}"
             );
             assert_ne!(t.joints[joint].internal, 0, "{about}");
-            // The limit is the share plus the friction that the integral had found.
+            // The limit is the share of the torque limit, plus the friction that the integral has learned.
             assert!(most < 0.3 * LIMITS(joint) + 12.0, "{about}: {most} N·m");
             assert!(fastest(&arm) < 0.02, "{about}: {} rad/s", fastest(&arm));
         }
     }
 }
 
-/// A hand leads joint 2 up by 1 rad in 5 s, through a stiff spring. The joint resists with at most its share of the torque limit, and the
-/// arm stays where the hand lets go.
+/// A hand moves joint 2 up by 1 rad in 5 s, through a stiff spring. The joint resists with at most its share of the torque limit. When the
+/// hand lets go, the arm stays in its pose.
 #[test]
 fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     let model = Parameters::avena().model;
@@ -345,7 +347,7 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     assert!((arm.q[1] - there).abs() < 0.06 && fastest(&arm) < 0.01, "{} rad", arm.q[1] - there);
 }
 
-/// Loads of 90 to 110 % of a torque limit are lowered slowly until the arm is in balance. If needed, the whole torque limit acts against
+/// Joints lower loads of 90 to 110 % of a torque limit slowly, until the arm is in balance. If needed, the whole torque limit acts against
 /// the motion. The joint is never released.
 #[test]
 fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
@@ -388,7 +390,7 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     }
 }
 
-/// An arm with 2 kg that are not configured is held with gains that are too weak, or that make the loop unstable.
+/// An arm with 2 kg that are not configured is held with gains that are too weak, or that make a control loop unstable.
 #[test]
 fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     for times in [
@@ -415,8 +417,8 @@ fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     }
 }
 
-/// Random motions need 95 % of a torque limit according to the model. The true arms are heavier and have more friction, and the controller
-/// does not release any arm.
+/// According to the model, these random motions need 95 % of a torque limit. The true arms are heavier and have more friction, and the
+/// controller does not release any arm.
 #[test]
 fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
     println!("seed 21");
@@ -430,7 +432,7 @@ fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
         for _ in 0..16 {
             let pose: [f64; 6] = core::array::from_fn(|j| POSES[0][j] + random.between(-0.5, 0.5));
             let to: [f64; 6] = core::array::from_fn(|j| pose[j] + random.between(-1.2, 1.2));
-            // The motion is as fast as 95 % of a torque limit and the velocity limit allow.
+            // The motion is as fast as 95 % of a torque limit and the velocity limit permit.
             let peak = |seconds: f64| {
                 (0..200)
                     .map(|i| {

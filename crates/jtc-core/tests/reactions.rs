@@ -1,5 +1,6 @@
-//! Tests of the reaction to each error (J-21, J-66, J-68, J-69). The arm yields or stops if the controller can still act. Otherwise the
-//! torque of the arm is removed. The table in docs/safety.md shows the results of these runs. `UPDATE_DOCS=1` updates this table.
+//! Tests of the reaction to each error or finding (J-21, J-66, J-68, J-69). The arm yields or stops if the controller can still act. In all
+//! other cases, the controller switches the torque of the arm off. The table in docs/safety.md shows the results of these tests.
+//! `UPDATE_DOCS=1` updates this table.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, error, joint_error};
@@ -19,7 +20,8 @@ fn path() -> Vec<RawPoint> {
         .collect()
 }
 
-/// Returns a rig that is held, or moves along the path. The torque limit of joint 4 leaves a margin for a position error.
+/// Returns a rig whose arm is held, or moves along the path. The torque limit of joint 4 leaves a margin for the torque of a position
+/// error.
 fn bench(moving: bool) -> Rig {
     bench_with(Config::avena(), moving)
 }
@@ -27,7 +29,7 @@ fn bench(moving: bool) -> Rig {
 fn bench_with(mut config: Config, moving: bool) -> Rig {
     config.joints[3].torque_max = 2_000.0;
     let mut rig = Rig::holding_with(config);
-    // The load of joints that were just enabled may still be caught (J-43).
+    // In the first second, the controller may still catch the load of joints that were just enabled (J-43).
     rig.run(1_000);
     if moving {
         rig.move_along(&path(), 500);
@@ -35,7 +37,7 @@ fn bench_with(mut config: Config, moving: bool) -> Rig {
     rig
 }
 
-/// Pushes joint 4 until its position error exceeds the limit, but not faster than is plausible (J-35).
+/// Pushes joint 4 until its position error exceeds the limit, but not faster than is plausible according to J-35.
 fn push(rig: &mut Rig, to: f64) {
     const TICKS: u32 = 50;
     rig.apart[3] = true;
@@ -46,7 +48,7 @@ fn push(rig: &mut Rig, to: f64) {
     }
 }
 
-/// Reports the present position of the arm until the held stop can be cleared.
+/// Simulates an arm at rest at its present position until the held stop can be cleared, and clears this stop.
 fn settle(rig: &mut Rig) {
     rig.run(600);
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
@@ -77,8 +79,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::Jog, &floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])), DataStatus::NotAllowed);
     settle(&mut rig);
-    // If the arm is not at the paused point, the path does not continue. If the arm is back at this point, the path continues after an
-    // approach.
+    // If the arm is not at the paused point, the controller refuses to continue the path. If the arm is back at the paused point, the path
+    // continues after an approach.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     push(&mut rig, 0.012);
     settle(&mut rig);
@@ -95,8 +97,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.controller.telemetry().joints[4].set_position, rad(path()[400].position[4]));
 }
 
-/// The torque falls within 10 ms to the torque of a weak spring. The torque never increases in a step meanwhile, and follows the joint to
-/// any position to which it is led.
+/// When a joint begins to yield, its torque falls within 10 ms to the torque of a weak spring. During this time, the torque has no step
+/// upwards, and the spring follows the joint to any position.
 #[test]
 fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     let mut rig = bench(false);
@@ -110,7 +112,7 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
         rig.nodes[3].report.velocity = 0.2;
         rig.tick();
         let t = rig.controller.telemetry().joints[3];
-        // The joint also carries the load that the integral had found.
+        // The torque of the joint also contains the load that the integral has learned.
         assert!((t.torque - t.torque_model - t.torque_i).abs() <= most + 1.0, "{k}: {t:?}");
         assert!((t.torque - last).abs() < 0.1 * most, "{k}: from {last} to {}", t.torque);
         last = t.torque;
@@ -120,8 +122,8 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
-/// A joint that is calm again after a push is held at its present position, without a torque step. After the third push, the joint yields
-/// until the host clears the stop.
+/// When a joint is calm again after a push, the controller holds it at its present position, without a torque step. After the third push,
+/// the joint yields until the host clears the stop.
 #[test]
 fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides() {
     let mut rig = bench(false);
@@ -136,7 +138,7 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
             assert!((torque - last).abs() < 250.0, "a step from {last} to {torque}");
             last = torque;
         }
-        // A held joint pulls towards its hold position, and the spring of a yielding joint pulls the joint back.
+        // A held joint pulls towards its hold position. The spring of a yielding joint pulls the joint back.
         let yields = rig.controller.telemetry().joints[3].torque < -10.0;
         assert_eq!(yields, time == 3, "time {time}: {} N·m", rig.controller.telemetry().joints[3].torque);
     }
@@ -146,7 +148,7 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
     assert!(torque > -5.0 && rig.errors() == 0, "{torque} N·m");
 }
 
-/// Commands that a held stop still accepts, and the events that end it.
+/// Tests the commands that the controller accepts in a held stop, and the events that end it.
 #[test]
 fn j69_a_latched_stop_outlasts_teaching_and_not_a_release() {
     for latches in [true, false] {
@@ -174,7 +176,7 @@ fn j69_a_latched_stop_outlasts_teaching_and_not_a_release() {
     }
 }
 
-/// A cause contains the measured value, with its sign, and the limit of the joint.
+/// The cause of a held stop contains the measured value, with its sign, and the limit of the joint.
 #[test]
 fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     let config = Config::avena();
@@ -184,7 +186,7 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     let cause = pulled.controller.reactions().stop.expect("a held stop").0;
     assert_eq!((cause.kind, cause.joint), (StopKind::PositionError, 4));
     assert_eq!(cause.limit, config.joints[3].position_error_max as f32);
-    // The joint moved 2 mrad further in each millisecond.
+    // In each millisecond, the joint has moved by 2 mrad.
     assert!((cause.limit..cause.limit + 0.01).contains(&-cause.value), "{cause:?}");
 
     let mut pushed = bench(false);
@@ -192,7 +194,7 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     let cause = pushed.controller.reactions().stop.expect("a held stop").0;
     assert_eq!((cause.kind, cause.joint), (StopKind::Push, 6));
     assert_eq!(cause.limit, (config.yield_torque_share * config.joints[5].torque_max) as f32);
-    // The value is the feedback torque against the push, before it is limited.
+    // The value in the cause is the feedback torque against the push, before the limit is applied.
     assert!((cause.limit..10.0 * cause.limit).contains(&-cause.value), "{cause:?}");
 }
 
@@ -211,18 +213,18 @@ fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_
     held(&mut rig, 800);
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     held(&mut rig, 1_000);
-    // The operator releases the key and presses it again.
+    // The operator releases the jog key and presses it again.
     rig.run(210);
     assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NoError);
 }
 
-/// While the arm brakes, it does not need to follow its path exactly. However, a push away from the present point of the path is still
-/// detected.
+/// While the arm brakes, it need not follow its path exactly. However, the controller still detects a push away from the present point of
+/// the path.
 #[test]
 fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_brakes() {
     let mut rig = bench(true);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
-    // The joint moves all the time, so the braking continues.
+    // The simulated joint moves all the time, so the braking continues.
     rig.nodes[3].report.velocity = 0.5;
     rig.until(500, |r| r.trajectory() == TrajectoryState::Pause);
     push(&mut rig, 0.097);
@@ -233,8 +235,8 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_bra
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
 }
 
-/// A joint that is stuck has not followed its command. If the arm is held as a result, and the next answers are missing, the prediction
-/// must not move the joint back.
+/// A joint that is stuck does not follow its command. If the controller holds the arm for this reason, and the next answers are missing,
+/// the prediction must not move the joint back.
 #[test]
 fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
     let mut config = Config::avena();
@@ -246,7 +248,7 @@ fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
     rig.until(1_500, |rig| rig.errors() != 0);
     let stuck = rig.nodes[4].report.position;
     for k in 1..=4 {
-        // The answer to the Move of that tick was also lost.
+        // The answer to the Move of this tick was also lost.
         rig.drop_answers(4);
         rig.tick();
         let t = rig.controller.telemetry().joints[4];
@@ -290,7 +292,7 @@ const ROWS: [Row; 8] = [
     Row { error: "gripper silent or reset (J-23)", cause: |rig| rig.nodes[6].silent = true },
 ];
 
-/// Returns the reaction of the controller, in words.
+/// Returns the reaction of the controller, as text for docs/safety.md.
 fn reaction(rig: &Rig) -> String {
     let t = rig.controller.telemetry();
     let torque = if t.joints.iter().all(|j| j.torque == 0.0) { "torque zero" } else { "torque stays" };

@@ -16,7 +16,7 @@ use rig::Rig;
 const BLOCKS: usize = 96;
 
 fn memory() -> [Vec<Block>; 2] {
-    // Memory pieces of different sizes with old contents, because memory contains random data at power-up.
+    // Returns memory pieces of different sizes with old contents, because memory contains random data at power-up.
     [vec![[0x4A46_0001; BLOCK_WORDS]; BLOCKS - 5], vec![[0xA5A5_5A5A; BLOCK_WORDS]; 5]]
 }
 
@@ -26,7 +26,7 @@ fn recorded() -> Rig {
     rig
 }
 
-/// Returns a rig in HoldPos, recorded since the start.
+/// Returns a rig in HoldPos that was recorded since its start.
 fn holding() -> Rig {
     let mut rig = recorded();
     rig.defaults();
@@ -43,7 +43,7 @@ fn blocks(rig: &Rig) -> Vec<Block> {
     recorder(rig).blocks().copied().collect()
 }
 
-/// Returns the ticks of a log, each with its result, and the ticks that are followed by a snapshot.
+/// Returns a hash of each tick of a log, and the ticks after which a snapshot follows.
 fn contents(blocks: &[Block]) -> (Vec<u64>, Vec<u64>) {
     let (mut ticks, mut snapshots) = (Vec::new(), Vec::new());
     for record in Log::new(blocks) {
@@ -91,14 +91,14 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(ticks.last(), Some(&(error + u64::from(AFTER_ERROR_MS))));
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "every tick once");
 
-    // The end of the error, another error, or the passing of time does not change the log.
+    // The log does not change when the error ends, when another error occurs, or while time passes.
     let before = blocks(&rig);
     rig.clear(true, 0x7F);
     rig.run(600);
     rig.press_stop(1);
     rig.run(1_000);
     assert_eq!((blocks(&rig), recorder(&rig).state()), (before.clone(), LogState::Error));
-    // A reset of any kind also does not change the log.
+    // A reset of any kind does not change the log either.
     for failed in [false, true] {
         let memory = rig.recorder.take().unwrap().into_memory();
         rig.recorder = Some(Recorder::new(memory, failed));
@@ -107,13 +107,13 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     rig.send(FrameType::ClearLog, &[]);
     rig.run(5);
     assert_eq!(recorder(&rig).state(), LogState::Recording);
-    // The error that is still latched is not the first error of the new log.
+    // An error that is still latched when the new log begins does not count as its first error.
     rig.run(1_000);
     assert_eq!(recorder(&rig).state(), LogState::Recording);
 }
 
-/// An emergency stop that is pressed while the device starts is an error. The log of a later error must not be lost because of this early
-/// error.
+/// An emergency stop that is pressed while the device starts counts as an error. The log of a later error must not be lost because of this
+/// early error.
 #[test]
 fn j56_a_log_without_torque_gives_way_when_torque_comes_on() {
     let mut rig = recorded();
@@ -150,12 +150,12 @@ fn j56_a_reset_keeps_the_log_of_a_device_that_failed_and_begins_anew_otherwise()
     }
 }
 
-/// Returns the blocks in memory as a recorder finds them after a reset.
+/// Returns the blocks that a recorder finds in this memory after a reset.
 fn found(memory: &[Vec<Block>; 2]) -> Vec<Block> {
     Recorder::new(memory.clone(), true).blocks().copied().collect()
 }
 
-/// The data of a tick are valid after the last word of the tick was written, and not before.
+/// The recorded data of a tick become valid with the last word of the tick, and not before.
 #[test]
 fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before() {
     const MAGIC: usize = 0;
@@ -176,7 +176,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
             .collect();
         assert!(changed.iter().any(|&(_, _, word)| word == COMMIT));
         let (ticks, snapshots) = contents(&found(&before));
-        // A tick that begins a block is long. The test uses only some of the words of this tick.
+        // A tick that begins a block changes many words. The test leaves out only some of these words.
         for leave_out in (0..changed.len()).step_by(1 + changed.len() / 8) {
             let mut cut = before.clone();
             for (n, &(piece, block, word)) in changed.iter().enumerate() {
@@ -184,7 +184,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
                     cut[piece][block][word] = after[piece][block][word];
                 }
             }
-            // Before a block is overwritten, it is first marked as invalid.
+            // Before the recorder overwrites a block, it marks the block as invalid.
             for &(piece, block, _) in changed.iter().filter(|(_, _, word)| *word == MAGIC) {
                 cut[piece][block][MAGIC] = 0;
             }
@@ -198,7 +198,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
     assert!(cuts > 200, "{cuts}");
 }
 
-/// After any changes in the memory, only data that were written are read, and all complete data are read.
+/// After any changes in the memory, a reader returns only data that were written, and all data that are complete.
 #[test]
 fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     let mut rig = holding();
@@ -214,13 +214,13 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
         damaged[block][word] ^= 1 << bit;
         let (left, _) = contents(&damaged);
         assert!(left.iter().all(|tick| known.contains(tick)), "block {block}, word {word}, bit {bit}");
-        // A snapshot after the damage, and everything after it, can still be read.
+        // A reader can still read a snapshot after the damage, and all data after this snapshot.
         let behind = whole[block + 1..].iter().position(|block| block[3] as u16 != 0xFFFF);
         if let Some(first) = behind.map(|first| block + 1 + first) {
             assert!(left.ends_with(&contents(&whole[first..]).0));
         }
     }
-    // Test data with blocks that are missing at either end, and with words that are not a log.
+    // The log is read with blocks that are missing at its start or end, and from words that are not a log.
     for cut in 0..whole.len() {
         assert!(ticks.ends_with(&contents(&whole[cut..]).0));
         assert!(ticks.starts_with(&contents(&whole[..cut]).0));
@@ -233,14 +233,14 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     for n in 0..50 {
         let mut noise = whole.clone();
         for block in &mut noise {
-            // In every second case the heads of the blocks stay unchanged.
+            // In every second case, the heads of the blocks stay unchanged.
             block[if n % 2 == 0 { 5 } else { 0 }..].fill_with(&mut next);
         }
         contents(&noise);
     }
 }
 
-/// Returns a page of the log as a host gets it.
+/// Returns a page of the log, as a host receives it.
 fn page(rig: &mut Rig, block: u32, offset: u16) -> (LogState, u32, u16, u32, Vec<u8>) {
     let body: Vec<u8> = [&block.to_be_bytes()[..], &offset.to_be_bytes()].concat();
     rig.send_on(1, FrameType::GetLog, &body);
@@ -258,7 +258,7 @@ fn page(rig: &mut Rig, block: u32, offset: u16) -> (LogState, u32, u16, u32, Vec
     panic!("no answer");
 }
 
-/// Returns the whole log, which is read page by page.
+/// Returns the whole log, after reading it page by page.
 fn fetched(rig: &mut Rig) -> Vec<Block> {
     let (mut block, mut bytes, mut all) = (0, Vec::new(), Vec::new());
     loop {
@@ -286,10 +286,10 @@ fn j56_a_log_is_read_in_pages_while_recording_rests() {
     rig.run(2_500);
     let before = blocks(&rig);
     let read = fetched(&mut rig);
-    // Recording continued until the first page was requested.
+    // Recording continued until the host requested the first page.
     let (before, read) = (contents(&before).0, contents(&read).0);
     assert!(read.starts_with(&before) && read.len() < before.len() + 10);
-    // Recording continues by itself, with a snapshot.
+    // Recording continues without a command, and begins with a snapshot.
     let rested = rig.controller.telemetry().tick;
     rig.run(2_500);
     let ticks = replayed(&rig);
@@ -305,7 +305,7 @@ fn j56_an_error_is_recorded_also_while_a_host_reads() {
     page(&mut rig, 0, 0);
     rig.press_stop(1);
     let error = rig.controller.telemetry().tick;
-    // The host continues to read.
+    // The host continues to read pages.
     for _ in 0..20 {
         page(&mut rig, 0, 0);
     }
@@ -337,7 +337,7 @@ fn j56_j50_a_device_without_a_recorder_refuses_what_is_asked_of_one() {
 #[test]
 fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     let mut rig = holding();
-    // The number of blocks is the number on the boards.
+    // The recorder of this test has as many blocks as the recorders on the boards.
     rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     let begin = rig.controller.telemetry().tick;
     for n in 0..3_000u32 {
@@ -357,8 +357,8 @@ fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     assert!(since.windows(2).all(|pair| pair[1] - pair[0] <= 2 * u64::from(SNAPSHOT_MS)), "{snapshots:?}");
 }
 
-/// A payload is being blended into the model when a snapshot is taken. The replay continues the blend (J-60). After the next snapshot, each
-/// tick is identical in every bit.
+/// A snapshot is taken while a payload is being blended into the model. The replay continues this blend (J-60). After the next snapshot,
+/// each tick is identical in every bit.
 #[test]
 fn j56_a_payload_on_its_way_is_replayed() {
     let mut rig = holding();
@@ -381,11 +381,11 @@ fn j56_a_payload_on_its_way_is_replayed() {
     assert_eq!(replayed(&rig).last(), Some(&rig.controller.telemetry().tick));
 }
 
-/// An emergency stop at power-up that is cleared at once does not stop the log. The log continues when the arm then gets its torque.
+/// If an emergency stop at power-up is cleared at once, it does not stop the log. The log continues when the arm then has torque.
 #[test]
 fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     let mut rig = Rig::new(Config::avena());
-    // The number of blocks is the number on the boards.
+    // The recorder of this test has as many blocks as the recorders on the boards.
     rig.recorder = Some(Recorder::new([vec![[0; BLOCK_WORDS]; 63], vec![[0; BLOCK_WORDS]; 94]], false));
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::Init && rig.controller.telemetry().tick > 50);
@@ -402,8 +402,7 @@ fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     assert!(replayed(&rig).contains(&error));
 }
 
-/// In a replay, read requests are also processed in their order when a tick has further requests, although the controller of the replay has
-/// no recorder.
+/// A replay processes read requests in their order when a tick has further requests, although the controller of the replay has no recorder.
 #[test]
 fn j56_requests_beside_others_are_replayed_in_their_turns() {
     let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
@@ -434,13 +433,14 @@ fn j56_requests_beside_others_are_replayed_in_their_turns() {
     }
 }
 
-/// Returns a rig, disabled or held, that has received a StoreArm after `wait` ticks, and has run for at least half a second since.
+/// Returns a disabled or held rig that received a StoreArm after `wait` ticks. After the StoreArm, the rig has run for at least half a
+/// second.
 fn storing(state: ControllerState, wait: usize) -> Rig {
     let mut rig = recorded();
     rig.controller.set_store_state(StoreState::Empty, 0);
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // The log from before the torque is discarded.
+    // The recorder has discarded the log from before the torque.
     rig.run(600);
     let stored = state == ControllerState::Init;
     if stored {
@@ -454,8 +454,8 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
     rig
 }
 
-/// A replay has no memory to store an arm, so it refuses the request at once. The replay does not report this refusal as a difference of
-/// the controller, even with a snapshot in between. After the next snapshot, all outputs are equal.
+/// A replay has no memory to store an arm, so it refuses a StoreArm at once. The replay does not report this refusal as a difference of the
+/// controller, even with a snapshot in between. After the next snapshot, all outputs are equal.
 #[test]
 fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
     for state in [ControllerState::Init, ControllerState::HoldPos] {

@@ -1,4 +1,4 @@
-//! Tests of the record of each frame, the order of records, and frames that wait for other frames (J-04).
+//! Tests of the response record of each frame, the order of these records, and frames that wait for other frames (J-04).
 use crate::rig;
 
 use jtc_core::{ControllerState, RECORDS_MAX, TrajectoryState};
@@ -8,7 +8,7 @@ use rig::{Rig, rest, segment_body};
 
 const NOISE: Response = Response::bad(0, FrameStatus::IncorrectHeader, 0);
 
-/// Returns a rig on a path whose statuses leave every 15 ms, as at 115 200 Bd.
+/// Returns a rig on a path. A status leaves this rig every 15 ms, as at 115 200 Bd.
 fn moving() -> Rig {
     let mut rig = Rig::holding();
     let points: Vec<RawPoint> = (0..400).map(|_| rest(0)).collect();
@@ -17,7 +17,7 @@ fn moving() -> Rig {
     rig
 }
 
-/// Runs ticks in which the line takes a status every 15 ms.
+/// Executes ticks in which the line accepts a status every 15 ms.
 fn run_slowly(rig: &mut Rig, ticks: usize) {
     for n in 0..ticks {
         rig.status_free = n % 15 == 0;
@@ -26,7 +26,8 @@ fn run_slowly(rig: &mut Rig, ticks: usize) {
     rig.status_free = true;
 }
 
-/// Runs until the trajectory execution state leaves Execute, for at most this number of ticks, because path time slows down.
+/// Executes ticks, at most this number, until the trajectory execution state changes from Execute to another state, because path time slows
+/// down.
 fn stopped_within(rig: &mut Rig, ticks: usize) -> TrajectoryState {
     rig.until(ticks, |r| r.trajectory() != TrajectoryState::Execute);
     rig.trajectory()
@@ -42,7 +43,7 @@ fn j04_stop_and_pause_wait_for_no_record() {
         [(UrgentCommand::Stop, TrajectoryState::Stop), (UrgentCommand::Pause, TrajectoryState::Pause)]
     {
         let mut rig = moving();
-        // The line takes no status, so every record waits.
+        // The line accepts no status, so every response record waits.
         rig.status_free = false;
         for _ in 0..400 {
             rig.send(FrameType::ClearOccurredErrors, &[]);
@@ -66,7 +67,7 @@ fn j04_a_stop_acts_while_a_long_frame_is_executed() {
     let mut rig = moving();
     rig.exec(ExecCommand::Pause);
     rig.until(400, |r| r.trajectory() == TrajectoryState::Pause);
-    // The segment needs many slices. During these slices, the path is discarded.
+    // The controller processes this segment in many slices. During these slices, the controller discards the path.
     let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
     rig.statuses.clear();
     rig.send(FrameType::FrictionTableUseDefault, &[]);
@@ -88,16 +89,16 @@ fn j04_a_stop_cancels_the_execute_before_it_and_not_the_one_after() {
         let mut rig = Rig::holding();
         rig.upload(&[rest(0); 50], 10);
         rig.statuses.clear();
-        // All frames arrive within one tick, with an Execute on each line.
+        // All these frames arrive within one tick, with an Execute on each line.
         rig.send_on(1, FrameType::TrajSetExecStatus, &[3]);
         rig.send(FrameType::TrajSetExecStatus, &[3]);
         rig.urgent(0, command);
         rig.run(20);
         assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Stop));
         let refused = exec_record(DataStatus::NotAllowed);
-        // The arm is at rest at the start. The trajectory is in the state after a Stop, not in the state after a Pause.
+        // The arm was already at rest. The trajectory is in the state after a Stop, so a Pause is refused.
         assert_eq!(rig.records(), [refused, refused, exec_record(data)]);
-        // A later command is executed.
+        // The controller executes a later command.
         rig.statuses.clear();
         rig.urgent(0, command);
         rig.send(FrameType::TrajSetExecStatus, &[3]);
@@ -145,7 +146,7 @@ fn j04_a_command_that_is_not_short_waits_for_its_own_tick() {
         assert!((1..=2).contains(&done), "at least one, and one of them costly: {done}");
         waiting = rig.waiting();
     }
-    // If a frame changes the state, the next frame must be checked in the new state.
+    // If a frame changes the controller state, the controller must check the next frame in the new state.
     rig.statuses.clear();
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.send(FrameType::TeachingModeDisable, &[]);
@@ -154,7 +155,7 @@ fn j04_a_command_that_is_not_short_waits_for_its_own_tick() {
     rig.send(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest(0); 3]));
     rig.run(10);
     assert!(rig.records().iter().all(Response::accepted), "{:?}", rig.records());
-    // Several short frames are executed in one tick.
+    // The controller executes several short frames in one tick.
     (0..160).for_each(|_| rig.send(FrameType::ClearOccurredErrors, &[]));
     rig.run(10);
     assert_eq!(rig.waiting(), 0);
@@ -198,7 +199,8 @@ fn j04_a_line_that_floods_loses_no_record_of_the_other() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..Default::default() })]
 
-    /// For any sequence of frames, each frame gets exactly one record while at most 64 wait. The records of each line are in order.
+    /// For any order of the frames, each frame gets exactly one response record if at most 64 records wait. The records of each line have
+    /// the order of its frames.
     #[test]
     fn j04_exactly_one_record_a_frame(sent in prop::collection::vec((0usize..2, 0u8..8), 1..60)) {
         let mut rig = Rig::holding();
@@ -233,7 +235,7 @@ proptest! {
                 found[line].push(rig.statuses.last().unwrap().response.frame_type);
             }
         }
-        // The records of frames that were sent slowly have already arrived.
+        // The response records of frames that were sent slowly have already arrived.
         let early = rig.records().len() - found[0].len() - found[1].len();
         prop_assert_eq!(early + found[0].len() + found[1].len(), expected[0].len() + expected[1].len());
         for line in 0..2 {

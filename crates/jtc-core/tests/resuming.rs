@@ -1,5 +1,5 @@
-//! Tests of the conditions and the starting point of an Execute after a Pause (J-16, J-33, J-34), and of the time limit of a teach request.
-//! This time limit does not depend on the time for which the arm was held (J-25).
+//! Tests of an Execute after a Pause: its conditions and its starting point (J-16, J-33, J-34). Also tests the timeout of a teach request
+//! (J-25). The timeout of a teach request does not depend on how long the arm was held before.
 use crate::rig;
 
 use jtc_bus::NodeState;
@@ -52,12 +52,12 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     assert!(rig.controller.telemetry().point > paused.point + 2, "{} after {}", last, paused.point);
 }
 
-/// The time limit of a teach request starts with the command, not when the arm was first held.
+/// The timeout of a teach request starts with the command, and not when the controller began to hold the arm.
 #[test]
 fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     let mut rig = Rig::holding_with(Config { enable_timeout_ms: 600, ..Config::avena() });
     rig.run(1_000);
-    // A hand leans on joint 2.
+    // A hand pushes against joint 2.
     rig.push(1, 0.002);
     rig.run(2);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);

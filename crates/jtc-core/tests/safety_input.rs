@@ -1,4 +1,4 @@
-//! Tests of the safety input with a ramp (J-22). All motion stops first, and then the torque is removed.
+//! Tests of the safety input with a ramp (J-22). The controller first stops all motion, and then switches the torque off.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, SettingValue};
 
@@ -16,7 +16,7 @@ fn speeds(bench: &Bench) -> (f64, f64) {
     (most(bench.arm.v), most(bench.rig.controller.telemetry().joints.map(|joint| joint.set_velocity)))
 }
 
-/// Returns the number of ticks until the torque is removed.
+/// Returns the number of ticks until the torque is off.
 fn released(bench: &mut Bench) -> usize {
     for k in 1..2_000 {
         bench.arm.tick(&mut bench.rig);
@@ -29,8 +29,8 @@ fn released(bench: &mut Bench) -> usize {
     panic!("the torque stays");
 }
 
-/// A pulse of 1 ms is sufficient. Commanded motion is at rest when the torque is removed. A joint that yields, or that a hand leads, may
-/// move until the end of the ramp.
+/// A pulse of 1 ms at the safety input is sufficient for the stop. The commanded motion is at rest when the torque is switched off. A joint
+/// that yields, or that a hand moves, may still move until the end of the ramp.
 #[test]
 fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     for (doing, begin) in UNDER_WAY {
@@ -45,7 +45,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
         println!("{doing}: from {before:.2} rad/s, {ms} ms, then {speed:.3} rad/s");
         assert!(ms <= 500, "{doing}: {ms} ms");
         match doing {
-            // Without a commanded motion, a stop would only delay the removal of the torque.
+            // Without a commanded motion, a stop would only delay switching the torque off.
             _ if before == 0.0 && !operates && doing != "teaches" && doing != "slows down after a Stop" => {
                 assert_eq!(ms, 0, "{doing}")
             }
@@ -60,7 +60,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     }
 }
 
-/// Returns an arm that moves on a path, with this ramp. The safety input has just become 0.
+/// Returns an arm that moves on a path, with this ramp. The safety input of this arm has just become 0.
 fn moving(ramp_ms: u16) -> Bench {
     let mut bench = Bench::holding(config(ramp_ms), 1.0, 0.0);
     bench.execute(1.0, 4.0);
@@ -71,13 +71,14 @@ fn moving(ramp_ms: u16) -> Bench {
     bench
 }
 
-/// The ramp is the longest time until the torque is removed. Without a ramp, the torque is removed in the tick that reads 0.
+/// The ramp setting is the longest time until the torque is off. Without a ramp, the controller switches the torque off in the tick in
+/// which it reads 0 at the safety input.
 #[test]
 fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     for ramp_ms in [0, 1, 20, 100] {
         assert_eq!(released(&mut moving(ramp_ms)), 1 + usize::from(ramp_ms));
     }
-    // A fault of a drive or another error removes the torque without waiting.
+    // After a fault of a drive or another error, the controller switches the torque off without waiting.
     let mut bench = moving(500);
     bench.run(50);
     bench.rig.nodes[3].fault();
@@ -85,7 +86,7 @@ fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     assert!(ticks < 20, "{ticks} ms");
 }
 
-/// If another cause removes the torque meanwhile, the safety input is also reported.
+/// If another cause switches the torque off during the ramp, the controller also reports the safety input.
 #[test]
 fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     for reset in [false, true] {
@@ -121,14 +122,14 @@ fn j22_a_ramp_enables_no_drive() {
     assert_eq!(rig.state(), ControllerState::Error);
 }
 
-/// No motion begins while the safety input stops the arm, even if the input is 1 again.
+/// No motion can begin while the safety input stops the arm, even if the input is 1 again.
 #[test]
 fn j22_nothing_begins_during_the_ramp() {
     let mut bench = moving(500);
     bench.run(1);
     bench.rig.safety_input = true;
     bench.until("a path that stands", |rig| rig.trajectory() == TrajectoryState::Stop);
-    // The hand that pushes the arm keeps it in motion.
+    // The hand that has pushed the arm keeps it in motion.
     bench.rig.follow = false;
     let rig = &mut bench.rig;
     rig.nodes[1].report.velocity = 0.1;
@@ -139,7 +140,7 @@ fn j22_nothing_begins_during_the_ramp() {
     rig.until(500, |rig| rig.state() == ControllerState::Error);
 }
 
-/// The setting is part of the arm, so it can be changed only without torque.
+/// The ramp setting is part of the arm, so this setting can change only without torque.
 #[test]
 fn j22_j53_the_ramp_is_a_setting_that_changes_without_torque_only() {
     let row = settings::setting(80).expect("the setting");

@@ -1,4 +1,5 @@
-//! docs/settings.md contains the table of settings (J-53). `UPDATE_DOCS=1 cargo test -p jtc-core --test suite settings_page::` writes it.
+//! docs/settings.md contains the table of settings (J-53). `UPDATE_DOCS=1 cargo test -p jtc-core --test suite settings_page::` writes this
+//! page.
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Tests of the two slots on a model of the flash (J-54). The power can fail before, during and after any word.
+//! Tests of the two flash slots with a simulated flash (J-54). The power can fail before, during and after the programming of any word.
 use jtc_core::slots::{Action, Header, IMAGE_MAX, SLOTS, Slots, Storing, WORD, Word, newer};
 use proptest::prelude::*;
 
@@ -10,13 +10,13 @@ const ERASED: Word = [0xFF; WORD];
 enum Cell {
     /// The word is erased and can be programmed.
     Erased,
-    /// The word was programmed, completely or partly.
+    /// The word was programmed, completely or in part.
     Holds(Word),
-    /// The word has more wrong bits than the flash can correct, so that reading it is an error.
+    /// The word has more wrong bits than the flash can correct, so that a read is an error.
     Unreadable,
 }
 
-/// Simulated flash of the slots.
+/// Simulated flash memory with the two slots.
 #[derive(Clone)]
 struct Flash([Vec<Cell>; SLOTS]);
 
@@ -33,7 +33,7 @@ impl Flash {
         }
     }
 
-    /// Returns a slot's image and sequence number, if the slot is complete.
+    /// Returns the image and the sequence number in a slot, if the slot is complete.
     fn load(&self, slot: usize) -> Option<(Vec<u8>, u32)> {
         let header = Header::parse(&self.read(slot, 0)?)?;
         let words: Option<Vec<Word>> = (1..header.words()).map(|word| self.read(slot, word)).collect();
@@ -41,12 +41,12 @@ impl Flash {
         Some((image, header.sequence()))
     }
 
-    /// Reads the slots as the board does when it starts.
+    /// Reads the state of the slots, as the board does when it starts.
     fn slots(&self) -> Slots {
         Slots::new([0, 1].map(|slot| self.load(slot).map(|(_, sequence)| sequence)))
     }
 
-    /// Returns the image that the board uses.
+    /// Returns the image that the board would use.
     fn current(&self) -> Option<Vec<u8>> {
         self.slots().current().and_then(|(slot, _)| self.load(slot)).map(|(image, _)| image)
     }
@@ -63,10 +63,10 @@ impl Flash {
         }
     }
 
-    /// Simulates a loss of power in the middle of an action.
+    /// Simulates a loss of power in the middle of an action on the flash.
     fn torn(&mut self, action: &Action, rng: &mut Chance) {
         match *action {
-            // Some words are erased, some words are not erased, and some words are erased in part.
+            // After the loss of power, some words are erased, some are not erased, and some are erased in part.
             Action::Erase { slot } => {
                 for cell in &mut self.0[slot] {
                     let before = match cell {
@@ -128,7 +128,7 @@ fn image(n: usize, seed: u64) -> Vec<u8> {
     (0..n).map(|_| rng.byte()).collect()
 }
 
-/// Many images are stored. The last image is found each time, and the previous image stays in the other slot.
+/// The test stores many images. Each time, the board finds the last image, and the previous image stays in the other slot.
 #[test]
 fn j54_the_newest_image_is_found() {
     let mut flash = Flash::new();
@@ -152,7 +152,7 @@ fn an_image_that_is_too_long_changes_nothing() {
     assert_eq!(slots, Slots::new([Some(3), Some(2)]));
 }
 
-/// J-54: every bit of a slot is checked. If one bit is wrong, the slot is not complete, and the other slot is used.
+/// J-54: the CRC covers every bit of a slot. If one bit is wrong, the slot is not complete, and the board uses the other slot.
 #[test]
 fn j54_no_wrong_bit_is_accepted() {
     for length in [0, 1, 40, 300] {
@@ -173,8 +173,8 @@ fn j54_no_wrong_bit_is_accepted() {
     }
 }
 
-/// J-54: the power fails before, during and after every action on the flash, during the first stores and during later stores. The old or
-/// the new image is complete afterwards, and the next store works normally.
+/// J-54: the power fails before, during and after every action on the flash, both during the first stores and during later stores. After
+/// the loss of power, the old or the new image is complete, and the next store works normally.
 #[test]
 fn j54_a_power_cut_leaves_one_whole_image() {
     for (stores, length) in [(0, 200), (1, 200), (2, 200), (3, 333), (4, 0), (5, 2000), (1, IMAGE_MAX)] {
@@ -214,7 +214,7 @@ fn j54_a_power_cut_leaves_one_whole_image() {
     }
 }
 
-/// If both slots are damaged, no image exists, and a store creates one.
+/// If both slots are damaged, no image exists, and the next store creates an image.
 #[test]
 fn j54_two_damaged_slots_are_no_image() {
     let mut flash = Flash::new();
@@ -228,7 +228,7 @@ fn j54_two_damaged_slots_are_no_image() {
     assert_eq!(flash.slots().current(), Some((0, 1)));
 }
 
-/// The CRC alone would detect an incomplete slot. Without a header, the CRC does not need to be computed.
+/// The CRC alone would detect an incomplete slot. In a slot without a header, the board does not need to compute the CRC.
 #[test]
 fn the_header_is_programmed_last() {
     let image = image(100, 1);
@@ -260,7 +260,8 @@ fn sequence_numbers_begin_again() {
     assert_eq!(Slots::new([Some(9), None]).next(), (1, 10));
 }
 
-/// Expected bytes of the documented layout, with a CRC that was computed independently (Python's `zlib.crc32`).
+/// The test compares the header with bytes of the documented layout. The CRC of these bytes was computed independently (Python's
+/// `zlib.crc32`).
 #[test]
 fn the_header_is_the_documented_one() {
     let header = Header::new(b"arm", 0x0102_0304).expect("short").emit();
@@ -273,7 +274,7 @@ fn the_header_is_the_documented_one() {
 const CRC_OF_PYTHON: u32 = 0x26B4_110F;
 
 proptest! {
-    /// For any content of the flash, loading does not panic and does not accept an image that was not stored.
+    /// Loading does not panic for any content of the flash, and does not accept an image that was not stored.
     #[test]
     fn garbage_is_no_image(words in prop::collection::vec(any::<[u8; WORD]>(), 1..20), length in 0..700u32) {
         let mut flash = Flash::new();
@@ -281,7 +282,7 @@ proptest! {
             *cell = Cell::Holds(*word);
         }
         prop_assert_eq!(flash.current(), None);
-        // The header is valid except for its CRC.
+        // The header in this flash is valid except for its CRC.
         let mut header = Header::new(&[], 5).expect("short").emit();
         header[8..12].copy_from_slice(&length.to_le_bytes());
         header[28..].copy_from_slice(&words[0][..4]);
@@ -289,7 +290,7 @@ proptest! {
         prop_assert_eq!(flash.current(), None);
     }
 
-    /// If two sequence numbers are not 2³¹ apart, the newer number belongs to the image that was stored later.
+    /// If two sequence numbers are not exactly 2³¹ apart, the newer number belongs to the image that was stored later.
     #[test]
     fn the_next_sequence_number_is_the_newest(found in any::<[Option<u32>; SLOTS]>()) {
         let mut slots = Slots::new(found);

@@ -1,4 +1,4 @@
-//! Tests of errors and of the return from errors (sections 3 and 4).
+//! Tests of errors, and of the return from state Error (sections 3 and 4).
 use crate::rig;
 
 use jtc_bus::{Frame, NodeState, Request, Target, warning};
@@ -24,10 +24,10 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     rig.tick();
     assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.errors(), error::EMERGENCY_INPUT | error::EXTERNAL);
-    // Clearing has no effect while the cause is present.
+    // A clear has no effect while the cause of the error is present.
     rig.clear(true, 0x7F);
     assert_eq!(rig.state(), ControllerState::Error);
-    // The end of the cause alone also has no effect.
+    // The end of the cause alone does not end state Error either.
     rig.safety_input = true;
     rig.run(200);
     assert_eq!(rig.state(), ControllerState::Error);
@@ -38,7 +38,7 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     rig.clear(true, 0);
     rig.run(100);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
-    // Occurred errors stay until ClearOccurredErrors (0x02).
+    // Occurred errors stay recorded until ClearOccurredErrors (0x02).
     assert_eq!(rig.status().occurred, error::EMERGENCY_INPUT | error::EXTERNAL);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.status().occurred, 0);
@@ -52,7 +52,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     rig.clear(true, 0);
     assert_eq!(rig.state(), ControllerState::Error, "the node's fault is still there");
-    // The node ignores frames for some time.
+    // The drive ignores frames for some time in its fault reaction.
     rig.nodes[1].report.state = NodeState::FAULT_REACTION;
     rig.clear(true, 1 << 1);
     let from = rig.sent.len();
@@ -68,7 +68,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.nodes[1].report.errors, 0);
 }
 
-/// A clear that arrives in the tick in which a fault appears does not hide the fault.
+/// A clear that arrives in the same tick as a fault does not hide this fault.
 #[test]
 fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     type Fault = fn(&mut Rig);
@@ -87,7 +87,8 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
                 }
                 rig.tick();
                 fault(&mut rig);
-                // The answer to the Move of this tick shows the fault in the next tick, which also executes the clear.
+                // The answer to the Move of this tick contains the fault. The answer with the fault arrives in the next tick, which also
+                // executes the clear.
                 rig.tick();
                 if occurred {
                     rig.send(FrameType::ClearOccurredErrors, &[]);
@@ -105,7 +106,7 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
             }
         }
     }
-    // The safety input is low for this tick only.
+    // The safety input is low in this tick only.
     let mut rig = Rig::holding();
     rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
     rig.press_stop(1);
@@ -116,7 +117,8 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     );
 }
 
-/// Existing hosts show the answer. A clear without an effect is refused, and is not executed later without a new request.
+/// Existing hosts show the answer to a clear. The controller refuses a clear without an effect, and does not execute it later without a new
+/// request.
 #[test]
 fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     type Fault = fn(&mut Rig);
@@ -138,12 +140,12 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!(rig.state(), ControllerState::Error, "{name}");
             rig.plain = plain;
             let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
-            // The three cases are a clear of the controller's errors alone, a clear that also names a joint without an error, and a clear
-            // of the occurred errors, which are all current.
+            // The first clear is for the controller's errors alone, and the second clear also names a joint without an error. The third
+            // clear is for the occurred errors, which are all current.
             assert_eq!(rig.clear(true, 0), refused, "{name}");
             assert_eq!(rig.clear(true, 0x01), refused, "{name}");
             assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
-            // Clears for nodes have no effect on the controller's errors.
+            // A clear for nodes has no effect on the controller's errors.
             assert_eq!(rig.clear(false, 0x01), DataStatus::NoError, "{name}");
             rig.nodes[4].report.state = NodeState::FAULT;
             assert_eq!(rig.clear(false, 0x10), DataStatus::NoError, "{name}");
@@ -159,7 +161,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
         }
     }
-    // A clear is accepted together with the joint, or while the joint is being cleared.
+    // The controller accepts a clear that also names the joint with the fault, or that arrives while this joint is being cleared.
     for joint_first in [false, true] {
         let mut rig = Rig::holding();
         rig.nodes[4].report.state = NodeState::FAULT;
@@ -173,7 +175,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
         rig.run(300);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // A clear that clears another error is accepted, but the fault stays.
+    // The controller accepts a clear that has an effect on another error, but the fault stays.
     let mut rig = Rig::holding();
     rig.press_stop(1);
     rig.nodes[4].report.state = NodeState::FAULT;
@@ -181,10 +183,10 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
-    // The first clear of the occurred errors sets their word to zero, and the second clear has no effect.
+    // The first clear of the occurred errors sets their word to zero, and the second clear would have no effect.
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
-    // A controller without errors does not refuse any clear.
+    // A controller without errors accepts every clear.
     let mut rig = Rig::holding();
     assert_eq!(rig.clear(true, 0x7F), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
@@ -208,7 +210,7 @@ fn j22_safety_input_acts_in_the_first_tick_and_output_follows_internal_errors() 
     assert_eq!(torque_of(rig.sent.last().unwrap()), [0.0; 6]);
     assert!(is_move(rig.sent.last().unwrap()), "the first frame after an error is Move");
     assert!(rig.last.safety_output, "an external error does not pull the output");
-    // An internal error sets the safety output to 0, and the bit of the internal error is set.
+    // An internal error sets the safety output to 0, and sets the bit for internal errors.
     let mut rig = Rig::holding();
     rig.nodes[4].silent = true;
     rig.until(20, |r| r.state() == ControllerState::Error);
@@ -231,11 +233,11 @@ fn j23_a_reset_touches_only_the_nodes_in_its_mask() {
     let resets: Vec<_> = rig.nodes.iter().map(|n| n.resets).collect();
     assert_eq!(resets, [1, 2, 1, 1, 1, 2, 1]);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // An empty mask has no effect.
+    // A reset with an empty mask has no effect.
     rig.ask(FrameType::ResetCanDevices, &[0, 0, 0, 0]);
     rig.run(50);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // Bits without a meaning are ignored, because hosts send 0xFF for all nodes.
+    // The controller ignores unused bits of the mask, because hosts send 0xFF for all nodes.
     rig.ask(FrameType::ResetCanDevices, &[0xFF, 0, 0, 0]);
     rig.run(600);
     assert_eq!(rig.state(), ControllerState::HoldPos);
@@ -287,7 +289,7 @@ fn j12_one_broadcast_a_tick_and_other_frames_in_one_tick_of_four() {
 #[test]
 fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
     const OWN: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
-    // In each state with torque, every second tick is missed.
+    // In each of these states with torque, every second tick is missed.
     for teaching in [false, true] {
         let mut rig = Rig::holding();
         if teaching {
@@ -308,7 +310,7 @@ fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
         rig.run(600);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // A few late ticks are tolerated for any length of time.
+    // The controller tolerates a few late ticks, however long they continue.
     let mut rig = Rig::holding();
     for _ in 0..100 {
         rig.missed_ticks = 5;
@@ -387,7 +389,7 @@ fn j04_each_record_is_carried_once_and_in_order() {
     assert_eq!(records[0].frame_type, 0x08);
     assert_eq!(records[1], bad);
     assert!(records[2..].iter().all(|r| (r.frame_type, r.data, r.length) == (0x0F, DataStatus::NoError, 6)));
-    // Without records, one status is sent every 40 ms, with an empty record.
+    // If no response record waits, the controller sends one status every 40 ms, with an empty record.
     rig.run(40);
     rig.statuses.clear();
     rig.run(400);
@@ -422,7 +424,7 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // The error latches. The bit of this error belongs to internal errors that do not come from a joint or from the bus.
+    // The error of the device latches. The bit of this error belongs to internal errors that do not come from a joint or from the bus.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

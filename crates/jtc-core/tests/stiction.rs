@@ -1,4 +1,4 @@
-//! Tests of holding joints with stiction, in which an integral can cause endless hunting (J-41).
+//! Tests of the hold of joints with stiction, in which an integral can cause endless hunting (J-41).
 use crate::{plant, rig};
 
 use jtc_core::{Config, Parameters, TrajectoryState};
@@ -8,7 +8,7 @@ use rig::{Rig, raw, segment_body};
 
 const POSE: [f64; 6] = [0.3, 0.8, -0.9, 0.4, 0.7, 0.2];
 
-/// Range of the observed values of one joint while the joint was held.
+/// Range of the observed values of one joint during the position hold.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     low: f64,
@@ -27,7 +27,7 @@ impl Seen {
     }
 }
 
-/// Returns the correction torque (N·m) and the true position (rad) of each joint over `ticks`.
+/// Returns the ranges of the correction torque (N·m) and of the true position (rad) of each joint over `ticks`.
 fn watch(arm: &mut Plant, rig: &mut Rig, ticks: usize) -> [(Seen, Seen); 6] {
     let mut seen = [(Seen::NOTHING, Seen::NOTHING); 6];
     for _ in 0..ticks {
@@ -41,13 +41,13 @@ fn watch(arm: &mut Plant, rig: &mut Rig, ticks: usize) -> [(Seen, Seen); 6] {
     seen
 }
 
-/// Returns the default arm's friction with this ratio of stiction to Coulomb friction and these bristles.
+/// Returns the default arm's friction, with this ratio of stiction to Coulomb friction and these bristle parameters.
 fn sticky(ratio: f64, stribeck: f64, stiffness: f64, damping: f64) -> [LuGre; 6] {
     core::array::from_fn(|j| LuGre { stribeck, stiffness, damping, ..LuGre::avena(j, ratio) })
 }
 
 /// Checks that every joint is quiet. At most the last bit of the encoder toggles, which causes 3.8 N·m of P and D torque on the large
-/// joints. The joint is at the position at which the integral settles.
+/// joints. The joint is at the position at which the integral stops changing.
 fn assert_quiet(arm: &mut Plant, rig: &mut Rig, what: &str) {
     for (j, (torque, position)) in watch(arm, rig, 6000).iter().enumerate() {
         let joint = j + 1;
@@ -78,8 +78,8 @@ fn j41_no_joint_hunts_or_buzzes_in_stiction() {
     }
 }
 
-/// If the integral never stops changing, an error below the resolution of the encoder leads to a limit cycle. The simulation in these tests
-/// shows the limit cycle.
+/// If the integral never stops changing, an error below the resolution of the encoder leads to a limit cycle. The simulation in this test
+/// shows this limit cycle.
 #[test]
 fn j41_an_integral_that_is_never_held_hunts() {
     let mut arm =
@@ -100,7 +100,7 @@ fn j41_a_motion_ends_without_hunting() {
         let mut arm = Plant::new(&heavier(Parameters::avena().model, 1.1), friction, POSE);
         let mut rig = arm.holding(Config::avena());
         arm.run(&mut rig, 3000);
-        // A motion moves the arm by 0.3 rad in 2 s and back.
+        // The motion moves the arm by 0.3 rad in 2 s, and back in 2 s.
         let points: Vec<_> = (0..=400).map(|i| point(&rig, f64::from(i) / 200.0)).collect();
         rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
         rig.send(FrameType::TrajSetExecStatus, &[3]);

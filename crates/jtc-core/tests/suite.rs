@@ -1,4 +1,5 @@
-//! All tests of the crate in one program, so that only one program must be linked. Each file here is a module of it.
+//! All tests of the crate in a single program, so that only this program must be linked. Each file in this folder is a module of this
+//! program.
 mod absent;
 mod approach;
 mod bring_up;

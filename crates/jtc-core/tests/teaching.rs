@@ -1,4 +1,4 @@
-//! Tests of Teaching with an arm that carries more or less than its model (J-25, J-44).
+//! Tests of Teaching with an arm that is heavier or lighter than its model (J-25, J-44).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters};
@@ -7,7 +7,7 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns the distance by which a hand leads each joint from a pose, rad. No joint reaches a soft end.
+/// Returns the distances that a hand moves the joints from a pose, rad. After the motion by a hand, no joint is in its soft end.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]
@@ -17,7 +17,7 @@ fn model() -> ArmModel {
     Parameters::avena().model
 }
 
-/// Holds the arm for 4 s, then teaches it. Checks that the torque does not step.
+/// Holds the arm for 4 s, then begins Teaching. Checks that the torque has no step.
 fn taught(arm: &mut Plant, config: Config) -> Rig {
     let mut rig = arm.holding(config);
     arm.run(&mut rig, 4000);
@@ -42,7 +42,7 @@ fn without_steps(arm: &mut Plant, rig: &mut Rig, ticks: usize) {
     }
 }
 
-/// Returns the largest motion of a joint in `ms`, rad.
+/// Returns the longest motion of a joint within `ms`, rad.
 fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     let from = arm.q;
     arm.run(rig, ms);
@@ -50,7 +50,7 @@ fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     (0..6).map(|j| (arm.q[j] - from[j]).abs()).fold(0.0, f64::max)
 }
 
-/// Simulates a hand that leads every joint by `way` rad in a second and lets go.
+/// Simulates a hand that moves every joint by `way` rad in a second and then lets go.
 fn lead(arm: &mut Plant, rig: &mut Rig, way: [f64; 6]) {
     let from = arm.q;
     for k in 0..1300 {
@@ -72,7 +72,7 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
             let mut arm = Plant::new(&loaded(model(), 2.0), LuGre::of_avena_times(factor), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
-            // With a third of its friction, the arm creeps because of the load that the integral had not found.
+            // With a third of its friction, the arm creeps because of the part of the load that the integral has not learned.
             assert!(still < if factor == 1.0 { 0.002 } else { 0.1 * 3.0 }, "{still} rad at {pose:?}");
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
@@ -82,7 +82,8 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
     }
 }
 
-/// A mass at the flange does not explain masses that are wrong in every link. Friction holds the difference.
+/// A mass at the flange cannot explain masses that are wrong in every link. Friction holds the difference between the true masses and a
+/// mass at the flange.
 #[test]
 fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
     for mass in [0.9, 1.1] {
@@ -93,7 +94,7 @@ fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.002 && led < 0.005, "masses times {mass}: {still}, {led} rad from {pose:?}");
-            // A third of this friction still holds the arm at its first position. At other positions, the arm may creep.
+            // A third of the modelled friction still holds the arm at its first position. At other positions, this arm may creep.
             let mut arm = Plant::new(&heavier(model(), mass), LuGre::of_avena_times(0.3), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
@@ -121,11 +122,11 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
     }
 }
 
-/// Returns the largest speed of a joint after the end of a contact that HoldPos had found, rad/s. The contact is a load of `mass` kg at the
-/// flange or, for 0 kg, a push on the joints. Returns `None` if Teaching waits until the contact has ended.
+/// Returns the highest speed of a joint after the end of a contact that HoldPos has learned as a load, rad/s. The contact is a load of
+/// `mass` kg at the flange or, for 0 kg, a push on the joints. Returns `None` if Teaching waits until the contact has ended.
 fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> {
     let mut arm = Plant::new(&model(), LuGre::of_avena_times(factor), pose);
-    // A contact that lasts this long is learned as a load, and not detected as a push.
+    // The controller learns such a long contact as a load, and does not detect it as a push.
     let mut rig = arm.holding(Config { yield_torque_share: 0.8, ..Config::avena() });
     let unit = Dynamics::new(&model(), Config::avena().gravity).flange_torque(&pose);
     let push = if mass == 0.0 { [30.0, 0.0, 0.0, 5.0, 0.0, 0.0] } else { unit.map(|u| mass * u) };
@@ -148,7 +149,7 @@ fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> 
     Some(fastest)
 }
 
-/// When Teaching began, a person leaned on the arm, or the arm lay on an object. When the contact ends, the learned load drives the arm,
+/// When Teaching begins, a person leans on the arm, or the arm lies on an object. When the contact ends, the learned load drives the arm,
 /// but slowly.
 #[test]
 fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
@@ -165,7 +166,7 @@ fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
             reached = reached.max(fastest.unwrap_or(0.0));
         }
     }
-    // Joint 1 yields to 30 N·m.
+    // For example, joint 1 yields to 30 N·m.
     assert!(taught >= 24, "{taught} of 36");
     assert!(reached > 0.3, "{reached} rad/s: nothing was learned");
 }

@@ -1,4 +1,4 @@
-//! Tests of the damping of Teaching, including light joints (J-25).
+//! Tests of the damping in Teaching, including joints with little inertia (J-25).
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -10,7 +10,7 @@ use rig::{Rig, floats, model_body};
 
 const POSE: [f64; 6] = [0.1, 0.5, -0.9, 0.4, 0.7, 0.2];
 
-/// Returns the default arm with its masses and lengths times these factors.
+/// Returns the model of the default arm with its masses and lengths multiplied by these factors.
 fn scaled(mass: f64, length: f64) -> ArmModel {
     let mut model = Parameters::avena().model;
     for joint in &mut model.joints {
@@ -27,9 +27,9 @@ fn scaled(mass: f64, length: f64) -> ArmModel {
 /// Effect of the brake in the last 0.4 s of a push. A hand turns `joint` with `push` N·m for 0.6 s against viscous friction only, and holds
 /// the other joints.
 struct Braked {
-    /// Highest speed, rad/s.
+    /// Highest speed of the joint, rad/s.
     fastest: f64,
-    /// Number of times that the brake changes between growing and shrinking, by more than 0.2 N·m in a tick.
+    /// Number of times that the braking torque changes between growing and shrinking, by more than 0.2 N·m in a tick.
     turns: u32,
 }
 
@@ -97,10 +97,10 @@ fn j25_damping_does_not_drive_light_joints_to_and_fro() {
     for joint in 3..6 {
         for (push, damping) in [-1.5, 1.5].into_iter().flat_map(|p| [(p, None), (p, Some(1000.0))]) {
             let it = braked_with(&light, 0.05, 0.05, damping, joint, push);
-            // With the highest damping that a joint tolerates, a pushed joint swings only until it has reached its speed.
+            // With the highest damping that the inertia of a joint tolerates, a pushed joint swings only until it has reached its speed.
             let most = if damping.is_some() { 6 } else { 0 };
             assert!(it.turns <= most, "joint {} at {push} N·m, {damping:?}: {}", joint + 1, it.turns);
-            // The damping is at least 90 1/s times a fifth of 0.05 kg·m², plus the brake.
+            // The damping is at least 90 1/s times a fifth of 0.05 kg·m², plus the braking torque.
             assert!(it.fastest < 1.5, "joint {}: {} rad/s", joint + 1, it.fastest);
         }
     }
@@ -112,12 +112,12 @@ fn j25_the_wrists_of_the_default_arm_are_damped() {
         let push = 0.3 * Config::avena().joints[joint].torque_max;
         let it = braked(&Parameters::avena().model, 0.7, joint, push);
         assert_eq!(it.turns, 0, "joint {}", joint + 1);
-        // A fifth of the rotor inertia does not allow more damping against three tenths of the torque limit.
+        // With a fifth of the rotor inertia, no more damping is possible against three tenths of the torque limit.
         assert!((0.4..1.2).contains(&it.fastest), "joint {}: {} rad/s", joint + 1, it.fastest);
     }
 }
 
-/// Drives have rotors even if the arm file does not contain a rotor inertia.
+/// A drive has a rotor even if the arm file does not contain its inertia.
 #[test]
 fn j25_a_joint_is_damped_where_no_rotor_inertia_is_given() {
     for joint in 3..6 {

@@ -1,4 +1,4 @@
-//! An arm in a pose in which its torque limits cannot hold it (J-06, J-20, J-43).
+//! Tests of an arm in a pose in which its torque limits cannot hold it (J-06, J-20, J-43).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, joint_error};
@@ -8,7 +8,7 @@ use rig::Rig;
 
 const POSE: [f64; 6] = [0.0, 0.6, 0.0, 0.0, 0.0, 0.0];
 
-/// The torque limit of joint 2 suffices to hold the arm upright, but in `POSE` it is only 80 % of the required torque.
+/// The torque limit of joint 2 suffices to hold the arm upright, but in `POSE` this limit is only 80 % of the required torque.
 fn weak() -> Config {
     let mut config = Config::avena();
     let gravity = Dynamics::new(&Parameters::avena().model, config.gravity).gravity_torque(&POSE);
@@ -16,8 +16,8 @@ fn weak() -> Config {
     config
 }
 
-/// In Teaching, the torque of the joint is at its limit in this pose. Teaching continues, or the arm is released if the setting requires
-/// that.
+/// In Teaching, the torque of the joint is at its limit in this pose. Teaching continues, or the controller releases the arm if the setting
+/// requires this.
 #[test]
 fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() {
     for (torque_release, end) in [(false, ControllerState::Teaching), (true, ControllerState::Error)] {
@@ -51,7 +51,8 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
     }
 }
 
-/// The controller checks that the torque limits can hold the arm when it must hold the arm, and not earlier, while a hand moves the arm.
+/// The controller checks that the torque limits can hold the arm when it begins to hold the arm. The controller does not check this while a
+/// hand moves the arm.
 #[test]
 fn j06_the_model_is_judged_where_init_ends() {
     let mut rig = Rig::new(weak());

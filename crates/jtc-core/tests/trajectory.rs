@@ -5,7 +5,7 @@ use jtc_core::{Config, ControllerState, POINTS_MAX, TrajectoryState};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, put, rad, rest, segment_body};
 
-/// A motion of joint 2 (and a smaller one of joint 5) that starts and ends at rest: `n` points, `step` ms apart.
+/// Returns a motion of joint 2, and a smaller motion of joint 5, that starts and ends at rest: `n` points, `step` ms apart.
 fn motion(n: usize, step: u16) -> Vec<RawPoint> {
     let total = (n - 1) as f64 * f64::from(step) / 1000.0;
     (0..n)
@@ -160,7 +160,7 @@ fn j31_point_0_is_commanded() {
     assert!(seen);
 }
 
-/// Every commanded position of a paused run is on the path, and no part of the path is skipped.
+/// Every commanded position of a paused motion is on the path, and the motion does not skip any part of the path.
 #[test]
 fn j33_pause_and_resume_follow_the_path() {
     let mut rig = Rig::holding();
@@ -188,7 +188,7 @@ fn j33_pause_and_resume_follow_the_path() {
         let near = |p: &(f64, f64)| (p.0 - x).hypot(p.1 - y) < 5e-4;
         assert!(near(&path[i]) || near(&path[i - 1]), "({x}, {y}) is off the path");
         assert!(t.point >= last.point && t.point <= last.point + 1, "the index is monotone");
-        // The velocity does not jump: in one tick it changes by at most the effect of 12.6 rad/s², plus one step of the int16 resolution.
+        // In one tick, the velocity changes by at most the effect of 12.6 rad/s², plus one step of the int16 resolution.
         let dv = (t.joints[2].set_velocity - last.joints[2].set_velocity).abs();
         assert!(dv < 0.0126 + 0.0004, "step of {dv} rad/s");
     };
@@ -215,7 +215,7 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
 }
 
-/// Pauses and stops are accepted even in the last milliseconds, when the ramp would reach beyond the last point.
+/// The controller accepts a pause or stop even in the last milliseconds, when its ramp would reach beyond the last point.
 #[test]
 fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     let points = motion(101, 10);
@@ -246,8 +246,8 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
 
 #[test]
 fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
-    // Every joint starts at rest, moves at 1 rad/s, and ends at rest. A ramp of 200 ms would need 7.5 rad/s², which this configuration does
-    // not allow.
+    // Every joint starts at rest, moves at 1 rad/s, and ends at rest. A ramp of 200 ms would need 7.5 rad/s², which the settings of this
+    // test do not allow.
     let n = 151;
     let speed = |i: i32| (0.04 * f64::from(i.min(n - 1 - i))).min(1.0);
     let mut way = 0.0;
@@ -292,7 +292,7 @@ fn j34_commands_follow_the_table() {
             rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
         }
         if trajectory == TrajectoryState::Finish {
-            // A second execution would need a closed path, so the test moves the joints back to the start.
+            // The path is not closed, so the test moves the joints back to the start before the second execution.
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
         rig
@@ -314,7 +314,7 @@ fn j34_commands_follow_the_table() {
     ] {
         for command in [Stop, Pause, Execute] {
             if (trajectory, command) == (TrajectoryState::Finish, Execute) {
-                continue; // below
+                continue; // The remainder of this test covers a second execution after Finish.
             }
             let mut rig = fresh(trajectory);
             let expected = if allowed.contains(&(trajectory, command)) {
@@ -375,13 +375,13 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
 #[test]
 fn j34_execute_needs_the_arm_at_the_first_point() {
     let mut rig = Rig::holding();
-    let points: Vec<_> = (0..10).map(|_| rest(250)).collect(); // 0.024 rad away
+    let points: Vec<_> = (0..10).map(|_| rest(250)).collect(); // The first point is 0.024 rad away.
     rig.upload(&points, 10);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     rig.run(300);
     assert_eq!((rig.trajectory(), rig.state()), (TrajectoryState::Stop, ControllerState::HoldPos));
     assert_eq!(rig.controller.telemetry().joints[0].set_position, 0.0, "nothing moves");
-    let points: Vec<_> = (0..10).map(|_| rest(190)).collect(); // 0.018 rad
+    let points: Vec<_> = (0..10).map(|_| rest(190)).collect(); // The first point is 0.018 rad away.
     rig.execute(&points);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Finish);
     assert_eq!(rig.errors(), 0);

@@ -6,22 +6,23 @@ use crate::config::limits::JointConfig;
 use crate::friction;
 use crate::parameters::{PidGains, TableOf};
 
-/// Share of the velocity limit up to which friction has been measured. Above this velocity, a fitted curve may have any value.
+/// Share of the velocity limit up to which the friction of a joint has been measured. Above this velocity, a fitted friction curve may have
+/// any value.
 const MEASURED: f64 = 0.5;
 /// Number of speeds at which a friction polynomial is checked. A cubic changes only a little between two of these speeds.
 const SPEEDS: u8 = 16;
 
-/// Bounds of gains, masses and friction. Arms with these drives have no values outside these bounds. Values outside the bounds could throw
-/// or drop the arm (J-06).
+/// Bounds of gains, masses and friction. Arms with the known drives have no gains, masses or friction outside these bounds. Gains, masses
+/// or friction outside these bounds could throw or drop the arm (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
-    /// Highest Kp, N·m/rad. The known drives use at most 28 000.
+    /// Highest Kp, N·m/rad. The known drives use a Kp of at most 28 000.
     pub kp_max: f64,
-    /// Highest Ki, N·m/(rad·s). The known drives use at most 24 000.
+    /// Highest Ki, N·m/(rad·s). The known drives use a Ki of at most 24 000.
     pub ki_max: f64,
-    /// Highest Kd, N·m·s/rad. The known drives use at most 300.
+    /// Highest Kd, N·m·s/rad. The known drives use a Kd of at most 300.
     pub kd_max: f64,
-    /// Largest magnitude of IntMin and IntMax, rad·s. The known arms use up to 120.
+    /// Largest magnitude of IntMin and IntMax, rad·s. The known arms use magnitudes up to 120.
     pub integral_max: f64,
     /// Largest torque at rest that the bounds of the integral may cause if they exclude zero, as a share of the torque limit of the joint.
     pub integral_bias_max: f64,
@@ -30,9 +31,9 @@ pub struct ParameterBounds {
     /// Largest moment or product of inertia of a link, kg·m²: the moment of inertia of 50 kg at a distance of 1.4 m.
     pub link_inertia_max: f64,
     /// Largest friction torque of a joint at any speed, as a share of its torque limit. A friction polynomial is checked without its
-    /// temperature factor. The known arms use values up to 1.19.
+    /// temperature factor. In the known arms, this share is at most 1.19.
     pub friction_max: f64,
-    /// Like `friction_max`, but for speeds up to half of the velocity limit. The known arms use values up to 0.82.
+    /// Like `friction_max`, but for speeds up to half of the velocity limit. In the known arms, this share is at most 0.82.
     pub slow_friction_max: f64,
     /// Largest friction torque in the direction of the motion, up to half of the velocity limit, as a share of the torque limit.
     /// Measurement noise can cause a friction torque in this direction.
@@ -46,18 +47,18 @@ pub struct ParameterBounds {
 pub struct OutOfBounds {
     /// Name of the parameter, with its unit.
     pub what: &'static str,
-    /// Velocity at which a friction torque is out of bounds, rad/s. The value is `None` for other parameters.
+    /// Velocity at which a friction torque is out of bounds, rad/s. The velocity is `None` for other parameters.
     pub velocity: Option<f64>,
-    /// The value.
+    /// The value that is out of bounds.
     pub value: f64,
-    /// Lowest value.
+    /// Lowest value that is allowed.
     pub low: f64,
-    /// Highest value.
+    /// Highest value that is allowed.
     pub high: f64,
 }
 
 impl OutOfBounds {
-    /// Checks that `value` is within `low..=high`. The comparison also refuses NaN.
+    /// Checks that `value` is within `low..=high`. The comparison also rejects NaN.
     fn unless_within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), Self> {
         if value >= low && value <= high {
             Ok(())
@@ -100,7 +101,7 @@ impl ParameterBounds {
         within("Kd (N·m·s/rad)", kd, 0.0, self.kd_max)?;
         within("IntMin (rad·s)", int_min, -self.integral_max, int_max)?;
         within("IntMax (rad·s)", int_max, int_min, self.integral_max)?;
-        // The value is the magnitude of the allowed integral that is nearest to zero.
+        // `least` is the magnitude of the allowed integral that is nearest to zero.
         let least = int_min.max(0.0) - int_max.min(0.0);
         within(
             "torque that the bounds of the integral force on a joint at rest (N·m)",
@@ -122,7 +123,7 @@ impl ParameterBounds {
         Ok(())
     }
 
-    /// Checks the mass and inertia of a payload. The bounds of a link apply.
+    /// Checks the mass and inertia of a payload. The bounds for a link also apply to a payload.
     pub fn check_payload(&self, payload: &Payload) -> Result<(), OutOfBounds> {
         OutOfBounds::unless_within("mass of the payload (kg)", payload.mass, 0.0, self.link_mass_max)?;
         let most = self.link_inertia_max;
@@ -158,7 +159,7 @@ impl ParameterBounds {
         let [c0, c1, c2, c3, ..] = *coefficients;
         let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
         let step = joint.velocity_max / f64::from(SPEEDS);
-        // Arms often move slowly, so the first speed step is divided into the same number of smaller steps.
+        // Arms often move slowly, so the first speed step is divided into `SPEEDS` smaller steps.
         let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
         slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
             // The sign of the speed is smoothed around standstill, so the torque at standstill is zero.
@@ -170,14 +171,14 @@ impl ParameterBounds {
     pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
         for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
             for &torque in row {
-                // Standstill is checked below, because most tables contain no row for standstill.
+                // The torque at standstill is checked after the other rows, because most tables contain no row for standstill.
                 if velocity != 0.0 {
                     self.check_friction(torque.into(), velocity.into(), joint)?;
                 }
             }
         }
         for &temperature in &table.temperature {
-            // A table that does not include standstill cannot be used for any path (J-36).
+            // A path passes through standstill, so the controller cannot use a table without standstill for any path (J-36).
             if let Some(torque) = friction::table(table, 0.0, temperature.into()) {
                 self.check_friction(torque, 0.0, joint)?;
             }

@@ -18,7 +18,7 @@ pub(crate) use arm::{MODEL, NAME, PID, POLYNOMIAL};
 
 /// Returns the default friction table of joint `j`.
 pub(crate) fn friction_table(j: usize) -> &'static TableOf<f32> {
-    // If the arm file contains a single table, it applies to all joints.
+    // If the arm file contains a single table, this table applies to all joints.
     arm::TABLES.get(j).unwrap_or(&arm::TABLES[0])
 }
 

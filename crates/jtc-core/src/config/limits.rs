@@ -1,4 +1,4 @@
-//! Limits of a joint (J-43), and the other settings of the joint.
+//! Limits (J-43) and other settings of a joint.
 use crate::bit_codec::bit_codec;
 use crate::interpolation::ROUNDING;
 use crate::joint_error;
@@ -6,13 +6,13 @@ use crate::joint_error;
 /// Settings of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointConfig {
-    /// Lowest position, rad.
+    /// Lowest position of the joint, rad.
     pub position_min: f64,
-    /// Highest position, rad.
+    /// Highest position of the joint, rad.
     pub position_max: f64,
-    /// Highest speed, rad/s.
+    /// Highest speed of the joint, rad/s.
     pub velocity_max: f64,
-    /// Highest acceleration, rad/s².
+    /// Highest acceleration of the joint, rad/s².
     pub acceleration_max: f64,
     /// Highest torque at the joint, N·m.
     pub torque_max: f64,
@@ -27,23 +27,24 @@ pub struct JointConfig {
     pub teach_damping: f64,
 }
 
-/// Rotor inertia for a drive without a configured value, kg·m². This is the value of the known drives.
+/// Rotor inertia for a drive without a configured value, kg·m². The known drives have this rotor inertia.
 const UNKNOWN_ROTOR: f64 = 0.7;
 
 impl JointConfig {
-    /// Returns the rotor inertia that the controller uses, kg·m². If no value is configured, the drive has a rotor nevertheless.
+    /// Returns the rotor inertia that the controller uses, kg·m². If the settings contain no rotor inertia, the controller uses the rotor
+    /// inertia of the known drives.
     pub fn counted_rotor(&self) -> f64 {
         if self.rotor_inertia > 0.0 { self.rotor_inertia } else { UNKNOWN_ROTOR }
     }
 }
 
-/// Number of ticks in the observed window.
+/// Length of the observed window, ticks.
 const WINDOW: u16 = 100;
 
 /// Record of the ticks with a certain property among the last [`WINDOW`] ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Recent {
-    /// Mask of the ticks with the property. Bit 0 is the last tick.
+    /// Mask of the ticks that have the observed property. Bit 0 stands for the last tick.
     history: u128,
     count: u16,
 }
@@ -51,8 +52,8 @@ pub(crate) struct Recent {
 bit_codec!(Recent { history, count });
 
 impl Recent {
-    /// Adds a tick to the window. `has` means that the tick has the property. Returns `true` if this tick and more than `most` of the last
-    /// 100 ticks have the property.
+    /// Adds a tick to the window. `has` is `true` if the tick has the property. Returns `true` if this tick and more than `most` of the
+    /// last 100 ticks have the property.
     #[inline]
     pub(crate) fn exceeds(&mut self, has: bool, most: u16) -> bool {
         if has | (self.count > 0) {
@@ -63,7 +64,7 @@ impl Recent {
         has & (self.count > most)
     }
 
-    /// Clears all ticks.
+    /// Clears the record of all ticks.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
@@ -72,7 +73,7 @@ impl Recent {
 /// State of the torque limit of one joint, with the recent ticks in which the torque was at the limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Saturation {
-    /// The last torque was above the limit, so the integral does not change (J-41).
+    /// `true` if the last torque was above the limit, so that the integral does not change (J-41).
     pub saturated: bool,
     over: Recent,
 }
@@ -80,9 +81,10 @@ pub(crate) struct Saturation {
 bit_codec!(Saturation { saturated, over });
 
 impl Saturation {
-    /// Returns the torque to command within the limit, and `true` if the joint is overloaded. A joint is overloaded if the computed torque
-    /// was above the limit, with either sign, in more than `over_ms_max` of the last 100 ticks. If the torque is NaN, the commanded torque
-    /// is zero. While the arm is `braking` with all available torque (J-33), ticks are not counted.
+    /// Returns the torque to command within the torque limit, and `true` if the joint is overloaded. A joint is overloaded if its computed
+    /// torque was above the limit, with either sign, in more than `over_ms_max` of the last 100 ticks. If the computed torque is NaN, the
+    /// commanded torque is zero. While the arm is `braking` with all available torque (J-33), the function does not count ticks above the
+    /// limit.
     pub(crate) fn limit(
         &mut self,
         torque: f64,
@@ -91,7 +93,7 @@ impl Saturation {
         braking: bool,
     ) -> (f64, bool) {
         let limit = limits.torque_max;
-        // With this comparison, NaN counts as above the limit.
+        // With this comparison, a torque of NaN counts as above the limit.
         let within = torque.abs() <= limit;
         self.saturated = !within;
         let overloaded = self.over.exceeds(self.saturated & !braking, over_ms_max);
@@ -99,23 +101,23 @@ impl Saturation {
         (if torque.is_nan() { 0.0 } else { limited }, overloaded)
     }
 
-    /// Clears all counts.
+    /// Clears the record of the ticks above the limit.
     pub(crate) fn forget(&mut self) {
         self.over.forget();
     }
 }
 
-/// Longest time (ticks) in which a torque must reach each limit twice to show an unstable loop.
+/// Time, ticks, within which a torque that reaches each limit twice shows an unstable control loop.
 const TURNS_MS: u32 = 200;
 
-/// Changes of a joint's torque from one limit to the other.
+/// Record of the changes of a joint's torque from one limit to the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turns {
     /// Last three ticks in which the torque reached one limit after the other, oldest first.
     at: [u32; 3],
     /// Number of entries in `at`, at most three.
     count: u8,
-    /// The torque was at the upper limit in the last of the ticks in `at`.
+    /// `true` if the torque was at the upper limit in the last of the ticks in `at`.
     upper: bool,
 }
 
@@ -136,12 +138,12 @@ impl Turns {
 }
 
 /// Returns a joint error for each set value (position, velocity, acceleration) outside its limits, and for a position `error` (rad, J-62)
-/// above its limit. The position limit applies only to `commanded` positions. An arm that is already outside the limit is held at its
-/// position, because otherwise the host could never move the arm back. Rounding between two points that have passed the check of J-36 is
-/// not an error.
+/// above its limit. The position limit applies only to `commanded` positions. The controller holds an arm that is already outside a
+/// position limit. Without the exception for held positions, the host could never move the arm back. A rounding error between two points
+/// that have passed the check of J-36 is not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
-    // With these comparisons, NaN counts as outside the limits.
+    // With these comparisons, a value of NaN counts as outside the limits.
     let (low, high) = (limits.position_min - ROUNDING, limits.position_max + ROUNDING);
     let inside = (position >= low) & (position <= high);
     bit(inside | !commanded, joint_error::POSITION)
@@ -150,7 +152,7 @@ pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, 
         | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
 
-/// Returns the part of the `wanted` torque that can be added to the present `torque` without exceeding the limit, N·m.
+/// Returns the amount of the `wanted` torque (N·m) that can be added to the present `torque` without exceeding the torque limit.
 pub(crate) fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)
@@ -212,7 +214,7 @@ mod tests {
             assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, false));
             assert!(saturation.saturated);
         }
-        // A tick within the limit is not counted, but does not restart the window.
+        // A tick within the torque limit is not counted, but does not restart the observed window.
         assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, false));
         assert!(!saturation.saturated);
         assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, true));
@@ -223,7 +225,7 @@ mod tests {
 
     #[test]
     fn j43_torque_at_its_limit_counts_within_any_100_ms_whichever_sign() {
-        // In any pattern and for any length of time, ten ticks in 100 ms are allowed, but eleven ticks are not allowed.
+        // In any pattern of ticks above the limit, ten such ticks in 100 ms are allowed, but eleven are not.
         for (period, allowed) in [(10, true), (9, false)] {
             let (l, mut saturation) = (limits(), Saturation::default());
             let mut good = true;
@@ -233,7 +235,7 @@ mod tests {
             }
             assert_eq!(good, allowed, "one tick of {period}");
         }
-        // Ten consecutive ticks at the limit, followed by a pause.
+        // Ten consecutive ticks are above the limit, and a pause follows.
         let (l, mut saturation) = (limits(), Saturation::default());
         for k in 0..1_000 {
             let torque = if k % 100 < 10 { INF } else { 0.0 };
@@ -249,7 +251,7 @@ mod tests {
             assert!(saturation.saturated);
         }
         assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, false));
-        // Ticks at the limit during braking are also not counted later.
+        // Ticks above the limit during braking are also not counted later.
         for _ in 0..10 {
             assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, false));
         }
@@ -278,13 +280,14 @@ mod tests {
                 let commanded = saturation.limit(torque, &l, 10, false).0;
                 prop_assert!(commanded.abs() <= l.torque_max);
                 prop_assert!(commanded == torque || commanded == 0.0 || commanded.abs() == l.torque_max);
-                // The commanded torque never opposes the computed torque. The signs are compared, because 0·∞ is NaN.
+                // The commanded torque never has the opposite sign of the computed torque. The test compares the signs, because the product
+                // 0·∞ is NaN.
                 prop_assert!(torque.is_nan() || commanded == 0.0 || (commanded > 0.0) == (torque > 0.0));
             }
         }
     }
 
-    /// A value that has passed the check of J-36 is not an error in motion, even if the largest rounding error is added to the value.
+    /// A value that has passed the check of J-36 is not an error in motion, even with the largest rounding error.
     #[test]
     fn j36_j43_what_rounding_may_add_is_no_error() {
         let l = limits();

@@ -7,14 +7,14 @@ use crate::{JOINTS, TrajectoryState};
 /// Phase of the execution in state Operate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Phase {
-    /// Wait until every joint is enabled. `elapsed_ms` is the elapsed waiting time, ms.
+    /// The controller waits until every joint is enabled. `elapsed_ms` is the elapsed waiting time, ms.
     Waiting { elapsed_ms: u32 },
-    /// Approach from the held position to the first point or to the paused point, with the duration `length_ms`. The approach has a
-    /// separate clock. `leave` is the state that follows at standstill.
+    /// Approach from the held position to the first point or to the paused point, with the duration `length_ms`. The approach has its own
+    /// clock. `leave` is the trajectory state that follows at standstill.
     Approaching { from: [f64; JOINTS], length_ms: f64, clock: PathClock, leave: Option<TrajectoryState> },
     /// Start of the path at point 0, which the next tick commands.
     AtStart,
-    /// Motion along the path. `leave` is the state that follows at standstill.
+    /// Motion along the path. `leave` is the trajectory state that follows at standstill.
     Running { leave: Option<TrajectoryState> },
 }
 
@@ -56,7 +56,7 @@ impl BitCodec for Phase {
 }
 
 impl Phase {
-    /// First phase of an execution, with no elapsed waiting time.
+    /// First phase of an execution: waiting, with no elapsed time.
     pub(crate) const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
     /// Creates an approach from the held position that takes `length_ms`.
@@ -95,7 +95,7 @@ impl Phase {
         }
     }
 
-    /// Returns the state that follows an accepted Pause or Stop.
+    /// Returns the trajectory state that follows an accepted Pause or Stop.
     pub(crate) fn leave(&self) -> Option<TrajectoryState> {
         match self {
             Self::Approaching { leave, .. } | Self::Running { leave } => *leave,

@@ -57,7 +57,7 @@ fn j34_after_a_stop_the_path_begins_anew() {
     }
 }
 
-/// Returns a controller on the path that has accepted a Pause `ms` ago.
+/// Returns a controller on the path that accepted a Pause `ms` ago.
 fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
     controller.phase = Phase::Running { leave: Some(TrajectoryState::Pause) };
@@ -72,7 +72,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     for (trajectory, ms, goes_on, error) in [
         (TrajectoryState::Execute, most - 1, true, 0),
         (TrajectoryState::Execute, most, false, joint_error::TORQUE),
-        // In this case, the arm is held but is moved by an external force.
+        // In these cases, the arm is held, but an external force moves the arm.
         (TrajectoryState::Pause, most - 1, true, 0),
         (TrajectoryState::Pause, most, false, 0),
     ] {
@@ -142,7 +142,7 @@ fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
 }
 
-/// Returns a controller that decelerates on a path of four points, 100 ms apart, at this path time.
+/// Returns a controller that decelerates at this path time, on a path of four points that are 100 ms apart.
 fn halting_at(time: f64) -> Controller<[RawPoint; 4]> {
     let mut controller = pausing(5);
     let mut body = [0; 8 + 4 * 36];
@@ -192,7 +192,7 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     }
 }
 
-/// A Stop or Pause arrives `after_ms` after the start of an approach to point 0 from this distance.
+/// A Stop or Pause arrives `after_ms` after the start of an approach to point 0, which is `way` away.
 #[test]
 fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point() {
     for (way, after_ms) in [(0.02, 1), (0.02, 60), (0.02, 150), (-0.3, 60), (0.49, 60), (0.49, 250)] {
@@ -220,8 +220,8 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // The limit is the smaller of the remaining distance and the stopping distance of a path that still accelerates for half of the
-            // ramp.
+            // The limit `most` is the smaller of two distances: the remaining distance, and the stopping distance of a path that still
+            // accelerates for half of the ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");
@@ -243,7 +243,8 @@ fn j33_a_stop_before_the_approach_moves_nothing() {
     );
 }
 
-/// An approach takes the time of a ramp, or the time that the joint with the longest distance needs within its limits.
+/// An approach takes the time of a ramp, or the time that the joint with the longest distance needs within its limits. The longer time
+/// applies.
 #[test]
 fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     for (way, velocity_max, acceleration_max) in
@@ -278,7 +279,7 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     }
 }
 
-/// A finished path cannot be slowed down. A jog ends if it overloads a joint.
+/// The controller cannot slow down a finished path. A jog ends if it overloads a joint.
 #[test]
 fn j75_only_a_motion_that_goes_on_is_held_back() {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);

@@ -11,13 +11,13 @@ struct Line {
     frame: [u8; ANSWER_MAX],
 }
 
-/// All lines.
+/// Answer buffers of all lines.
 #[derive(Clone, Debug)]
 pub(crate) struct Answers {
     lines: [Line; HOST_LINES],
-    /// Index of the line on which the last frame was sent.
+    /// Index of the line on which the last answer was sent.
     sent: usize,
-    /// Length of the last frame that was sent.
+    /// Length of the last answer that was sent.
     sent_len: usize,
 }
 
@@ -39,7 +39,7 @@ impl Answers {
         }
     }
 
-    /// Returns the index of the line whose answer must be sent now. The lines send their answers alternately.
+    /// Returns the index of the line whose answer must be sent now. The lines take turns if several lines have an answer.
     pub(crate) fn send(&mut self) -> Option<usize> {
         for offset in 1..=HOST_LINES {
             let n = (self.sent + offset) % HOST_LINES;
@@ -51,7 +51,7 @@ impl Answers {
         None
     }
 
-    /// Returns the frame that was sent last.
+    /// Returns the answer that was sent last.
     pub(crate) fn frame(&self) -> &[u8] {
         self.lines.get(self.sent).and_then(|line| line.frame.get(..self.sent_len)).unwrap_or(&[])
     }

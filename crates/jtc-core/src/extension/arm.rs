@@ -1,4 +1,4 @@
-//! Functions that load, read, hash and store the arm as a unit (J-52, J-54).
+//! Functions that load, read back, hash and store the complete arm (J-52, J-54).
 use jtc_wire::{Answer, ArmImage, DataStatus, FrictionImage, Hash, PAGE_BYTES, RawPoint, StoreState};
 
 use super::Extensions;
@@ -13,21 +13,22 @@ use crate::settings;
 pub(super) const IMAGE_PER_TICK: usize = 256;
 
 impl Extensions {
-    /// Clears the hash, because the arm that the controller uses has changed.
+    /// Clears the hash of the arm, because the arm that the controller uses has changed.
     pub(crate) fn forget_hash(&mut self) {
         (self.hash, self.hashed) = (None, (0, Hash::new()));
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Loads the stored arm (J-54). The controller then uses the settings and the name of this arm, and the UseDefault frames select this
+    /// Loads the stored arm (J-54). The controller then uses the settings and the name of this arm, and the UseDefault frames refer to this
     /// arm. The host must still request the parameters. The board calls this function before the first tick. Returns `false` if this
-    /// controller does not accept the image. In this case, the settings do not change, and the UseDefault frames are refused until an arm
-    /// is stored.
+    /// controller does not accept the image. If the controller does not accept the image, the settings do not change, and the controller
+    /// refuses the UseDefault frames until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        // The values are written directly into the parameters. A temporary copy would need too much of the small stack.
+        // The values of the image are written directly into the parameters. A temporary copy of the parameters would need too much of the
+        // small stack.
         let loaded = arm.zip(config).is_some_and(|(arm, config)| {
             let taken = takes(&mut self.parameters, &arm, &config);
             if taken {
@@ -41,25 +42,25 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !loaded {
             self.parameters.begin(&self.config);
         }
-        // The host must request the parameters.
+        // The controller uses these parameters only when the host requests them.
         self.parameters.forget();
         self.extensions.forget_hash();
         self.extensions.unusable = !loaded;
         loaded
     }
 
-    /// Returns the image of the stored arm, which the board writes when [`crate::Outputs::store`] requests it. The image is empty if no arm
-    /// is stored.
+    /// Returns the image of the stored arm. The board writes this image to its memory when [`crate::Outputs::store`] requests it. The image
+    /// is empty if no arm is stored.
     pub fn stored_arm(&self) -> &[u8] {
         self.extensions.stored.bytes()
     }
 
-    /// Sets the state and the number of the stored arm. The board calls this function when the state changes.
+    /// Sets the state of the storage and the number of the stored arm. The board calls this function when the state of the storage changes.
     pub fn set_store_state(&mut self, state: StoreState, sequence: u32) {
         let before = core::mem::replace(&mut self.extensions.store, state);
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
-            // The next start would use another arm, so no stored arm is available until the next start.
+            // The next start of the board would use another arm, so no stored arm is available until the next start.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }
@@ -69,7 +70,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         ImageSource { config: &self.config, parameters: &self.parameters, name: &self.extensions.name }
     }
 
-    /// Computes the next part of the hash of the arm, unless the hash is known.
+    /// Computes the next part of the hash of the arm, unless the hash is already known.
     pub(crate) fn hash_arm(&mut self) {
         if self.extensions.hash.is_none() {
             self.hash_more();
@@ -93,7 +94,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
     }
 
-    /// Stores the arm (J-54). First, the present arm becomes the arm that the UseDefault frames select. Then the board writes this arm.
+    /// Stores the arm that the controller uses (J-54). First, this arm becomes the arm to which the UseDefault frames refer. Then the board
+    /// writes this arm to its memory.
     pub(super) fn store_arm(&mut self) -> SliceOutcome {
         let offset = match self.slice_progress {
             SliceProgress::Image(offset) => offset,
@@ -103,7 +105,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
-            // The parts of the arm may have arrived separately (J-71).
+            // The host may have sent gains and model at different times, so the gains are checked against the model again (J-71).
             _ if !self.parameters.gains_are_borne(&self.config) => {
                 return SliceOutcome::Refused(DataStatus::IncorrectValue);
             }
@@ -129,7 +131,7 @@ fn takes(parameters: &mut HostParameters, arm: &ArmImage<'_>, config: &Config) -
         FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),
         FrictionImage::Table(floats) => {
             let mut progress = SliceProgress::Begin;
-            // A whole table needs twelve slices.
+            // A complete friction table needs twelve slices.
             (0..16).any(|_| match parameters.take_table(&floats, progress, config) {
                 SliceOutcome::Unfinished(next) => {
                     progress = next;

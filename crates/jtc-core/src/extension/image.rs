@@ -1,4 +1,4 @@
-//! Image of the arm that the controller uses. The image is used to read back, hash and store the arm (J-52, J-54).
+//! Image of the arm that the controller uses. The controller uses the image to read back, hash and store the arm (J-52, J-54).
 use jtc_wire::field::image as field;
 use jtc_wire::{ArmImage, Hash, IMAGE_MAX, NAME_LEN, Name, VALUE_LEN};
 
@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::host_parameters::HostParameters;
 use crate::settings;
 
-/// Parts from which the image is assembled.
+/// Settings, parameters and name from which the image is assembled.
 pub(crate) struct ImageSource<'a> {
     pub config: &'a Config,
     pub parameters: &'a HostParameters,
@@ -20,7 +20,7 @@ impl ImageSource<'_> {
         field::FRICTION + if table { field::TABLE_LEN } else { field::POLYNOMIAL_LEN }
     }
 
-    /// Returns the offset of the name in the image. Only the bytes before the name affect the motion of the arm.
+    /// Returns the offset of the name in the image. Only the bytes of the image before the name affect the motion of the arm.
     fn name(&self) -> usize {
         self.settings() + VALUE_LEN * settings::count(true)
     }
@@ -30,7 +30,7 @@ impl ImageSource<'_> {
         self.name() + NAME_LEN
     }
 
-    /// Reads bytes of the image into `out`, starting at byte `offset`. Returns the number of bytes that were read.
+    /// Reads bytes of the image into `out`, starting at byte `offset`. Returns the number of bytes that were copied.
     pub(crate) fn read(&self, offset: usize, out: &mut [u8]) -> usize {
         let (settings, name) = (self.settings(), self.name());
         let mut at = offset;
@@ -59,7 +59,7 @@ impl ImageSource<'_> {
         [a, b, c, d, field::VERSION, self.parameters.friction_is_table.into(), high, low]
     }
 
-    /// Returns value number `i` of gains, model and friction.
+    /// Returns value `i` of the list of gains, model and friction.
     fn float(&self, i: usize) -> f32 {
         const MODEL: usize = (field::MODEL.start - field::PID.start) / 4;
         const FRICTION: usize = (field::FRICTION - field::PID.start) / 4;
@@ -70,7 +70,7 @@ impl ImageSource<'_> {
         }
     }
 
-    /// Adds up to `count` bytes to the hash, starting at byte `offset`. Returns the next offset and the new hash.
+    /// Adds up to `count` bytes of the image to the hash, starting at byte `offset`. Returns the next offset and the new hash.
     pub(crate) fn hash(&self, offset: usize, hash: Hash, count: usize) -> (usize, Hash) {
         let mut bytes = [0; 256];
         let count = count.min(self.name().saturating_sub(offset));
@@ -79,7 +79,7 @@ impl ImageSource<'_> {
         (offset + read, hash.update(slice.get(..read).unwrap_or(&[])))
     }
 
-    /// Returns `true` if `offset` is after the hashed part, which contains all bytes before the name.
+    /// Returns `true` if `offset` is after the hashed bytes, which are all bytes before the name.
     pub(crate) fn hashed(&self, offset: usize) -> bool {
         offset >= self.name()
     }
@@ -96,7 +96,8 @@ impl Output<'_> {
         self.filled < self.out.len()
     }
 
-    /// Writes the bytes of `bytes` from index `from` into the remaining space of the buffer. Returns the number of bytes that were written.
+    /// Writes the bytes of `bytes` from index `from` into the remaining space of the buffer. Returns the number of bytes that were copied
+    /// to the buffer.
     fn part(&mut self, bytes: &[u8], from: usize) -> usize {
         let room = self.out.get_mut(self.filled..).unwrap_or(&mut []);
         let rest = bytes.get(from..).unwrap_or(&[]);
@@ -109,7 +110,7 @@ impl Output<'_> {
     }
 }
 
-/// Image of the arm that the UseDefault frames select, if an arm other than the built-in arm is stored.
+/// Image of the arm to which the UseDefault frames refer, if an arm other than the built-in arm is stored.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredArm {
     bytes: [u8; IMAGE_MAX],
@@ -121,12 +122,12 @@ impl StoredArm {
         Self { bytes: [0; IMAGE_MAX], len: 0 }
     }
 
-    /// Returns its bytes.
+    /// Returns the bytes of the stored image.
     pub(crate) fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns its parts.
+    /// Returns the parts of the stored arm.
     pub(crate) fn arm(&self) -> Option<ArmImage<'_>> {
         ArmImage::parse(self.bytes())
     }

@@ -4,7 +4,7 @@ use jtc_wire::{Answer, PAGE_POINTS, POINT_LEN, Points, RawPoint};
 use crate::controller::Controller;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Answers with the points in memory, including points of a discarded trajectory (J-56).
+    /// Answers with the points in the memory of the trajectory, including points of a discarded trajectory (J-56).
     pub(super) fn get_points(&mut self, line: usize, first: u16) {
         let held = self.store.held_points(first.into());
         let mut bytes = [[0; POINT_LEN]; PAGE_POINTS];

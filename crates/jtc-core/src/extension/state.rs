@@ -8,16 +8,16 @@ use crate::config::defaults;
 /// Request of a host to the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LogRequest {
-    /// Sends a page to this line, from a byte of a block on.
+    /// The recorder must send a page of a block to this line, starting at byte `offset`.
     Page { line: usize, block: u32, offset: u16 },
-    /// Discards the log and begins a new one.
+    /// The recorder must discard the log and begin a new log.
     Clear,
 }
 
-/// Identity of the device, as its board knows it (J-52).
+/// Identity of the device, as set by its board (J-52).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Identity {
-    /// The board.
+    /// Name of the board.
     pub board: &'static str,
     /// Version of the firmware.
     pub firmware: &'static str,
@@ -27,7 +27,7 @@ pub struct Identity {
     pub boots: u32,
     /// Cause of the last start.
     pub boot_cause: BootCause,
-    /// Program in the flash of the board. `None` if the board has none, or has not read it (J-67).
+    /// Program in the flash of the board. `None` if the board has no program in the flash, or has not read it (J-67).
     pub program: Option<Program>,
 }
 
@@ -36,15 +36,16 @@ pub struct Identity {
 pub(crate) struct Extensions {
     pub answers: Answers,
     pub stored: StoredArm,
-    /// The stored arm must be written to non-volatile memory.
+    /// The board must write the stored arm to non-volatile memory.
     pub store_requested: bool,
-    /// An arm is stored but not in use, because it could not be loaded or written. The built-in arm does not replace it.
+    /// An arm is stored but not in use, because the controller could not load or write it. The controller does not use the built-in arm
+    /// instead.
     pub unusable: bool,
     /// Hash of the arm in use; `None` until it is computed again.
     pub hash: Option<u64>,
-    /// Ticks since a frame of a host was received.
+    /// Ticks since the controller received a frame of a host.
     pub hosts_silent_ms: u32,
-    /// Time left in which a Jog with a velocity is refused. This time begins again with each such Jog.
+    /// Remaining time in which the controller refuses a Jog with a velocity, ms. Each refused Jog starts this time again.
     pub jogs_refused_ms: u16,
     /// Progress of the hash of the arm.
     pub(super) hashed: (usize, Hash),
@@ -60,7 +61,7 @@ pub(crate) struct Extensions {
 }
 
 impl Extensions {
-    /// Refuses jogs after a jog was stopped, so that a key that is still held down causes no motion (J-58).
+    /// Refuses Jogs after a jog was stopped, so that a jog key that is still pressed causes no motion (J-58).
     pub(crate) fn refuse_jogs(&mut self) {
         self.jogs_refused_ms = crate::motion::JOG_LASTS_MS;
     }

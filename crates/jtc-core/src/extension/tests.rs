@@ -19,10 +19,10 @@ mod setting_frames;
 mod stored;
 mod two_hosts;
 
-/// Controller on two serial lines, and its outputs.
+/// Controller on two host lines, and its outputs.
 struct Bench {
     controller: Box<Controller<[RawPoint; 8]>>,
-    /// Answers by line.
+    /// Answers, each with the index of its line.
     answers: Vec<(usize, Vec<u8>)>,
     records: Vec<(usize, Response)>,
 }
@@ -54,7 +54,7 @@ impl Bench {
         self.send_as(false, line, bytes)
     }
 
-    /// Sends a frame on a line. If `plain` is true, the line is plain (J-51).
+    /// Sends a frame on a line. If `plain` is `true`, the line is plain (J-51).
     fn send_as(&mut self, plain: bool, line: usize, bytes: &[u8]) -> DataStatus {
         let frame = FrameRef::new_checked(bytes).expect("a good frame");
         let host = [HostEvent { line, overtaken: false, plain, event: LinkEvent::Frame(frame) }];
@@ -95,7 +95,7 @@ impl Bench {
         assert_eq!(self.asks_for_defaults(), [DataStatus::NoError; 3]);
     }
 
-    /// Sends the three UseDefault frames. Returns the data status of each frame.
+    /// Sends the three UseDefault frames to the controller. Returns the data status of each frame.
     fn asks_for_defaults(&mut self) -> [DataStatus; 3] {
         let frames = [
             fixed::FRICTION_POLYNOMIAL_USE_DEFAULT,
@@ -131,7 +131,7 @@ impl Bench {
         self.controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Executes a command at once, in a state for which the nodes on the bus are not prepared.
+    /// Executes a command at once, in a state for which the simulated nodes are not prepared.
     fn at_once(&mut self, command: Command<'_>) -> DataStatus {
         match self.controller.carry_out_extension(0, command) {
             SliceOutcome::Done => DataStatus::NoError,
@@ -156,7 +156,7 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
         let info = bench.info(line);
         assert_eq!((info.version, info.missing), (1, 7));
     }
-    // A request that causes no answer frame still causes a response record.
+    // A request without an answer frame still has a response record.
     assert_eq!(bench.send(0, &fixed::set_name(&Name::cut("seven"))), DataStatus::NoError);
     bench.run(500);
     assert!(bench.answers.is_empty());
@@ -167,13 +167,13 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
 fn j51_on_a_plain_line_no_data_status_is_above_6() {
     let mut bench = Bench::new();
     for line in [0, 1] {
-        // The frames are Execute without a trajectory, and a request that is not allowed in Init.
+        // The first frame is Execute without a trajectory, the second frame is a request that is not allowed in Init.
         for frame in [&fixed::EXECUTE[..], &fixed::TEACHING_MODE_ENABLE] {
             assert_eq!(bench.send_as(true, line, frame), DataStatus::IncorrectValue);
             assert_eq!(bench.send_as(false, line, frame), DataStatus::NotAllowed);
         }
     }
-    // All other data statuses are equal on each line.
+    // All other data statuses are the same on a plain line and on any other line.
     for data in DataStatus::ALL {
         let plain = crate::host::in_plain_words(data);
         assert!(plain as u8 <= 6 && (plain == data || data as u8 > 6), "{data:?}: {plain:?}");
@@ -215,7 +215,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     let image = bench.image();
     assert_eq!(Hash::of_image(&image), first);
     assert!(ArmImage::parse(&image).is_some());
-    // The hash does not include the name or the speed override. The hash includes each setting of the arm.
+    // The hash of the arm does not include the name or the speed override. The hash of the arm includes each setting of the arm.
     bench.send(0, &fixed::set_name(&Name::cut("another")));
     assert_eq!(bench.set(128, 0, 0.5), DataStatus::NoError);
     assert_eq!(bench.info(0).hash, first);
@@ -246,7 +246,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     assert_eq!(Hash::of_image(&bench.image()), table);
 }
 
-/// A request is refused while an earlier answer waits, so that no answer is lost.
+/// The controller refuses a request while an earlier answer waits, so that it does not lose an answer.
 #[test]
 fn j50_a_second_request_waits_for_the_first_answer() {
     let mut bench = Bench::new();

@@ -1,4 +1,4 @@
-//! Tests of the inertia that gains need, and of the trial of new gains.
+//! Tests of the inertia that gains require, and of the trial of new gains.
 use proptest::prelude::*;
 
 use super::*;
@@ -25,7 +25,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
         }
         assert!(poses[..n].iter().all(|other| other != pose), "pose {n}");
     }
-    // The poses fill the range of the first joint evenly, so each quarter of the range contains a quarter of the poses.
+    // The poses fill the range of the first joint evenly: each quarter of the range contains a quarter of the poses.
     let (low, high) = config.position_range(0);
     for quarter in 0..4 {
         let inside = |q: f64| ((q - low) / (high - low) * 4.0) as i32 == quarter;
@@ -33,7 +33,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
     }
 }
 
-/// Values for the default arm that docs/protocol-jtc.md contains.
+/// docs/protocol-jtc.md contains these values for the default arm.
 #[test]
 fn j71_the_default_arm_feels_what_is_said() {
     let felt = least_felt_inertia(&Parameters::avena().model, &Config::avena());
@@ -41,7 +41,7 @@ fn j71_the_default_arm_feels_what_is_said() {
 }
 
 proptest! {
-    /// In a pose for which the inertia was not computed, a joint feels only slightly less inertia.
+    /// In a pose for which the controller did not compute the inertia, the effective inertia of a joint is only slightly lower.
     #[test]
     fn j71_a_joint_feels_little_less_in_other_poses(shares in prop::array::uniform6(0.0..1.0f64)) {
         let (model, config) = (Parameters::avena().model, Config::avena());
@@ -66,7 +66,7 @@ fn j71_the_arm_bears_its_gains_and_not_twice_as_much() {
     let mut nan = given();
     nan[3].kd = f64::NAN;
     assert!(!felt.bears(&nan, &config));
-    // A longer delay requires more inertia.
+    // With a longer delay, the gains require more inertia.
     assert!(!felt.bears(&given(), &Config { delay_ticks: 7, ..config.clone() }));
 }
 
@@ -87,7 +87,7 @@ fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
 fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
     let limits = Config::avena().joints[1];
     let gains = PidGains { kp: 1_000.0, ki: 100.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
-    // A position error of at most a quarter of 0.09 rad may hold the arm, at 1 000 N·m/rad.
+    // With 1 000 N·m/rad, a position error of at most a quarter of 0.09 rad may hold the arm.
     for (gains, i, holds) in [
         (gains, 100.0, true),
         (gains, 122.0, true),
@@ -103,7 +103,8 @@ fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
 }
 
 proptest! {
-    /// For any earlier gains, new gains are blended in without a step. In a millisecond, a gain changes by at most 1/200 of the difference.
+    /// New gains are blended in without a step, for any earlier gains. In a millisecond, each gain changes by at most 1/200 of the
+    /// difference.
     #[test]
     fn j71_gains_come_in_over_half_a_second(factors in prop::array::uniform3(0.05..1.5f64), again_ms in 0..900u16) {
         let [before, second, third] = factors.map(scaled);
@@ -133,8 +134,8 @@ proptest! {
         prop_assert_eq!(last, third);
     }
 
-    /// Softer gains need less inertia than the previous gains. The damping of softer gains is at least twice the damping that the delay of
-    /// Kp consumes.
+    /// Softer gains require less inertia than the previous gains. The damping of softer gains is at least twice the damping that is lost by
+    /// the delay of the Kp torque.
     #[test]
     fn j66_softer_gains_are_stable_where_the_others_were_borne(kp in 1.0..50_000.0f64, kd in 0.0..500.0f64, delay in 0..8u8) {
         let own = PidGains { kp, ki: 1000.0, kd, ..given()[0] };
@@ -146,7 +147,8 @@ proptest! {
     }
 }
 
-/// Returns the gains of an arm whose new gains fail after `ms`. `unstable` means that the loop of joint 2 is unstable.
+/// Returns the gains after new gains have failed `ms` after the start of their trial. `unstable` is `true` if the control loop of joint 2
+/// is unstable.
 fn after(ms: u16, unstable: bool) -> Option<(StopKind, [PidGains; JOINTS])> {
     let mut trial = Trial::default();
     trial.begin(&scaled(0.5), &given());
@@ -172,7 +174,7 @@ fn j66_j71_gains_that_fail_are_taken_back() {
     assert_eq!((softer[0], softer[2]), (given()[0], given()[2]), "the others keep theirs");
 }
 
-/// Gains on trial have not held the arm yet. Therefore the earlier gains that held the arm are restored.
+/// Gains on trial have not yet held the arm for long enough. Therefore the controller restores the last gains that held the arm.
 #[test]
 fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     for (ms, back) in [(100, 0.5), (2_000, 1.2)] {
@@ -185,7 +187,7 @@ fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     }
 }
 
-/// If a host sends gains that have already held the arm, these gains do not need a trial.
+/// If a host sends gains that have already held the arm, no trial begins.
 #[test]
 fn j71_gains_that_held_are_not_on_trial() {
     let mut trial = Trial::default();
@@ -198,7 +200,7 @@ fn j71_gains_that_held_are_not_on_trial() {
     assert_eq!(trial.end(), Some(scaled(1.2)));
 }
 
-/// Only the time in which all joints are held counts for the trial.
+/// Only the time in which all joints are held counts for a trial of gains.
 #[test]
 fn j71_a_trial_waits_for_joints_that_are_not_held() {
     let mut trial = Trial::default();
@@ -209,7 +211,7 @@ fn j71_a_trial_waits_for_joints_that_are_not_held() {
     assert!(!trial.is_on());
 }
 
-/// Joints that fail get the previous gains at once. The gains of the other joints are blended into the previous gains.
+/// Joints that fail get their previous gains at once. The gains of the other joints are blended back to their previous gains.
 #[test]
 fn j71_gains_come_back_at_once_where_they_failed() {
     let mut trial = Trial::default();

@@ -1,34 +1,34 @@
-//! Priority of Stop and Pause, which take effect before earlier frames are executed (J-04).
+//! Priority of Stop and Pause, which take effect before the frames that arrived earlier (J-04).
 use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
 
 use crate::TrajectoryState;
 use crate::bit_codec::bit_codec;
 
-/// State of the urgent commands of a line until their frames are processed.
+/// State of the urgent commands of a line until the controller processes their frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Priority {
     /// Numbers of Stops and Pauses that were accepted and have no response record yet.
     pub(super) stops: u8,
     pub(super) pauses: u8,
-    /// The Stops and Pauses have cancelled an Execute.
+    /// `true` if these Stops and Pauses have cancelled an Execute.
     pub(super) cancelled: bool,
-    /// A Stop has arrived on either line, accepted or not, so an upload that began before this Stop is dropped (J-30). The first event that
-    /// was received after the Stop clears the flag. The record of an earlier Stop does not clear the flag.
+    /// A Stop has arrived on any line, accepted or refused, so the controller drops an upload that began before this Stop (J-30). The first
+    /// event that arrived after this Stop clears the flag. The response record of an earlier Stop does not clear the flag.
     pub(super) stopped: bool,
 }
 
 bit_codec!(Priority { stops, pauses, cancelled, stopped });
 
 impl Priority {
-    /// Adds the number of urgent commands that were accepted.
+    /// Adds `count` to the number of urgent commands of this kind that were accepted.
     pub(crate) fn accept(&mut self, command: UrgentCommand, count: u8) {
         let accepted = self.accepted(command);
         *accepted = accepted.saturating_add(count);
     }
 
-    /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause that was accepted is
-    /// reported as accepted. A Stop or a Pause is also reported as accepted if it has cancelled an Execute and the `trajectory` is in
-    /// the commanded state.
+    /// Returns the data status of an execution command that an urgent command has overtaken. The status reports success for a Stop or a
+    /// Pause that was accepted. The status also reports success for a Stop or a Pause that has cancelled an Execute, if the `trajectory` is
+    /// in the commanded state.
     pub(crate) fn overtaken(
         &mut self,
         exec: ExecCommand,

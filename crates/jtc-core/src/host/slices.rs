@@ -1,4 +1,4 @@
-//! Progress of a frame that is too long for one tick, and outcome of one slice of the frame (J-06).
+//! Progress of a frame that is too long for one tick, and result of one slice of this frame (J-06).
 use jtc_wire::DataStatus;
 
 /// Progress of a long frame. Each tick executes one slice of the frame.
@@ -14,13 +14,13 @@ pub(crate) enum SliceProgress {
     TableCheck(usize),
     /// Number of joints whose table has been copied.
     TableCopy(usize),
-    /// Number of poses in which the inertia of the joints has been computed.
+    /// Number of poses in which the controller has computed the inertia of the joints.
     Pose(usize),
-    /// Number of bytes of the arm image that have been written.
+    /// Number of bytes of the arm image that are stored.
     Image(usize),
 }
 
-/// Outcome of a slice.
+/// Result of the execution of one slice.
 pub(crate) enum SliceOutcome {
     Done,
     Refused(DataStatus),

@@ -1,4 +1,4 @@
-//! Tests of the effect of single host commands, and of the part of a tick that each command uses (J-04, J-21, J-23, J-36).
+//! Tests of the effect of single host commands, and of the share of a tick that each command uses (J-04, J-21, J-23, J-36).
 extern crate std;
 use std::vec::Vec;
 
@@ -11,7 +11,7 @@ use crate::{Config, HOST_LINES};
 
 type Bench = Controller<[RawPoint; 64]>;
 
-/// Origin of a command that is executed at once.
+/// Line and event from which a command comes that the test executes at once.
 const ON_LINE_0: HostEvent<'_> =
     HostEvent { line: 0, overtaken: false, plain: false, event: LinkEvent::Noise(Response::NONE) };
 
@@ -21,7 +21,7 @@ fn holding() -> Bench {
     controller
 }
 
-/// Sends three of these frames and returns the number of frames that one tick completes.
+/// Sends three equal frames and returns the number of frames that one tick completes.
 fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
     let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
@@ -40,12 +40,12 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
         (ClearCurrentErrors, &[1, 0x7F, 0, 0], 3),
         (ResetCanDevices, &[0x40, 0, 0, 0], 1),
         (PidParamUseDefault, &[], 1),
-        // If the state forbids a command, the command uses no time.
+        // A command that the state forbids uses no time.
         (TrajSetExecStatus, &[3, 0, 0, 0], 3),
     ] {
         assert_eq!(done_of_three(&mut holding(), frame_type, body), done, "{frame_type:?} {body:?}");
     }
-    // If the state of the controller changes, the next command depends on it.
+    // If a command changes the state of the controller, the next command must wait for the next tick.
     let mut teaching = holding();
     teaching.teaching = true;
     assert_eq!(done_of_three(&mut teaching, TeachingModeDisable, &[]), 1);
@@ -54,7 +54,7 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
     assert_eq!(done_of_three(&mut error, ClearOccurredErrors, &[]), 1);
 }
 
-/// If the frame of a Stop was lost, a later Stop is not reported as accepted because of the lost Stop.
+/// If the frame of a Stop was lost, the controller does not report a later Stop as accepted because of the lost frame.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
     let before = Priority { stops: 2, pauses: 1, cancelled: true, stopped: true };
@@ -116,7 +116,7 @@ fn body(segment: u8, points: usize) -> Vec<u8> {
     body
 }
 
-/// Loads a segment and returns the number of ticks that the check needed.
+/// Loads a segment and returns the number of ticks that its check needed.
 fn load(controller: &mut Bench, segment: u8, points: usize) -> usize {
     let body = body(segment, points);
     let (segment, mut checks) = (Segment::parse(&body).expect("a segment"), 0);
@@ -138,7 +138,8 @@ fn j36_a_segment_is_checked_with_its_last_point() {
     }
 }
 
-/// Segment 0 is checked against the present friction. Later segments may be checked against different friction.
+/// The controller checks segment 0 against the friction parameters of that time. The controller may check later segments against different
+/// friction parameters.
 #[test]
 fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     let mut controller = holding();
@@ -151,7 +152,7 @@ fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     assert_eq!(controller.trajectory, TrajectoryState::Stop);
 }
 
-/// The check of a segment is more exact than the check of the whole velocity range, which is used for friction that arrives later.
+/// The check of each segment is more exact than the check of the whole velocity range, which is used when friction parameters arrive later.
 #[test]
 fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     let body = body(0, 1);
@@ -175,7 +176,7 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     }
 }
 
-/// Gravity acts sideways, so that these torque limits cannot hold the arm.
+/// Gravity acts sideways, so the low torque limits cannot hold the arm.
 #[test]
 fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
     for (known, torque_max, taken) in [(false, 0.01, true), (true, 0.01, false), (true, 500.0, true)] {

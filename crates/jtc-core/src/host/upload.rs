@@ -7,8 +7,8 @@ use crate::io::HostEvent;
 use crate::trajectory::check::{TrajectoryCheck, Violation};
 use crate::{ControllerState, TrajectoryState};
 
-/// Highest number of ticks for checking a segment (J-36), and for copying a segment. Check, copy and response record together take less
-/// than 40 ms.
+/// Highest number of ticks for checking a segment (J-36), and highest number of ticks for copying a segment. Checking, copying and the
+/// response record together take less than 40 ms.
 const CHECK_TICKS: usize = 28;
 const COPY_TICKS: usize = 10;
 /// Points that are checked, and points that are copied, in one tick for a short segment.
@@ -16,27 +16,28 @@ const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Processes a segment (J-30, J-36). All points are checked before the first point is copied, so that a refused segment does not change
-    /// the trajectory.
+    /// Checks and stores a segment of a trajectory (J-30, J-36). The controller checks all points before it copies the first point, so a
+    /// refused segment does not change the trajectory.
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // The host repeats the segment until the segment is accepted, and does not forward a Stop meanwhile. Therefore the segment acts
-            // as a Stop, and is refused in this tick.
+            // The host repeats this segment until the controller accepts it, and does not forward a Stop before this. Therefore the segment
+            // acts as a Stop, and the controller refuses the segment in this tick.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
-            // The state may also change during the processing of a segment. Such a change has cleared the trajectory.
+            // The controller state may also change during the processing of a segment. A change from HoldPos during the processing has
+            // cleared the trajectory.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // The segment was received before a Stop that has taken effect.
+        // The controller received this segment before a Stop that has taken effect.
         let stopped =
             received.overtaken && self.priorities.get(received.line).is_some_and(|before| before.stopped);
         if first && !received.plain && stopped {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // The upload may also be dropped during the processing of a segment.
+        // A Stop may also drop the upload during the processing of a segment.
         let begun = !first || matches!(self.slice_progress, SliceProgress::PointCopy(_));
         if begun && self.store.dropped() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
@@ -49,7 +50,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Ok(()) => {
                     self.begin_check(segment);
                     match self.store.refused().filter(|_| !first) {
-                        // The first violation is sufficient and stays stored.
+                        // The first violation is sufficient to refuse the trajectory, and stays stored.
                         Some(violation) => self.take_refused(segment, violation, stopped),
                         None => self.check_points(segment, 0, received.plain, stopped),
                     }
@@ -58,7 +59,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Begins the check. Segment 0 begins a new check. Later segments continue the check after the points received so far.
+    /// Begins the check of a segment. Segment 0 begins a new check of the trajectory. Each later segment continues the check after the
+    /// points received so far.
     fn begin_check(&mut self, segment: &Segment<'_>) {
         let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
@@ -96,8 +98,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Accepts a segment of a trajectory that violates J-36, because a host on a plain line cannot handle a refused segment. The trajectory
-    /// will not be executed.
+    /// Accepts a segment of a trajectory that violates J-36, because a host on a plain line cannot handle a refused segment. The controller
+    /// will not execute this trajectory.
     fn take_refused(&mut self, segment: &Segment<'_>, violation: Violation, stopped: bool) -> SliceOutcome {
         let outcome = self.begin_copy(segment, true, stopped);
         self.violation = Some(violation);

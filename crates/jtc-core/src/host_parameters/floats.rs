@@ -25,7 +25,7 @@ impl HostParameters {
         number.unwrap_or(0.0)
     }
 
-    /// Returns value `i` of the friction in use, in the order of the wire format.
+    /// Returns value `i` of the friction parameters in use, in the order of the wire format.
     pub(crate) fn friction_float(&self, i: usize) -> f32 {
         if !self.friction_is_table {
             let coefficient = self.polynomial.get(i / 6).and_then(|joint| joint.iter().rev().nth(i % 6));

@@ -1,4 +1,5 @@
-//! Parameters in frames, with the values in the order of the wire format. A frame is refused if a value is not finite (J-06).
+//! Conversion of the parameters in received frames, whose values have the order of the wire format. The controller refuses a frame with a
+//! value that is not finite (J-06).
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{DataStatus, Floats};
 
@@ -23,7 +24,7 @@ impl HostParameters {
         }
     }
 
-    /// Uses the gains and the model of a stored arm. The gains are checked against the model when a host requests them.
+    /// Loads the gains and the model of a stored arm. The controller checks the gains against the model when a host requests them.
     pub(crate) fn load(
         &mut self,
         pid: &Floats<'_>,
@@ -38,7 +39,7 @@ impl HostParameters {
     }
 
     pub(crate) fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
-        // Each joint has 4 or 6 coefficients, the highest index first.
+        // Each joint has 4 or 6 coefficients. The coefficient with the highest index comes first.
         let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
         let mut polynomial = [[0.0; 6]; JOINTS];
         for (j, coefficients) in polynomial.iter_mut().enumerate() {
@@ -49,7 +50,7 @@ impl HostParameters {
         self.set_polynomial(&polynomial, config)
     }
 
-    /// Checks and copies the tables of a frame in the number of ticks that [`take_tables`](Self::take_tables) needs.
+    /// Checks and copies the friction tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
     pub(crate) fn take_table(
         &mut self,
         floats: &Floats<'_>,
@@ -60,7 +61,7 @@ impl HostParameters {
     }
 }
 
-/// Returns the gains, which are in the order of the wire format.
+/// Returns the gains of all joints from `floats`, which have the order of the wire format.
 pub(crate) fn read_pid(floats: &Floats<'_>) -> Result<[PidGains; JOINTS], DataStatus> {
     let mut gains = [PidGains::default(); JOINTS];
     for (j, gain) in gains.iter_mut().enumerate() {
@@ -82,12 +83,12 @@ fn read_model(floats: &Floats<'_>) -> Result<ArmModel, DataStatus> {
     Ok(model)
 }
 
-/// Returns float `i`. Refuses a float that is NaN, infinite or missing (J-06).
+/// Returns value `i` of the frame. Refuses a value that is NaN, infinite or missing (J-06).
 fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
     floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
 }
 
-/// Reader that returns finite floats one after the other.
+/// Reader that returns the values of a frame one after the other and refuses values that are not finite.
 struct Reader<'a> {
     floats: &'a Floats<'a>,
     next: usize,

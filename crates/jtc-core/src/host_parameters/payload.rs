@@ -1,5 +1,5 @@
-//! Blends a new payload into the model (J-60). For half a second, the control law uses an arm between the last payload and the next
-//! payload, so that the change does not cause a torque step.
+//! Blend of a new payload into the model (J-60). For half a second, the control law uses an arm model between the last and the next
+//! payload. The change therefore does not cause a torque step.
 use jtc_dynamics::{Dynamics, LinkInertias};
 
 use crate::JOINTS;
@@ -8,22 +8,23 @@ use crate::bit_codec::bit_codec;
 /// Length of the blend, ms.
 pub(crate) const BLEND_MS: u16 = 500;
 
-/// Blend from one payload to another.
+/// State of the blend from one payload to another.
 #[derive(Clone, Debug)]
 pub(crate) struct PayloadBlend {
     from: LinkInertias,
     to: LinkInertias,
-    /// Mass that has not been added yet, kg. The value is negative if mass is removed.
+    /// Mass that the blend has not added yet, kg. The remaining mass is negative if the new payload is lighter.
     mass: f64,
     left_ms: u16,
 }
 
-/// State of the blend. The blend ends at the arm with its configured payload.
+/// State of a payload blend for a snapshot. The blend ends at the arm with its configured payload, so the state does not contain the
+/// inertial parameters of this arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,
     mass: f64,
-    /// Parameters of the arm at the beginning of the blend. `None` if the blend has ended.
+    /// Inertial parameters of the arm at the beginning of the blend. `None` if the blend has ended.
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
@@ -39,7 +40,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Continues from this state. `dynamics` are the dynamics of the arm with its whole payload.
+    /// Continues the blend from this state. `dynamics` are the dynamics of the arm with its whole payload.
     pub(crate) fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
         *self = Self::none(dynamics);
         if let Some(from) = &state.from {
@@ -49,7 +50,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Returns the arm at the present stage of the blend.
+    /// Returns the inertial parameters of the arm at the present stage of the blend.
     fn between(&self) -> LinkInertias {
         self.from.toward(&self.to, 1.0 - f64::from(self.left_ms) * (1.0 / BLEND_MS as f64))
     }
@@ -60,8 +61,8 @@ impl PayloadBlend {
         Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
-    /// Begins a blend from the arm `now` to the arm with the `next` payload. `now` may be in an earlier blend. `heavier` is the mass of the
-    /// next payload minus the mass of the last payload, kg.
+    /// Begins a blend from the arm `now` to the arm with the `next` payload. The arm `now` may be in an earlier blend. `heavier` is the
+    /// mass of the next payload minus the mass of the last payload, kg.
     pub(crate) fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
         let mass = self.mass + heavier;
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
@@ -82,7 +83,7 @@ impl PayloadBlend {
         self.left_ms
     }
 
-    /// Runs a tick of the blend.
+    /// Executes one tick of the blend.
     pub(crate) fn step(&mut self, dynamics: &mut Dynamics) {
         match self.left_ms {
             0 => {}
@@ -95,7 +96,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Ends the blend at once, while the arm is not held.
+    /// Ends the blend at once, because the arm is not held.
     pub(crate) fn end(&mut self, dynamics: &mut Dynamics) {
         self.mass = 0.0;
         if core::mem::take(&mut self.left_ms) > 0 {
@@ -109,7 +110,7 @@ mod tests {
     use super::*;
     use crate::{Config, Parameters};
 
-    /// The added mass is also correct if another payload follows during the blend.
+    /// The total of the added mass is also correct if another payload follows during the blend.
     #[test]
     fn j60_as_much_mass_comes_as_is_given() {
         let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);

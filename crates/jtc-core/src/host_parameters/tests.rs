@@ -1,4 +1,4 @@
-//! Tests of the acceptance of parameters, and of the number of slices for each parameter (J-06).
+//! Tests of the acceptance of parameters, and of the number of slices that each parameter needs (J-06).
 extern crate std;
 use std::vec::Vec;
 
@@ -21,7 +21,7 @@ fn j06_a_model_may_need_the_whole_torque_limit() {
     }
 }
 
-/// Each tick processes one joint: each table is checked once and copied once.
+/// Each tick processes the table of one joint: each table is checked once and copied once.
 #[test]
 fn j06_a_table_takes_twelve_ticks() {
     let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {

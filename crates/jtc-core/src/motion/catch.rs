@@ -1,18 +1,18 @@
-//! Control of a load that is missing in the model, when the joints are enabled (J-43).
+//! Catch of a load that is missing in the arm model, when the joints are enabled (J-43).
 //!
 //! A load that is missing in the model begins to fall when its joint is enabled. The joint then oscillates around the position at which it
-//! will be held. At the end of the first oscillation, the control law needs up to 1.7 times the torque that is missing in the model. If this
-//! torque is above the limit, the limit is commanded, which stops every load that the limit can hold. During this time the set position *sags*
-//! towards the joint, in proportion to the torque above the limit. The joint therefore comes to rest at the position at which the limit
-//! torque has stopped it. If the set position did not sag, the joint would be thrown upwards and fall again. With little friction, this
-//! oscillation would never end.
+//! will be held. At the end of the first oscillation, the control law needs up to 1.7 times the torque that is missing in the model. If the
+//! required torque is above the torque limit, the controller commands the torque limit. The torque limit stops every load that the drive
+//! can hold. While the torque is at the limit, the set position *sags*: it moves towards the joint, in proportion to the torque above the
+//! limit. The joint therefore comes to rest at the position at which the limit torque has stopped it. Without this sag of the set position,
+//! the joint would be thrown upwards and fall again. Without the sag, the oscillation of a joint with little friction would never end.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::config::limits::JointConfig;
 use crate::motion::deceleration::moves;
 
-/// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. The time is longer than the
-/// low-speed phase at the reversal of a swing.
+/// Time for which a joint must be at rest, with a torque within its limit, before its load is considered caught, ms. The required time at
+/// rest is longer than the low-speed phase of a swing when its direction changes.
 const CALM_MS: u16 = 100;
 
 /// Speed below which growth of a swing is treated as noise, rad/s.
@@ -21,13 +21,13 @@ const FAST_SWING: f64 = 0.1;
 /// State of a joint whose load may need to be caught.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Catch {
-    /// Remaining time of the catch, ms. The value is 0 if the catch is over or if the joint was not enabled.
+    /// Remaining time of the catch, ms. The remaining time is 0 if the catch is over or if the joint was not enabled.
     left_ms: u16,
-    /// Remaining time until the joint is considered caught, ms.
+    /// Remaining time until the load of the joint is considered caught, ms.
     busy_ms: u16,
     /// `true` if the joint has been calm for `CALM_MS` at least once since it was enabled.
     settled: bool,
-    /// Sag of the set position, rad. The sag grows in one direction only.
+    /// Sag of the set position, rad. The set position sags in one direction only.
     sag: f64,
     /// Highest speed of the present half swing, with its sign, and of the half swing before it, rad/s.
     peak: f64,
@@ -44,7 +44,7 @@ impl Catch {
         Self { left_ms: config.catch_ms_max, busy_ms: CALM_MS, ..Self::default() }
     }
 
-    /// Returns `true` if the joint is not at rest yet.
+    /// Returns `true` if a joint in a catch has not come to rest yet.
     pub(crate) fn busy(&self) -> bool {
         self.left_ms > 0 && self.busy_ms > 0
     }
@@ -54,8 +54,8 @@ impl Catch {
         self.settled
     }
 
-    /// Executes one tick with the measured velocity (rad/s). Returns `true` while the catch continues. A growing swing shows an unstable
-    /// control loop, so it ends the catch.
+    /// Executes one tick of the catch with the measured velocity of the joint (rad/s). Returns `true` while the catch continues. If the
+    /// swing of the joint grows, its control loop is unstable, so the catch ends.
     pub(crate) fn step(&mut self, velocity: f64) -> bool {
         if self.settled && self.left_ms == 0 {
             return false;
@@ -65,7 +65,7 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise around standstill does not count as a half swing, so a fall after the noise does not count as growth.
+            // Noise around standstill does not count as a half swing. A fall after this noise is therefore not a growing swing.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -103,7 +103,7 @@ impl Catch {
         self.grew && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// Ends the catch, because the joint was stopped by another function.
+    /// Ends the catch, because another function of the controller has stopped the joint.
     pub(crate) fn calm_down(&mut self) {
         *self = Self { settled: true, ..Self::default() };
     }
@@ -113,9 +113,9 @@ impl Catch {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// Returns the step of the set position, rad, if the computed torque exceeds the limit by `excess` (N·m) at a position error of `error`
-    /// (rad). Ends the catch if the sag would exceed the highest position error. Also ends the catch if the load pulls in the other
-    /// direction, as in a swing between both limits.
+    /// Returns the change of the set position, rad, for a computed torque above the limit by `excess` (N·m) and a position error of `error`
+    /// (rad). Ends the catch if the sag would exceed the position error limit. Also ends the catch if the load pulls in the opposite
+    /// direction, because the joint then swings between both torque limits.
     pub(crate) fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         // The set position moves at most to the measured position of the joint.
         let wanted = excess / kp;
@@ -123,7 +123,7 @@ impl Catch {
         let sag = self.sag + step;
         let good = step * self.sag >= 0.0 && sag.abs() <= limits.position_error_max;
         if !good {
-            // The catch ends, although the joint has not settled.
+            // The catch ends, although the joint has not come to rest.
             (self.left_ms, self.busy_ms) = (0, CALM_MS);
             return 0.0;
         }
@@ -152,8 +152,8 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // Torque above the limit does not cause a sag if only the derivative requires it. With a position gain of zero, the set
-            // position sags only as far as the joint.
+            // If only the derivative term of the PID controller causes a torque above the limit, the set position does not sag. With a
+            // position gain of zero, the set position sags only as far as the measured position.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -206,7 +206,7 @@ mod tests {
         assert!(!goes_on(&[0.03, -0.05, 0.101]));
     }
 
-    /// After noise of the opposite sign, a load that begins to fall must be caught like any other load.
+    /// Even after noise of the opposite sign, the controller must catch a load that begins to fall.
     #[test]
     fn j43_noise_around_standstill_is_no_half_of_a_swing() {
         for noise in [0.001, 0.01, 0.02] {
@@ -215,7 +215,7 @@ mod tests {
         }
     }
 
-    /// While gains are on trial, a settled joint oscillates without an external cause only if its control loop is unstable.
+    /// During a trial of gains, a settled joint oscillates without an external cause only if its control loop is unstable.
     #[test]
     fn j71_a_swing_that_grows_over_three_halves_is_seen_of_a_joint_that_has_settled() {
         let seen = |peaks: &[f64]| {

@@ -10,10 +10,11 @@ use crate::interpolation::smooth;
 const STANDING: f64 = 0.02;
 /// Highest deceleration of a joint that falls while it is enabled, rad/s². Gravity requires most of the torque of a falling joint.
 const CATCH_DECELERATION: f64 = 3.0;
-/// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The peak is in the middle of the motion.
+/// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The deceleration peak of a falling joint is in the middle
+/// of the motion.
 const STEEPEST: f64 = 1.5;
-/// Peak deceleration of a joint that a hand was guiding, as a multiple of the mean deceleration. The peak is at the beginning, when the
-/// damping of Teaching already decelerates the joint.
+/// Peak deceleration of a joint that a hand was guiding, as a multiple of the mean deceleration. The deceleration peak of a guided joint is
+/// at the beginning, when the damping of Teaching already decelerates the joint.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 
 /// Returns `true` if a joint with this velocity (rad/s) moves.
@@ -26,53 +27,53 @@ pub(crate) fn moves(velocity: f64) -> bool {
 pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
-    /// Elapsed time, ms. The time is 0 in the first tick, which commands the measured values. The position error and its derivative
-    /// therefore begin at 0.
+    /// Elapsed time, ms. The elapsed time is 0 in the first tick, which commands the measured position and velocity. The position error and
+    /// its derivative therefore begin at 0.
     elapsed_ms: f64,
     length_ms: f64,
-    /// `true` if the joint falls, so that no torque decelerates it at the beginning.
+    /// `true` if the joint falls. At the beginning, no torque decelerates a falling joint.
     falls: bool,
 }
 
 bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// Creates the deceleration of a joint that a hand guides. The deceleration starts at a measured position (rad) and velocity (rad/s)
-    /// and takes `length_ms`. The velocity is clipped to the velocity limit.
+    /// Creates the deceleration of a joint that a hand was guiding. The deceleration of a guided joint starts at a measured position (rad)
+    /// and velocity (rad/s) and takes `length_ms`. The start velocity is clipped to the velocity limit.
     pub(crate) fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
     }
 
-    /// Creates the deceleration of a joint that falls. The deceleration of a faster joint takes longer.
+    /// Creates the deceleration of a joint that falls. The faster the joint falls, the longer its deceleration takes.
     pub(crate) fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
         let led = Self::led(from, velocity, f64::from(config.ramp_ms), limits);
         let length_ms = led.length_ms.max(STEEPEST * led.velocity.abs() / (CATCH_DECELERATION * DT));
         Self { length_ms, falls: true, ..led }
     }
 
-    /// Returns the start position, rad, and the start velocity, rad/s.
+    /// Returns the start position, rad, and the start velocity, rad/s, of the deceleration.
     pub(crate) fn start(&self) -> (f64, f64) {
         (self.from, self.velocity)
     }
 
-    /// Shifts all positions by `way` (rad).
+    /// Shifts all positions of the deceleration by `way` (rad).
     pub(crate) fn shift(&mut self, way: f64) {
         self.from += way;
     }
 
-    /// Returns position, velocity and acceleration of the next tick, and `true` if the joint is at rest after that tick.
+    /// Returns the position, velocity and acceleration of the next tick, and `true` if the joint is at rest after that tick.
     pub(crate) fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
         let (seconds, left) = (self.length_ms * DT, 1.0 - u);
-        // The three values are the velocity, its integral and its slope, as shares of v, v·T and v/T.
+        // `velocity`, `way` (its integral) and `slope` (its derivative) are shares of v, v·T and v/T.
         let (velocity, way, slope) = if self.falls {
             (1.0 - smooth(u), u - u * u * u + 0.5 * u * u * u * u, -6.0 * u * left)
         } else {
             (left * left, (1.0 - left * left * left) * (1.0 / 3.0), -2.0 * left)
         };
-        // The set position never leaves the limits. A joint that is already outside does not move further out.
+        // The set position never leaves the position limits. A joint that is already outside its limits does not move further out.
         let position = (self.from + self.velocity * way * seconds)
             .max(limits.position_min.min(self.from))
             .min(limits.position_max.max(self.from));
@@ -94,7 +95,7 @@ mod tests {
         JointConfig { position_min: -9.0, position_max: 9.0, ..Config::avena().joints[0] }
     }
 
-    /// Returns the positions and velocities until the joint is at rest.
+    /// Returns the set positions and velocities until the joint is at rest.
     fn ways(mut deceleration: Deceleration, limits: &JointConfig) -> Vec<(f64, f64)> {
         let mut ways = Vec::new();
         for _ in 0..5_000 {
@@ -146,7 +147,7 @@ mod tests {
             let most = decelerations(velocity);
             assert!((0.99 * CATCH_DECELERATION..1.001 * CATCH_DECELERATION).contains(&most), "{most}");
         }
-        // The deceleration of a slow joint takes the time of the ramp.
+        // The deceleration of a slow joint takes `ramp_ms`.
         assert_eq!(
             ways(Deceleration::falling(0.0, 0.1, &config, &limits()), &limits()).len(),
             usize::from(config.ramp_ms) + 1
@@ -164,7 +165,7 @@ mod tests {
                     ways(Deceleration::led(end - 0.1 * outside, velocity, RAMP_MS, &limits), &limits);
                 let inward = velocity * outside < 0.0;
                 assert!(inside.iter().all(|(q, _)| (limits.position_min..=limits.position_max).contains(q)));
-                // A joint that is outside its limits at the start does not move further out.
+                // A joint that is outside its limits at the start of the deceleration does not move further out.
                 let found = end + outside;
                 let beyond = ways(Deceleration::led(found, velocity, RAMP_MS, &limits), &limits);
                 let last = beyond[beyond.len() - 1].0;

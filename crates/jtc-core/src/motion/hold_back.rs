@@ -1,23 +1,23 @@
 //! Slows down path time while a motion overloads a joint (J-75).
 //!
 //! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
-//! path needs less torque, because the torque for inertia falls with the square of the rate. Therefore path time slows down as much as the
-//! joints at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its normal rate when no
-//! joint is at its torque limit any more.
+//! motion along the path needs less torque, because the torque for inertia falls with the square of the rate. Therefore path time slows
+//! down as much as the joints at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its
+//! normal rate when no joint is at its torque limit.
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 use crate::trajectory::path::PathClock;
 
-/// Time for which the inertia of the arm is assumed to be constant, ms.
+/// Time for which the controller assumes that the inertia of the arm is constant, ms.
 const INERTIA_MS: u16 = 60;
-/// Time from the moment when the last joint leaves its limit until the path returns to its normal rate, ms.
+/// Time from the moment when the last joint leaves its torque limit until the path returns to its normal rate, ms.
 const QUIET_MS: u16 = 200;
-/// Longest time for which joints may be at their limits without interruption, ms.
+/// Longest time for which joints may be at their torque limits without interruption, ms.
 const PRESSED_MS: u16 = 250;
 /// Longest total time for which the path may be slowed down during one run of the path, ms.
 const RUN_MS: u16 = 5_000;
-/// Rate below which the path is considered at rest, and longest time at such a rate before the arm stops, ms. Without this limit, a path
-/// could rest for ever if the torque is just sufficient to hold the arm.
+/// Rate of path time below which the arm counts as at rest on the path, and longest time at such a rate before the arm stops, ms. Without
+/// this limit, the arm could stay at rest on the path for ever if the torque is just sufficient to hold the arm.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
@@ -30,7 +30,7 @@ pub(crate) struct HoldBack {
     stands_ms: u16,
     /// Number of ticks since the inertia was computed.
     since_ms: u16,
-    /// Consecutive ticks in which a joint has been at its limit.
+    /// Consecutive ticks in which any joint has been at its torque limit.
     pressed_ms: u16,
     /// Number of ticks since any joint was at its torque limit.
     quiet_ms: u16,
@@ -47,9 +47,10 @@ bit_codec!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_m
 pub(crate) enum HoldBackStep {
     /// The path continues as before.
     Nothing,
-    /// The path returns to its normal rate.
+    /// Path time returns to its normal rate.
     Restore,
-    /// The arm stops, because a slower path does not relieve the joints.
+    /// The arm stops, because a joint was at its torque limit for too long, or because the motion was slowed down or stood still for too
+    /// long.
     Stop,
 }
 
@@ -59,12 +60,12 @@ impl HoldBack {
         self.active
     }
 
-    /// Returns `true` if `step` must be called in each tick.
+    /// Returns `true` if the controller must call `step` in each tick.
     pub(crate) fn is_watched(&self) -> bool {
         self.active | self.restores
     }
 
-    /// Begins to slow down the path because a joint is overloaded. Returns `true` if the inertia of the arm must be computed.
+    /// Begins to slow down the path because a joint is overloaded. Returns `true` if the controller must compute the inertia of the arm.
     pub(crate) fn begin(&mut self) -> bool {
         if self.active && self.since_ms < INERTIA_MS {
             return false;
@@ -76,7 +77,8 @@ impl HoldBack {
         true
     }
 
-    /// Stops holding back the path, because the path stops. The time so far still counts for the present run of the path.
+    /// Stops holding back the motion, because the arm stops or an approach has ended. The time for which the motion was held back still
+    /// counts for the present run of the path.
     pub(crate) fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
@@ -130,7 +132,7 @@ mod tests {
 
     const PRESSED: [bool; JOINTS] = [false, false, true, false, false, false];
 
-    /// Returns a clock that is ramping to its normal rate.
+    /// Returns a clock that changes to its normal rate along a ramp.
     fn at(rate: f64) -> PathClock {
         let mut clock = PathClock::start(1.0);
         clock.rate = rate;

@@ -10,42 +10,42 @@ use crate::interpolation::SetPoint;
 use crate::trajectory::path::PathClock;
 use crate::{DT, JOINTS};
 
-/// Time without a new command after which the joints come to rest, ticks.
+/// Time without a new Jog after which the joints come to rest, ticks.
 pub(crate) const LASTS_MS: u16 = 200;
-/// Highest acceleration, as a share of the joint's limit.
+/// Highest acceleration of a jogged joint, as a share of the acceleration limit of the joint.
 const ACCELERATION: f64 = 0.2;
-/// Time in which a joint reaches the highest acceleration, s.
+/// Time in which a jogged joint reaches its highest acceleration, s.
 const RISE_S: f64 = 0.1;
 
-/// Returns the highest acceleration of a joint, rad/s², if the torque limits leave enough torque for this acceleration.
+/// Returns the highest acceleration of a jogged joint, rad/s², if the torque limits allow this acceleration.
 pub(crate) fn hardest(limits: &JointConfig) -> f64 {
     ACCELERATION * limits.acceleration_max
 }
 
-/// Jog of one joint.
+/// State of the jog of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct JointJog {
-    /// Commanded velocity, rad/s.
+    /// Velocity that the host has commanded, rad/s.
     wanted: f64,
-    /// Highest acceleration, rad/s².
+    /// Highest acceleration of the joint, rad/s².
     most: f64,
     /// Velocity and acceleration of the set values, rad/s and rad/s².
     velocity: f64,
     acceleration: f64,
 }
 
-/// Returns the jerk limit of a joint, rad/s³.
+/// Returns the jerk limit of a jogged joint, rad/s³.
 pub(crate) fn jerk(limits: &JointConfig) -> f64 {
     hardest(limits) / RISE_S
 }
 
-/// Jog of all joints, from the first command until all joints are at rest.
+/// State of a jog of all joints, from the first command until all joints are at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jog {
     joints: [JointJog; JOINTS],
-    /// Number of ticks since the last command.
+    /// Number of ticks since the last Jog.
     silent_ms: u16,
-    /// Clock of the jog.
+    /// Clock of the jog, which slows down like path time.
     clock: PathClock,
 }
 
@@ -58,8 +58,8 @@ impl Jog {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// Commands velocities, rad/s, and the highest accelerations, rad/s². A command that arrives while the joints come to rest takes effect
-    /// when the joints are at rest.
+    /// Sets the commanded velocities, rad/s, and the highest accelerations, rad/s², of all joints. A command that arrives while the joints
+    /// come to rest takes effect when the joints are at rest.
     pub(crate) fn command(
         &mut self,
         wanted: &[f64; JOINTS],
@@ -70,7 +70,7 @@ impl Jog {
         self.silent_ms = 0;
         for (j, joint) in self.joints.iter_mut().enumerate() {
             joint.wanted = wanted[j];
-            // If a joint could not stop within its range at this acceleration, the previous acceleration limit stays valid.
+            // If a joint could not stop within its range with the new acceleration limit, its previous acceleration limit stays valid.
             let (softer, jerk) = (JointJog { most: acceleration[j], ..*joint }, jerk(&config.joints[j]));
             let (low, high) = config.position_range(j);
             let rest = position[j] + softer.stopping_way(jerk);
@@ -80,13 +80,13 @@ impl Jog {
         }
     }
 
-    /// Brings the joints to rest.
+    /// Brings the jogged joints to rest.
     pub(crate) fn end(&mut self) {
         self.silent_ms = 0;
         self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
     }
 
-    /// Begins a tick. Returns `true` if this is the tick in which all joints begin to come to rest.
+    /// Begins a tick of the jog. Returns `true` if all joints begin to come to rest in this tick.
     pub(crate) fn ends(&mut self) -> bool {
         self.silent_ms = self.silent_ms.saturating_add(1);
         if self.silent_ms > LASTS_MS {
@@ -99,7 +99,7 @@ impl Jog {
         ends
     }
 
-    /// Returns `true` until the jog begins to come to rest.
+    /// Returns `true` until the joints begin to come to rest.
     pub(crate) fn goes_on(&self) -> bool {
         self.clock.is_going()
     }
@@ -114,7 +114,7 @@ impl Jog {
         !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
-    /// Runs one tick, which moves `point`. `ramp` advances the clock while the clock changes to another rate.
+    /// Executes one tick of the jog, which moves `point`. `ramp` advances the clock while the clock changes to another rate.
     pub(crate) fn step(
         &mut self,
         point: &mut SetPoint,
@@ -147,8 +147,8 @@ impl Jog {
 }
 
 impl JointJog {
-    /// Runs one tick that lasts `tick` seconds of the jog's clock. If `goes` is `true`, the jog continues and the joint approaches the
-    /// commanded velocity.
+    /// Executes one tick for this joint. The tick lasts `tick` seconds of the jog's clock. If `goes` is `true`, the jog continues, and the
+    /// joint approaches its commanded velocity.
     fn step(
         &mut self,
         position: &mut f64,
@@ -160,20 +160,20 @@ impl JointJog {
         let jerk = jerk(limits);
         let wanted = if goes { self.wanted } else { 0.0 };
         let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
-        // The joint approaches the commanded velocity as long as the joint could still stop inside its range afterwards.
+        // The joint may approach its commanded velocity if it can still stop inside its range after this tick.
         let onward = self.toward(wanted, jerk, limits.velocity_max, tick);
         let way = self.way(&onward, tick) + onward.stopping_way(jerk);
         let room = if way < 0.0 { low - *position } else { high - *position };
         let onward_fits = way.abs() < room.abs() && way * room >= 0.0;
         let next = if onward_fits { onward } else { self.toward(0.0, jerk, limits.velocity_max, tick) };
-        // The joint never leaves its range. A joint outside its range only moves back towards the range.
+        // The set position of the joint never leaves its range. A joint outside its range only moves back towards the range.
         let reached = *position + self.way(&next, tick);
         let within = reached.max(low.min(*position)).min(high.max(*position));
         *self = if within == reached { next } else { Self { velocity: 0.0, acceleration: 0.0, ..next } };
         *position = within;
     }
 
-    /// Returns the distance that the joint moves in the `tick` seconds before it reaches the state `next`, rad.
+    /// Returns the distance, rad, that the joint moves in `tick` seconds from its present state to the state `next`.
     fn way(&self, next: &Self, tick: f64) -> f64 {
         0.5 * (self.velocity + next.velocity) * tick
     }
@@ -204,8 +204,8 @@ impl JointJog {
         }
     }
 
-    /// Returns the stopping distance of a joint that stops at once, rad. With this `jerk` (rad/s³) the acceleration falls to its limit
-    /// against the motion, stays at the limit, and rises to zero. A small margin is added for the effect of whole ticks.
+    /// Returns the stopping distance of a joint that begins to stop now, rad. The acceleration changes with this `jerk` (rad/s³) to its
+    /// limit against the motion, stays at the limit, and returns to zero. The result includes a small margin for the effect of whole ticks.
     fn stopping_way(&self, jerk: f64) -> f64 {
         let sign = if self.velocity == 0.0 { self.acceleration } else { self.velocity };
         let (v, a) = if sign < 0.0 {
@@ -213,8 +213,8 @@ impl JointJog {
         } else {
             (self.velocity, self.acceleration)
         };
-        // The distance is measured from the point of zero acceleration. A joint that accelerates has not reached this point yet, and a
-        // joint that brakes has passed the point.
+        // The stopping distance is first computed from the point of zero acceleration. A joint that accelerates has not reached this point
+        // yet, and a joint that brakes has passed the point.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
         let rise = self.most / jerk;
         let rest = if peak >= self.most * rise {
@@ -239,13 +239,14 @@ mod tests {
         Config::avena()
     }
 
-    /// Returns a jog command that the torque limits do not restrict.
+    /// Commands velocities that the torque limits do not restrict.
     fn command(jog: &mut Jog, wanted: &[f64; JOINTS], position: &[f64; JOINTS], config: &Config) {
         let acceleration = core::array::from_fn(|j| hardest(&config.joints[j]));
         jog.command(wanted, &acceleration, position, config);
     }
 
-    /// Runs a tick that moves `position`, for joints without inertia. Returns the velocities and accelerations of the joints.
+    /// Executes a tick that moves `position`, for joints that follow their set positions exactly. Returns the set velocities and the set
+    /// accelerations of the joints.
     fn tick(jog: &mut Jog, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
         let mut point = SetPoint::still(*position);
         jog.ends();
@@ -256,8 +257,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any commands at any time, the joints stay within the position range and within the limits of velocity, acceleration and
-        /// jerk. The joints are at rest soon after the last command.
+        /// For any Jogs at any time, the joints stay within their position range and within the limits of velocity, acceleration and jerk.
+        /// The joints are at rest soon after the last Jog.
         #[test]
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
             start in prop::array::uniform6(-1.0..1.0f64),
@@ -283,12 +284,12 @@ mod tests {
                 let ramps = was_ramping || jog.clock.ramping();
                 for j in 0..JOINTS {
                     let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
-                    // While a jog comes to rest, the joints may decelerate as fast as on a path.
+                    // While a jog comes to rest, the joints may decelerate as fast as on a trajectory path.
                     let most = if ramps { limits.acceleration_max } else { ACCELERATION * limits.acceleration_max };
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
                     let at_end = position[j] == low || position[j] == high;
-                    // The velocity that remains at the end of the range is almost zero.
+                    // The velocity of a joint when it reaches the end of its range is almost zero.
                     let step = (v[j] - last.0[j]).abs();
                     assert!(step <= most * DT + 1e-9 || (at_end && step < 0.005), "{} {}", v[j], last.0[j]);
                     let jerk = (a[j] - last.1[j]).abs();
@@ -320,7 +321,7 @@ mod tests {
         }
     }
 
-    /// Returns configurations with joint limits as imported from the UR5 and Z1 models, and with wide position ranges.
+    /// Returns configurations with the joint limits of the imported UR5 and Z1 models, and with wide position ranges.
     fn arms() -> [Config; 3] {
         let avena = config();
         let with = |velocity: [f64; JOINTS], acceleration: f64| {
@@ -344,21 +345,21 @@ mod tests {
     enum End {
         /// No further Jog arrives.
         Silence,
-        /// A Stop or a Pause.
+        /// A Stop or a Pause arrives.
         Stop,
-        /// A Jog with another velocity, as a share of the velocity limit.
+        /// A Jog with another velocity arrives, as a share of the velocity limit.
         Rate(f64),
     }
 
-    /// Number of ticks after the end of a jog. The controller detects silence after [`LASTS_MS`], and then the acceleration needs
+    /// Number of ticks after the end of a jog. The controller detects missing Jogs after [`LASTS_MS`]. The acceleration then needs
     /// [`RISE_S`] to reach zero.
     const AFTER: u16 = LASTS_MS + 120;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// A joint is jogged at its velocity limit, or up to a thousandth below it, and still accelerates when the jog ends. For any tick
-        /// in which the jog ends, the set velocity stays within the limit, and no limit of J-43 is violated.
+        /// A joint is jogged at its velocity limit, or up to a thousandth below this limit, and still accelerates when the jog ends. The
+        /// set velocity stays within the limit, and no limit of J-43 is violated, for any tick in which the jog ends.
         #[test]
         fn j58_the_set_velocity_never_exceeds_its_limit_whenever_a_jog_ends(
             arm in 0..3usize,
@@ -447,7 +448,7 @@ mod tests {
         }
     }
 
-    /// Returns the ticks from the end of a jog until it is at rest, and the distance of joint 1 in this time (rad).
+    /// Returns the number of ticks from the end of a jog until all joints are at rest, and the distance of joint 1 in this time (rad).
     fn stop(mut jog: Jog, mut position: [f64; JOINTS], config: &Config, end: End) -> (u16, f64) {
         let begin = position[0];
         match end {
@@ -477,8 +478,8 @@ mod tests {
                     tick(&mut jog, &mut position, &config);
                     position[0] = position[0].min(0.0);
                 }
-                // At this speed, a path stops within the time of the ramp, after half of the distance. A fast joint stops with its
-                // acceleration limit.
+                // At the same speed as this jog, a motion along a path would stop within the time of the ramp, after half of the distance.
+                // A fast joint stops with its acceleration limit.
                 let hard = config.joints[0].acceleration_max;
                 let longest = 20 + config.ramp_ms.max((1_600.0 * share * fastest / hard) as u16);
                 for (end, wait) in [(End::Stop, 0), (End::Rate(0.0), 0), (End::Silence, LASTS_MS)] {
@@ -492,7 +493,8 @@ mod tests {
     }
 
     /// Before the arm is at rest, the operator presses the same jog key, the opposite key or another key. The arm comes to rest first, and
-    /// no joint becomes faster meanwhile. A joint that moves afterwards does not exceed the acceleration of a jog.
+    /// no joint becomes faster before the arm is at rest. A joint that moves after the arm was at rest does not exceed the acceleration of
+    /// a jog.
     #[test]
     fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {
         let then = [[1.0, 0.0], [-0.4, 0.0], [0.0, 1.0]];

@@ -15,26 +15,26 @@ use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::{JOINTS, friction, gains, joint_error};
 
-/// Speed in rad/s below which the torque that the integral finds in motion may be an error of the friction model. No load is learned from
-/// such a torque.
+/// Speed, rad/s, below which an error of the friction model may cause the torque that the integral finds in motion. The controller does not
+/// take such a torque as a load.
 const CREEPS: f64 = 0.05;
 
-/// Share of the torque limit that the friction of a joint can hold. If the torque that is missing in addition to the found load is below
-/// this share, the load is considered known.
+/// Share of the torque limit up to which friction can hold a joint. If the missing torque in addition to the learned load is below this
+/// share, the load counts as known.
 const LITTLE: f64 = 0.04;
 
 /// Control mode, which determines the active parts of the control law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ControlMode {
-    /// Gravity and PID.
+    /// Gravity and PID are active.
     Hold,
     /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration are active.
     Follow,
-    /// Mode for the approach to the path, like `Follow`. The limits of the path do not apply, because the approach begins at the measured
-    /// position.
+    /// Mode for the approach to the path. In this mode, all parts are active that are active in `Follow`. The limits of the path do not
+    /// apply in this mode, because the approach begins at the measured position.
     Approach,
-    /// An arm that a hand has led comes to rest and is held. This mode is like `Hold`, with additional friction and inertia at the
-    /// commanded velocity and acceleration.
+    /// Mode for an arm that a hand has moved. The arm comes to rest and is then held. In this mode, all parts are active that are active in
+    /// `Hold`. In addition, friction and inertia at the commanded velocity and acceleration are active.
     Rest,
     /// Gravity and the torques for hand guiding are active (J-25).
     Teach,
@@ -51,19 +51,19 @@ impl ControlMode {
         self.moves() || self == Self::Rest
     }
 
-    /// Returns `true` if a motion is commanded.
+    /// Returns `true` if the mode is used for a commanded motion.
     pub(crate) fn moves(self) -> bool {
         matches!(self, Self::Follow | Self::Approach)
     }
 }
 
-/// Longest time after the configuration of a payload in which the integral releases the torque that it had found for this payload, ms.
+/// Longest time after the configuration of a payload in which the integral releases the torque that it contained for this payload, ms.
 const UNWINDS_MS: u16 = 3_000;
 
 /// Inputs of a tick of the control law.
 pub(crate) struct LawInputs<'a> {
     pub mode: ControlMode,
-    /// The arm brakes with all available torque (J-33).
+    /// `true` if the arm brakes with all available torque (J-33).
     pub braking: bool,
     pub nodes: &'a Nodes,
     pub config: &'a Config,
@@ -76,27 +76,27 @@ pub(crate) struct ControlParameters<'a> {
     pub pid: &'a [PidGains; JOINTS],
     pub polynomial: &'a [[f64; 6]; JOINTS],
     pub table: Option<&'a [TableOf<f32>; JOINTS]>,
-    /// The gains are on trial, so the control law monitors the joints for swings (J-71).
+    /// `true` if the gains are on trial, so that the control law checks the joints for swings (J-71).
     pub on_trial: bool,
 }
 
-/// The state of the control law.
+/// State of the control law.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
-    /// Torque of the last tick.
+    /// Torque of each joint in the last tick, by parts.
     pub torque: [JointTorque; JOINTS],
-    /// State of Teaching. This state exists only in Teaching, and the flight recorder does not store it.
+    /// State of Teaching. The state of Teaching exists only during Teaching, and the flight recorder does not store it.
     pub(super) taught: Option<Taught>,
     transfer: Transfer,
-    /// Joints that yield (J-68, J-70).
+    /// State of the joints that yield or lower a load (J-68, J-70).
     yields: [Option<Yield>; JOINTS],
     yielded: Yielded,
-    /// Load that each joint carries and that the model does not contain.
+    /// Unmodelled load that each joint carries.
     loads: [Load; JOINTS],
     /// Index of the joint whose load is observed in this tick.
     observed: u8,
-    /// Remaining time in which the integral releases the torque that it had found for a payload that is now configured, ms (J-60).
+    /// Remaining time in which the integral releases the torque that it contained for a payload that is now configured, ms (J-60).
     pub(super) unwinds_ms: u16,
 }
 
@@ -122,20 +122,21 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// Like [`Self::change_mode`], but no torque may step, because the torque that decelerates an arm is part of the model torque after the
-    /// change.
+    /// Like [`Self::change_mode`], but no torque may step, because the torque that decelerates the arm belongs to the model torque after
+    /// the change.
     pub(crate) fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
 
-    /// Prepares a change of the model while the arm is held. The transfer is bumpless, so no torque may step.
+    /// Prepares a change of the arm model while the arm is held. The transfer is bumpless, so no torque may step.
     pub(crate) fn change_model(&mut self) {
-        // The integral contains torque that was missing in the last model, and must release this torque.
+        // The integral contains torque that was missing in the last model, and must release this torque now.
         self.payload_comes();
         self.transfer.change_model();
     }
 
-    /// Changes the gains. The integral keeps as much of its torque as the new gains allow. The remainder of the torque is blended out.
+    /// Changes the gains of the joints. The integral keeps as much of its torque as the new gains allow. The remaining torque is blended
+    /// out.
     pub(crate) fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         for j in 0..JOINTS {
             if !self.yields(j) {
@@ -154,7 +155,7 @@ impl ControlLaw {
         (0..JOINTS).all(holds)
     }
 
-    /// Clears the loads, so that each joint must find its load again.
+    /// Clears the loads, so that the controller must learn the load of each joint again.
     fn forget_loads(&mut self) {
         self.loads.iter_mut().for_each(Load::forget);
     }
@@ -167,23 +168,24 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Resets joints whose position hold has ended or has not begun.
+    /// Resets the control law of joints whose position hold has ended or has not begun.
     pub(crate) fn latch(&mut self, latched: &Latched) {
         for j in 0..JOINTS {
             if !latched.held[j] {
                 self.pid[j].reset(0.0);
                 self.loads[j].forget();
                 self.yields[j] = None;
-                // The joint has no integral from which torque must be released.
+                // Joints that were just enabled have no integral from which torque must be released.
                 self.unwinds_ms = 0;
             }
         }
         self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// Makes a joint yield, or lower its load, from the next tick on. `set` is the commanded position in rad. `inertia` is the inertia that
-    /// the joint moves, kg·m². `led` means that the joint comes to rest after Teaching.
-    // Inlined, so that the compiler knows that the index is in range.
+    /// Makes a joint yield, or lower its load, from the next tick on (J-68, J-70). `set` is the commanded position of the joint, rad.
+    /// `inertia` is the effective inertia of the joint, kg·m². `led` is `true` if the joint comes to rest after a hand has moved it in
+    /// Teaching.
+    // The function is inlined, so that the compiler knows that the index is in range.
     #[inline(always)]
     pub(crate) fn begin_yield(
         &mut self,
@@ -200,12 +202,12 @@ impl ControlLaw {
             }
             return;
         }
-        // The joint releases the commanded torque, not the computed torque.
+        // The yielding joint starts from the commanded torque, not from the computed torque, which may be above the limit.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // The integral of a pushed joint has not found a load. After hand guiding, the integral of a joint contains the load that Teaching
-        // carried.
+        // Before the load of a pushed joint is known, its integral does not count as a load. After hand guiding, the integral of a joint
+        // contains the torque that Teaching used for the load.
         let load = if lowers {
             Load::bounded(load.torque(torque.pid.i), limits)
         } else if led {
@@ -232,18 +234,18 @@ impl ControlLaw {
         self.yields.iter().flatten().any(|yields| !yields.is_calm())
     }
 
-    /// Ends the yields at the host's request. Joints that are calm are held again.
+    /// Allows all yields to end, because the host requests this. Each joint is held again as soon as it has calmed down.
     pub(crate) fn end_yields(&mut self) {
         self.yields.iter_mut().flatten().for_each(Yield::clear);
     }
 
-    /// Moves the spring of a yielding joint along with the joint. Returns the position to which the spring pulls, rad. Returns `None` if
-    /// the joint does not yield.
+    /// Drags the free end of the spring of a yielding joint along with the joint. Returns the position to which the spring pulls, rad.
+    /// Returns `None` if the joint does not yield.
     pub(crate) fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
 
-    /// Returns the torque that the joint carries and that the model does not contain, N·m.
+    /// Returns the torque of the unmodelled load of the joint, N·m.
     pub(crate) fn load(&self, joint: usize) -> f64 {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
@@ -254,7 +256,8 @@ impl ControlLaw {
         pid.p + pid.d + (pid.i - self.load(joint))
     }
 
-    /// Ends the yield of joints that are calm. Returns these joints, which are held at their present positions.
+    /// Ends the yield of the joints that have calmed down. Returns `true` for each joint whose yield has ended. The controller then holds
+    /// these joints at their present positions.
     pub(crate) fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
         let mut ended = [false; JOINTS];
         for j in 0..JOINTS {
@@ -271,12 +274,12 @@ impl ControlLaw {
         ended
     }
 
-    /// Returns `true` if the load of every held joint is known, so that Teaching can carry it. In addition, the position controller must
-    /// cause almost no torque. If the integral is still changing, or releases torque that is now in the model, the load is not known yet. A
-    /// person who leans on the arm may let go at any time.
+    /// Returns `true` if the load of every held joint is known, so that Teaching can hold this load. In addition, the feedback torque of
+    /// each of these joints must be small. If the integral is still changing, or releases torque that is now part of the model, the load is
+    /// not known yet. A person who leans on the arm may stop leaning at any time.
     ///
-    /// If a `contact` may press on the arm, the controller does not wait for the end of the pressure. A load that was known before must
-    /// nevertheless be known again.
+    /// If a `contact` may press on the arm, the controller does not wait for the end of this contact. A load that was cleared must be
+    /// learned again even in this case.
     pub(crate) fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
@@ -285,13 +288,13 @@ impl ControlLaw {
         (contact || self.unwinds_ms == 0) && (0..JOINTS).all(|j| !held[j] || known(j))
     }
 
-    /// Sets the loads as if every joint had found a load of zero.
+    /// Sets the loads as if the controller had learned a load of zero for every joint.
     #[cfg(test)]
     pub(crate) fn find_loads_for_test(&mut self) {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
     }
 
-    /// Begins Teaching, which carries the found loads (J-25), but does not carry torque that may come from a contact.
+    /// Begins Teaching, which holds the learned loads (J-25), but not a torque that may come from a contact.
     pub(crate) fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
         let mut loads = [0.0; JOINTS];
         for j in 0..JOINTS {
@@ -304,15 +307,15 @@ impl ControlLaw {
         forget_yields(&mut self.yields);
     }
 
-    /// Records that the payload is added to the model while the arm is held. The missing torque does not count as a load until the integral
-    /// has released the torque that it had found for the payload (J-60).
+    /// Records that a payload is added to the model while the arm is held. The unmodelled torque does not count as a load until the
+    /// integral has released the torque that it contained for the payload (J-60).
     pub(crate) fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
     }
 
-    /// Reduces the mass that Teaching had found by `mass` (kg). The payload was configured in Teaching, and from this tick on the model
-    /// contains the payload (J-60).
+    /// Reduces the mass that Teaching has estimated by `mass` (kg), because from this tick on the model contains this mass. The mass is a
+    /// part of the payload that the host has configured during Teaching (J-60).
     pub(crate) fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
@@ -330,7 +333,7 @@ impl ControlLaw {
         speeds
     }
 
-    /// Ends Teaching. The integral takes over the torque that held each joint.
+    /// Ends Teaching. The integral then contains the torque that held each joint.
     pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let q = nodes.positions();
         if let Some(taught) = &self.taught {
@@ -349,7 +352,8 @@ impl ControlLaw {
         }
     }
 
-    /// Runs one tick, which computes the torque before any limit. Returns the joint errors that the friction table causes.
+    /// Executes one tick of the control law, which computes the torques before any limit. Returns the joint errors that the friction table
+    /// causes.
     #[inline(always)]
     pub(crate) fn step(
         &mut self,
@@ -362,15 +366,16 @@ impl ControlLaw {
         self.yielded.step();
         let before = self.transfer.begin(&self.torque);
         if before.is_some() && mode != ControlMode::Teach {
-            // The load and brake torques exist only in Teaching.
+            // Load and brake torques exist only in Teaching.
             self.torque.iter_mut().for_each(|torque| (torque.load, torque.brake) = (0.0, 0.0));
         }
         let q = nodes.positions();
         let v = nodes.velocities();
-        // J-62: a measurement is compared with the set position for the time of the measurement.
+        // J-62: a measurement is compared with the set position at the time of the measurement.
         let due = set.due(config);
-        // J-40: the model uses the measured position, and the commanded velocity and acceleration in Operate (zero in other states). The
-        // model torque acts at the present time, so the commanded motion since the measurement is added to the measured position.
+        // J-40: the model uses the measured position. The model also uses the commanded velocity and acceleration, in Operate, in a jog,
+        // and while the arm comes to rest after Teaching. In all other cases, the model uses zeros. The model torque acts at the present
+        // time, so the motion that was commanded since the measurement is added to the measured position.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {
@@ -434,17 +439,17 @@ impl ControlLaw {
         self.observed = (j as u8 + 1) % JOINTS as u8;
         let speed = set.point.velocity[j].abs();
         let creeps = speed > 0.0 && speed < CREEPS;
-        // While the integral releases torque that is now in the model, the integral does not show a load.
+        // While the integral releases torque that is now part of the model, the integral does not show a load.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
-            // Until the integral has reached the holding torque, the load is not known.
+            // Until the integral has reached the holding torque of the joint, its load is not known.
             let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
             load.observe(pid.i, found && set.settled(j), limits);
         }
     }
 
-    /// Computes the torque that Teaching adds to the torque of the model (J-25). Slowly changing parts are computed in separate ticks, in
-    /// which the other parts do not change. Returns `true` if the whole torque was computed.
+    /// Computes the torque that Teaching adds to the torque of the model (J-25). Slowly changing values are computed in separate ticks, in
+    /// which the torques of Teaching do not change. Returns `true` if the torques of Teaching were computed in this tick.
     #[inline(never)]
     fn teach(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) -> bool {
         let (q, v) = (nodes.positions(), nodes.velocities());
@@ -486,7 +491,8 @@ impl ControlLaw {
         true
     }
 
-    /// Limits the braking torques of Teaching to the remaining torque within the limits, so that braking does not cause an overload.
+    /// Limits the braking torques of Teaching to the torque that remains within the torque limits, so that braking does not overload a
+    /// joint.
     #[inline(never)]
     fn bound_brakes(&mut self, nodes: &Nodes, config: &Config) {
         for (j, torque) in self.torque.iter_mut().enumerate() {
@@ -498,15 +504,15 @@ impl ControlLaw {
     }
 }
 
-/// Ends all yields in place. Assigning an array of `None` would create and copy the array, including the space for unused values.
+/// Ends all yields in place. An assignment of an array of `None` would create and copy the array, including the space for unused values.
 fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
     for yields in yields {
         *yields = None;
     }
 }
 
-/// Returns the torques that compensate friction at the commanded velocities, N·m, and joint errors for velocities that are outside the
-/// friction table (J-42).
+/// Returns the torques that compensate friction at the commanded velocities, N·m, and the joint errors for velocities outside the friction
+/// table (J-42).
 #[inline]
 pub(super) fn compensation(
     inputs: &LawInputs<'_>,

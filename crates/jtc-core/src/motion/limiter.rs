@@ -1,57 +1,59 @@
-//! Applies the limits of the control law to each joint in each tick (J-43).
+//! Application of the limits of the control law to each joint in each tick (J-43).
 use super::law::{ControlLaw, ControlMode, LawInputs};
 use super::set_values::SetValues;
 use crate::bit_codec::bit_codec;
 use crate::config::limits::{self, Recent, Saturation, Turns};
 use crate::{JOINTS, joint_error};
 
-/// Speed in rad/s above which a saturated torque along the motion is not considered part of a catch.
+/// Speed, rad/s, above which a torque at the limit in the direction of the motion is not considered part of a catch.
 pub(super) const DRIVEN: f64 = 0.05;
-/// Share of the set velocity of a joint that comes to rest after Teaching. If the joint is slower, an obstacle is assumed to stop it.
+/// Lowest speed of a joint that comes to rest after Teaching, as a share of its set velocity. If a joint is slower, the controller assumes
+/// that an obstacle stops it.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit at and above which the feedback torque may be twice as high, because friction and inertia of the model may
-/// be wrong. If a fast motion meets an obstacle, its torque exceeds the doubled share a few milliseconds later.
+/// Share of the velocity limit at and above which the feedback torque may be twice as high, because the model may have wrong friction and
+/// inertia. If a fast joint hits an obstacle, its feedback torque exceeds the doubled share a few milliseconds later.
 const FAST: f64 = 0.2;
-/// Highest number of ticks, among the last 100, in which the feedback torque of a joint may exceed its share. After more ticks, the joint
-/// is considered pushed (J-66).
+/// Highest number of ticks, among the last 100, in which the feedback torque of a joint may exceed its permitted share. After more ticks,
+/// the joint counts as pushed (J-66).
 const PUSHED_MS: u16 = 20;
-/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit, and distance that this excess has added, rad. A
-/// joint that exceeds both limits is considered pushed, even with weak gains. With weak gains, a light joint reaches its over-speed before
-/// the feedback torque shows the push.
+/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit. The second constant is the distance that this
+/// excess has added, rad. A joint that exceeds both limits counts as pushed, even with weak gains. With weak gains, a joint with little
+/// inertia exceeds its speed limit before the feedback torque shows the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
-/// Counters of each joint for ticks with torque at the limit, and for ticks with feedback torque above the share.
+/// State of the limiter: for each joint, the ticks with a torque at the limit, the ticks with too much feedback torque, and the changes of
+/// the torque from limit to limit.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
     pushed: [Recent; JOINTS],
     turns: [Turns; JOINTS],
-    /// Number of ticks of this limiter. The number restarts at 0 when the torque is turned off.
+    /// Number of ticks that the limiter has executed. The number starts again at 0 when the controller switches the torque off.
     tick: u32,
 }
 
 bit_codec!(Limiter { saturation, pushed, turns, tick });
 
-/// Findings of a tick for one joint.
+/// Findings of the limiter in a tick for one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Found {
-    /// Set values that exceed their limits, as joint errors. The torque bit is set if the torque is NaN.
+    /// Joint errors for the set values that exceed their limits. The torque bit is set if the computed torque is NaN.
     pub errors: u16,
-    /// The computed torque was above its limit for too long (J-43).
+    /// `true` if the computed torque was above its limit for too long (J-43).
     pub overloaded: bool,
-    /// The feedback torque was above its share for too long, and the joint had settled before.
+    /// `true` if the feedback torque was above its permitted share for too long, and the joint had settled before.
     pub pushed: bool,
-    /// The feedback torque is above its share.
+    /// `true` if the feedback torque is above its permitted share.
     pub strained: bool,
-    /// The joint has settled since it was enabled.
+    /// `true` if the joint has settled since it was enabled.
     pub settled: bool,
-    /// The position controller is unstable, because the torque jumps from limit to limit or a swing grows.
+    /// `true` if the position controller is unstable: the torque jumps from limit to limit, or a swing grows.
     pub unstable: bool,
 }
 
 impl Found {
-    /// Returns `true` if a reaction is needed.
+    /// Returns `true` if the controller must react to the findings.
     pub(crate) fn is_any(&self) -> bool {
         (self.errors != 0) | self.overloaded | self.pushed | self.unstable
     }
@@ -62,19 +64,19 @@ impl Found {
 pub(crate) struct Limited {
     /// Torque to command, N·m.
     pub torque: [f64; JOINTS],
-    /// Findings of this tick. `None` if no reaction is needed.
+    /// Findings of this tick for each joint. `None` if no joint needs a reaction.
     pub found: Option<[Found; JOINTS]>,
     /// Sag of the set positions of joints whose loads are being caught, rad. `None` if no set position has sagged.
     pub sag: Option<[f64; JOINTS]>,
 }
 
 impl Limiter {
-    /// Returns `true` for each joint whose last torque was above the limit. The integral of such a joint does not change (J-41).
+    /// Returns `true` for each joint whose last computed torque was above its limit. The integral of such a joint does not change (J-41).
     pub(super) fn saturated(&self) -> [bool; JOINTS] {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
-    /// Clears the counters of a joint.
+    /// Clears the counters of a joint in the limiter.
     #[inline(always)]
     pub(super) fn forget(&mut self, joint: usize) {
         self.saturation[joint].forget();
@@ -82,14 +84,15 @@ impl Limiter {
         self.turns[joint] = Turns::default();
     }
 
-    /// Clears the record of earlier changes from limit to limit.
+    /// Clears the record of the changes of each torque from one limit to the other.
     pub(super) fn forget_turns(&mut self) {
         self.turns = Default::default();
     }
 
-    /// Runs one tick, which limits the torque of the `law` and checks the torque and the set values. While the arm brakes with all
-    /// available torque, an overload is not reported. If a motion is also commanded, position error and acceleration are not reported
-    /// either (J-33). For a joint that yields, only a torque of NaN is reported, because the torque is bounded by construction.
+    /// Executes one tick of the limiter, which limits the torque of the `law` and checks the torque and the set values. While the arm
+    /// brakes with all available torque, the limiter does not report an overload. If a motion is also commanded, the limiter does not
+    /// report position error and acceleration either (J-33). For a joint that yields, the limiter reports only a torque of NaN, or a torque
+    /// that jumps from limit to limit. No other report is needed, because the torque of such a joint is bounded by construction.
     pub(super) fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -99,11 +102,12 @@ impl Limiter {
         limited: &mut Limited,
     ) {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        // The exceptions apply only while set values move, because an arm at rest yields to a push (J-66).
+        // The exceptions for braking apply only while the set values move, because an arm at rest yields to a push (J-66).
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
         } else if held_back || mode == ControlMode::Rest {
-            // If path time slows down, this adds an acceleration to the set values. An arm that a hand has led may have any acceleration.
+            // A change of the rate of path time adds an acceleration to the set values. An arm that a hand has moved may have any
+            // acceleration.
             joint_error::ACCELERATION
         } else {
             0
@@ -125,7 +129,7 @@ impl Limiter {
             if parameters.on_trial && stands {
                 unstable |= set.catch[j].watch(v[j]);
             }
-            // A torque that accelerates a joint instead of stopping it does not belong to a catch or a deceleration.
+            // A torque that accelerates a joint instead of stopping the joint does not belong to a catch or a deceleration.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
             let excuses = braking || stopping || yields;
@@ -136,12 +140,13 @@ impl Limiter {
             }
             let settled = set.catch[j].settled();
             let (feedback, share) = (law.feedback(j), config.yield_torque_share * limits.torque_max);
-            // A fast motion may use more feedback torque.
+            // A fast joint may use more feedback torque.
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // Feedback torque that brakes a moving joint does not count as a push. Feedback torque on a joint at rest counts as a push.
             let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            // If an arm hits a person after hand guiding, before the arm is at rest, the joint lags its set values.
+            // After hand guiding, the arm may hit a person before it is at rest. The joint that has hit the person then lags its set
+            // values.
             let lags = || {
                 let set = set.point.velocity[j];
                 mode == ControlMode::Rest && feedback * set > 0.0 && v[j] * set.signum() < LAGS * set.abs()
@@ -153,7 +158,7 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // The distance is checked first, because the distance rarely exceeds its limit.
+            // The distance is checked first, because the distance exceeds its limit only rarely.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);

@@ -1,31 +1,31 @@
-//! Load that a joint carries and that the model does not contain. The controller learns the load from the integral of the position
-//! controller.
+//! Unmodelled load: a load that a joint must hold and that the model does not contain. The controller learns this load from the integral of
+//! the position controller.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::limits::JointConfig;
 
-/// Number of ticks between two observations of the same joint. Each tick observes a single joint.
+/// Number of ticks between two observations of the load of the same joint. Each tick observes a single joint.
 const PERIOD: f64 = crate::JOINTS as f64;
-/// Time constant of the low-pass filter, s.
+/// Time constant of the low-pass filter of the load, s.
 const TIME_S: f64 = 1.0;
 /// Highest load of a joint, as a share of the torque limit.
 const HIGHEST: f64 = 0.3;
-/// Difference of integral and load, as a share of the torque limit. A larger difference is attributed to a contact, and the load does not
-/// change.
+/// Difference between integral and load, as a share of the torque limit, up to which the load follows the integral. The controller
+/// attributes a larger difference to a contact, and does not change the load.
 const APART: f64 = 0.1;
 /// Largest change of the integral, as a share of the torque limit, at which the joint is still considered held steadily.
 const STEADY: f64 = 0.03;
-/// Time of steady holding after which the integral is considered the load, s.
+/// Time of steady holding after which the controller takes the integral as the load, s.
 const STEADY_S: f64 = 10.0;
 
-/// The load of a joint.
+/// Learned load of a joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Load {
-    /// Torque of the load, N·m. Single precision, because the flight recorder stores it.
+    /// Torque of the load, N·m. The torque has single precision, because the flight recorder stores it.
     torque: f32,
-    /// The joint has settled since it was enabled, or since its load was cleared.
+    /// `true` if the joint has settled since it was enabled, or since its load was cleared.
     known: bool,
-    /// Integral at the beginning of steady holding, N·m, and number of observations since that time.
+    /// Integral at the beginning of steady holding, N·m. The next field is the number of observations since that time.
     steady: f32,
     observations: u16,
 }
@@ -33,22 +33,22 @@ pub(crate) struct Load {
 bit_codec!(Load { torque, known, steady, observations });
 
 impl Load {
-    /// Clears the load, so that the joint must find the load again.
+    /// Clears the load, so that the controller must learn the load again.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Returns the load, N·m. Before the load is known, returns the torque of the `integral` (N·m).
+    /// Returns the torque of the load, N·m. Before the load is known, returns the torque of the `integral` (N·m).
     pub(crate) fn torque(&self, integral: f64) -> f64 {
         if self.known { self.torque.into() } else { integral }
     }
 
-    /// Returns the load, N·m. Returns zero before the load is known.
+    /// Returns the torque of the load, N·m. Returns zero before the load is known.
     pub(crate) fn known_torque(&self) -> f64 {
         self.torque.into()
     }
 
-    /// Returns the part of a torque (N·m) that is accepted as a load without observation.
+    /// Returns a torque (N·m), clipped to the range that is accepted as a load without observation.
     pub(crate) fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
@@ -59,13 +59,13 @@ impl Load {
         self.known
     }
 
-    /// Sets the load to the torque (N·m) that was found while the joint lowered the load.
+    /// Sets the load to the torque (N·m) that the controller has learned while the joint lowered the load.
     pub(crate) fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };
     }
 
-    /// Observes the torque of the `integral` (N·m). `settled` means that the joint has settled since it was enabled. Call this once in
-    /// [`PERIOD`] ticks.
+    /// Observes the torque of the `integral` (N·m) of a joint. `settled` is `true` if the joint has settled since it was enabled. Call this
+    /// function once in [`PERIOD`] ticks for each joint.
     pub(crate) fn observe(&mut self, integral: f64, settled: bool, limits: &JointConfig) {
         if !settled {
             self.forget();
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// Returns a joint with a torque limit of 180 N·m.
+    /// Returns the limits of a joint with a torque limit of 180 N·m.
     fn limits() -> JointConfig {
         Config::avena().joints[1]
     }
@@ -120,12 +120,12 @@ mod tests {
     fn j66_the_load_follows_the_integral_within_a_second_and_no_contact() {
         let mut load = Load::default();
         observe(&mut load, 10.0, 0.1);
-        // If the difference is within a tenth of the limit, the load reaches 63 % of the difference in a second.
+        // If integral and load differ by at most a tenth of the torque limit, the load changes by 63 % of this difference in a second.
         observe(&mut load, 20.0, 1.0);
         assert!((load.torque(0.0) - 16.3).abs() < 0.1, "{}", load.torque(0.0));
         observe(&mut load, 16.3, 5.0);
         let known = load.torque(0.0);
-        // A larger difference is considered a contact until the difference has been steady for ten seconds.
+        // A larger difference between integral and load counts as a contact until the integral has been steady for ten seconds.
         observe(&mut load, 40.0, 9.9);
         assert_eq!(load.torque(0.0), known);
         observe(&mut load, 40.0, 0.2);
@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// A load that was lowered may be above the bound. The lowered load does not jump back to the bound.
+    /// A load that a joint has lowered may be above the bound for a load. A lowered load above the bound does not jump back to the bound.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();

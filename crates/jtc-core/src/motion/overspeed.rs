@@ -1,10 +1,10 @@
-//! Detects the measured over-speed of a joint with torque (J-35), which checks of commanded values cannot detect.
+//! Detection of over-speed in the measured speed of a joint with torque (J-35). Checks of commanded values cannot detect this over-speed.
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::{JOINTS, joint_error};
 
-/// Time for which the speed of each joint has been above its threshold.
+/// Time for which the speed of each joint has been above its over-speed threshold.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct OverSpeed {
     /// Number of consecutive measurements above the threshold for each joint.
@@ -15,10 +15,12 @@ bit_codec!(OverSpeed { ticks });
 
 impl OverSpeed {
     /// Returns the joint errors of this tick. A joint has an error if its measured speed has been above [`Config::overspeed_factor`] times
-    /// its limit for [`Config::overspeed_ms`]. Only measurements that came in this tick are evaluated, so a missing or unusable answer does
-    /// not change the time. Joints that are not enabled are ignored, because these joints have no torque that could be removed.
+    /// its velocity limit for [`Config::overspeed_ms`]. The function uses only measurements that arrived in this tick, so a missing or
+    /// unusable answer does not change the time. The function ignores joints that are not enabled, because these joints have no torque that
+    /// could be switched off.
     pub(crate) fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
-        // Uses the velocity in the answer of the joint, not a predicted velocity. NaN counts as above the threshold.
+        // The function uses the velocity in the answer of the joint, not a predicted velocity. A velocity of NaN counts as above the
+        // threshold.
         let within = |j: usize| {
             let threshold = config.overspeed_factor * config.joints[j].velocity_max;
             nodes.node(j).report.velocity.abs() <= threshold
@@ -50,7 +52,7 @@ impl OverSpeed {
 mod tests {
     use super::*;
 
-    /// Returns `true` if every joint has an error after this number of measurements at this multiple of its threshold.
+    /// Returns `true` if every joint has an error after this number of measurements at `times` times its threshold.
     fn found(measurements: u16, times: f64, config: &Config) -> bool {
         let threshold = config.joints.map(|joint| config.overspeed_factor * joint.velocity_max);
         let nodes = Nodes::enabled_at([0.0; JOINTS], threshold.map(|threshold| times * threshold));
@@ -78,7 +80,7 @@ mod tests {
         }
     }
 
-    /// If the allowed time is zero, an over-speed is an error at once, but a slow joint has no error.
+    /// If the allowed time is zero, an over-speed is an error in the first tick. A slow joint still has no error.
     #[test]
     fn j35_no_time_at_all_is_a_setting_too() {
         let config = Config { overspeed_ms: 0, ..Config::avena() };

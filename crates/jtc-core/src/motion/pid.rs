@@ -8,7 +8,7 @@ const WINDOW: usize = 5;
 /// Inverse of the length of the derivative window, 1/s.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
-/// Position error at rest, in encoder steps, above which the integral acts again. A joint that slips settles within this distance.
+/// Position error at rest, in encoder steps, above which the integral acts again. A joint that slips comes to rest within this distance.
 const RELEASE_STEPS: f64 = 4.0;
 /// Rounding error of the positions on the bus, in encoder steps.
 const ROUNDING: f64 = 0.01;
@@ -16,15 +16,15 @@ const ROUNDING: f64 = 0.01;
 /// State of the PID controller.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pid {
-    /// Integral of the error, rad·s.
+    /// Integral of the position error, rad·s.
     integral: f64,
-    /// The last errors, rad, oldest first.
+    /// Last position errors, rad, oldest first.
     errors: [f64; WINDOW],
-    /// The joint is at rest and close to its commanded position, so the integral does not change.
+    /// `true` if the joint is at rest and close to its commanded position, so that the integral does not change.
     settled: bool,
 }
 
-/// Three parts of the torque, N·m.
+/// Parts of the torque of the PID controller, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PidTorque {
     /// Torque of the position error, Kp·e.
@@ -39,20 +39,22 @@ bit_codec!(Pid { integral, errors, settled });
 bit_codec!(PidTorque { p, i, d });
 
 impl PidTorque {
-    /// Returns the sum, N·m.
+    /// Returns the sum of the three parts, N·m.
     pub(crate) fn sum(&self) -> f64 {
         self.p + self.i + self.d
     }
 }
 
 impl Pid {
-    /// Resets the state. `error` (rad) is assumed to have been constant until now, so that the derivative starts at 0.
+    /// Resets the state of the PID controller. The function assumes that `error` (rad) was constant until now, so the derivative starts at
+    /// 0.
     pub(crate) fn reset(&mut self, error: f64) {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// Resets the state like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. The result is a bumpless
-    /// transfer from a state that had found this torque. If the integral has no gain or reaches its bounds, it contains less torque.
+    /// Resets the state like [`reset`](Self::reset) with an error of 0, and sets the integral to `torque` (N·m). The transfer from an
+    /// earlier state with this torque is then bumpless. If the integral gain is zero or the integral reaches its bounds, the integral
+    /// contains less torque.
     pub(crate) fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);
@@ -70,12 +72,13 @@ impl Pid {
         self.errors = self.errors.map(|error| error + way);
     }
 
-    /// Runs one tick with the position error (rad). `saturated` means that the torque is at its limit, so the integral does not change.
-    /// `encoder_step` (rad) is the resolution of the encoder if the joint is commanded at rest, and `None` in motion.
+    /// Executes one tick with the position error (rad). `saturated` is `true` if the torque is at its limit, so that the integral does not
+    /// change. `encoder_step` (rad) is the resolution of the encoder if the joint is commanded to be at rest. In motion, `encoder_step` is
+    /// `None`.
     ///
-    /// At rest, the integral stops changing when the error is within one step, until the error exceeds [`RELEASE_STEPS`]. If the integral
-    /// changed below the encoder resolution, a joint with stiction would break away again and again (hunting). If the integral restarted at
-    /// each change of the last bit, hunting would occur as well.
+    /// At rest, the integral stops changing when the error is within one encoder step. The integral changes again when the error exceeds
+    /// [`RELEASE_STEPS`]. If the integral changed below the encoder resolution, a joint with stiction would break away again and again
+    /// (hunting). Hunting would also occur if the integral restarted at each change of the last bit of the encoder.
     pub(crate) fn step(
         &mut self,
         gains: &PidGains,
@@ -118,12 +121,13 @@ mod tests {
         pid.reset(0.0);
         let slope = 0.3;
         let mut d = 0.0;
-        // The test runs more ticks than the window contains, because errors older than five ticks have no effect.
+        // The test executes more ticks than the window contains, because errors older than five ticks must have no effect.
         for k in 1..=12 {
             d = pid.step(&GAINS, slope * f64::from(k) * DT, false, None).d;
         }
         assert!((d - GAINS.kd * slope).abs() < 1e-12);
-        // The effect of a step is spread over five ticks. In each of the five ticks, the torque is at most Kd·step/(5 ms).
+        // The effect of a step of the error on the derivative is spread over five ticks. In each of the five ticks, the torque is at most
+        // Kd·step/(5 ms).
         pid.reset(0.0);
         let first = pid.step(&GAINS, 0.01, false, None).d;
         assert!((first - GAINS.kd * 0.01 / 0.005).abs() < 1e-12);
@@ -151,7 +155,8 @@ mod tests {
             }
             pid.integral - before
         };
-        // In motion, every error changes the integral. At rest, only errors above the encoder resolution change the integral.
+        // In motion, every error changes the integral. At rest, an error within one encoder step does not change the integral. After the
+        // joint has settled, an error of up to four steps does not change the integral either.
         assert!(run(&mut pid, 0.5, false) > 0.0);
         assert!(run(&mut pid, 2.0, true) > 0.0);
         assert_eq!(run(&mut pid, 1.0, true), 0.0);
@@ -191,7 +196,7 @@ mod tests {
         assert_eq!((taken(GAINS, 24.0), taken(GAINS, -24.0)), (10.0 * 0.003, 10.0 * -0.002));
         let none = PidGains { ki: 0.0, ..wide };
         assert_eq!((taken(none, 24.0), taken(none, 0.0)), (0.0, 0.0));
-        // Later gains do not hold any torque either.
+        // After a transfer to gains without an integral, gains that are set later hold no torque either.
         for torque in [24.0, -24.0, 0.0] {
             let mut pid = Pid::default();
             pid.take_over(&none, torque);
@@ -199,7 +204,8 @@ mod tests {
         }
     }
 
-    /// Other gains hold the same torque, as far as the integral bounds allow it. The derivative is not affected.
+    /// After a change of the gains, the integral holds the same torque, as far as the integral bounds allow this. The change of the gains
+    /// does not affect the derivative.
     #[test]
     fn j71_the_integral_keeps_its_torque_under_other_gains() {
         let mut pid = Pid::default();
@@ -229,7 +235,7 @@ mod tests {
         assert_eq!(PidTorque { p: 1.0, i: 2.0, d: 4.0 }.sum(), 7.0);
     }
 
-    /// A position that the bus has rounded by a hundredth of a step is still within the step.
+    /// A position error of one encoder step still counts as one step if the bus has rounded the position by a hundredth of a step.
     #[test]
     fn j41_a_step_is_a_step_after_rounding() {
         const STEP: f64 = 1e-4;

@@ -1,4 +1,4 @@
-//! Computes the bounds of a ramp of path time (J-33): the slopes at which the arm stays within its acceleration and torque limits.
+//! Bounds of a ramp of path time (J-33): the slopes at which the arm stays within its acceleration and torque limits.
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
@@ -10,20 +10,20 @@ use crate::nodes::Nodes;
 use crate::trajectory::path::{Bounds, PathClock, SlopeBounds};
 use crate::{DT, JOINTS};
 
-/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use. The remainder is for changes within a tick and
-/// for the position controller.
+/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use. The remainder of each limit is for changes within
+/// a tick and for the position controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Share of the remaining torque that a stop may use after a hand has led the arm. The position controller causes this torque, and the
-/// torque overshoots.
+/// Share of the remaining torque that a stop may use after a hand has moved the arm. The position controller must produce this torque, and
+/// its torque overshoots.
 const STOP_TORQUE: f64 = 0.5;
-/// Least share of the torque limit that a stop uses, even if hardly any torque remains.
+/// Least share of the torque limit that a stop may use, even if the holding torque leaves hardly any torque.
 const LEAST_LEFT: f64 = 0.1;
 
 /// Inertia of the arm at the start of a ramp.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRamp {
-    /// Mass matrix, including the rotors.
+    /// Mass matrix of the arm, including the rotors.
     inertia: [[f64; JOINTS]; JOINTS],
 }
 
@@ -38,12 +38,12 @@ impl PathRamp {
         }
     }
 
-    /// Returns the inertia that each joint moved at the start of the ramp while the other joints were held, kg·m².
+    /// Returns the inertia of each joint at the start of the ramp, for a motion of this joint alone, kg·m².
     pub(crate) fn inertia(&self) -> [f64; JOINTS] {
         core::array::from_fn(|j| self.inertia[j][j])
     }
 
-    /// Returns the inertia that joint `j` feels when joint `k` accelerates, kg·m².
+    /// Returns the coupling inertia between joint `j` and an accelerating joint `k`, kg·m².
     pub(crate) fn coupling(&self, j: usize, k: usize) -> f64 {
         self.inertia[j][k]
     }
@@ -60,15 +60,15 @@ impl PathRamp {
         for j in 0..JOINTS {
             let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
             let (limit, held) = (config.joints[j].torque_max, law.torque[j].model + law.torque[j].load);
-            // The holding torque helps to stop the joint, or reduces the torque that could stop it.
+            // The holding torque either helps to stop the joint, or reduces the torque that is available for the stop.
             let left = (STOP_TORQUE * (limit + held * momentum.signum())).max(LEAST_LEFT * limit);
             longest = longest.max(STEEPEST_LED * momentum.abs() / (left * DT));
         }
         longest
     }
 
-    /// Runs one tick of a clock that changes to another rate, along a ramp that the arm can follow. `slope_bounds` describes `at` and
-    /// `law`.
+    /// Executes one tick of a clock that changes to another rate, along a ramp that the arm can follow. `at` and `law` are the arguments of
+    /// `slope_bounds`.
     pub(crate) fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {
             clock.slope = 0.0;
@@ -83,14 +83,14 @@ impl PathRamp {
         }
     }
 
-    /// Runs one tick of a clock that is held back because joints are at their torque limits (J-75).
+    /// Executes one tick of a clock that is held back because joints are at their torque limits (J-75).
     pub(crate) fn hold_back(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         clock.hold_back(self.slope_bounds(at, law, clock.rate, clock.slope, config).full);
     }
 
     /// Returns the slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The remaining torque of
-    /// each joint is computed from the last torque of the `law`, including all parts, so less torque remains for a joint that already lags.
-    /// Joints that yield do not move along the path, and the rate of path time does not change the torque of these joints.
+    /// each joint is computed from the last torque of the `law` with all its parts. A joint that already lags therefore has less remaining
+    /// torque. Joints that yield do not move along the path, so the rate of path time does not change their torque.
     fn slope_bounds(
         &self,
         at: &SetPoint,
@@ -116,7 +116,7 @@ impl PathRamp {
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
-            // A change of path time does not relieve a joint that does not move along the path.
+            // If a joint does not move along the path, a change of path time does not reduce its torque.
             narrow(
                 &mut full,
                 if moves(at.velocity[j]) { (low, high) } else { (low.min(0.0), high.max(0.0)) },
@@ -126,7 +126,7 @@ impl PathRamp {
     }
 }
 
-/// Returns slopes with |`offset` + `factor`·slope| ≤ `limit`.
+/// Returns the range of slopes with |`offset` + `factor`·slope| ≤ `limit`.
 fn within(offset: f64, factor: f64, limit: f64) -> Bounds {
     if factor.abs() <= 1e-9 {
         return (f64::NEG_INFINITY, f64::INFINITY);
@@ -158,7 +158,7 @@ mod tests {
 
     proptest! {
         /// A slope within the bounds keeps the acceleration and torque limits. A slope outside the bounds violates a limit. A joint at rest
-        /// that exceeds a limit does not prevent path time from continuing at its present rate.
+        /// that exceeds a limit does not prevent path time from keeping its present rate.
         #[test]
         fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
             velocity in velocities(),

@@ -1,6 +1,6 @@
-//! Computes the torque margin for a motion from the held position. This margin determines how soon the arm can reach the first point of a
-//! path (J-34), and the acceleration and speed of a jog (J-58). Gravity and the found load are taken into account at both ends of the
-//! motion. Friction is taken into account at the top speed.
+//! Computation of the torque that remains for a motion from the held position. The remaining torque determines how soon the arm can reach
+//! the first point of a path (J-34), and the acceleration and speed of a jog (J-58). The computation includes gravity and the learned load
+//! at both ends of the motion. The computation also includes friction at the top speed of the motion.
 use jtc_dynamics::sqrt;
 
 use super::Motion;
@@ -8,13 +8,13 @@ use super::law::{LawInputs, compensation};
 use crate::JOINTS;
 use crate::motion::jog;
 
-/// Highest share of a torque limit that an approach uses. The feedback of a fast approach needs up to a fifth of the limit.
+/// Highest share of a torque limit that an approach uses. The feedback torque of a fast approach needs up to a fifth of the torque limit.
 const APPROACH_TORQUE: f64 = 0.8;
-/// Highest share of a torque limit that a jog uses. The remaining share is for the feedback, and for the return from a position with a
-/// higher holding torque.
+/// Highest share of a torque limit that a jog uses. The remaining share is for the feedback torque, and for the return from a position with
+/// a higher holding torque.
 const JOG_TORQUE: f64 = 0.92;
-/// Share of the remaining torque that a jog uses. An approach uses this share if holding the arm already needs nearly the whole torque
-/// limit.
+/// Share of the remaining torque that a jog may use. An approach uses this share if the holding torque is so high that the share allows
+/// more torque than [`APPROACH_TORQUE`].
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
@@ -22,34 +22,35 @@ const LONGER_MS: f64 = 2_000.0;
 const TOP_SPEED: f64 = 1.875;
 const TOP_ACCELERATION: f64 = 5.774;
 
-/// Time in which a jogged joint can come to rest with its share of the remaining torque, s.
+/// Time within which a jogged joint can come to rest with its share of the remaining torque, s.
 const REST_S: f64 = 0.3;
-/// Speed of a slow jog, rad/s. If friction leaves no torque at the requested speed, some torque may remain at this speed.
+/// Speed of a slow jog, rad/s. If friction leaves no torque for the requested speed, the remaining torque may still be sufficient for this
+/// slow speed.
 const CREEP: f64 = 0.02;
-/// Speed at and above which a joint slides and the full friction of the model acts, rad/s.
+/// Speed of a joint, rad/s, at and above which the full friction of the model acts.
 const SLIDES: f64 = 0.1;
-/// Highest speed that is considered zero, rad/s.
+/// Highest speed that counts as zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
-/// Least share of a torque limit that is assumed to remain for a motion that unloads the joint.
+/// Least share of the torque limit that the controller assumes to remain for a motion that reduces the load of the joint.
 const UNLOADING: f64 = 0.01;
-/// Least share of the tool speed limit that remains for joints that become faster, so that the jog continues.
+/// Least share of the tool speed limit that remains for joints that become faster, because the jog must be able to continue.
 const LEAST_ROOM: f64 = 0.005;
-/// Least share of a jog's acceleration.
+/// Least share of a jog's highest acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
 
 /// Limits of a jog that follow from the remaining torque.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JogRoom {
-    /// Velocities, rad/s, which are the requested velocities or a share of the requested velocities.
+    /// Velocities of the jog, rad/s: the requested velocities, or a share of these velocities.
     pub velocity: [f64; JOINTS],
-    /// Highest accelerations, rad/s².
+    /// Highest accelerations of the jog, rad/s².
     pub acceleration: [f64; JOINTS],
 }
 
 impl Motion {
-    /// Returns the time for the approach from the held position to `to` (rad), ms. The approach takes the time of a ramp, or longer if the
-    /// velocity, acceleration or torque limits require more time. Returns `None` if the torque limits require over 2 s more than the other
-    /// limits. Uses the inertia of a ramp that begins at the held position.
+    /// Returns the time for the approach from the held position to `to` (rad), ms. The approach takes the time of a ramp. The approach
+    /// takes longer if the velocity, acceleration or torque limits require more time. Returns `None` if the torque limits require over 2 s
+    /// more than the other limits. The function uses the inertia of a ramp that begins at the held position.
     pub(crate) fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
         let config = inputs.config;
         let from = &self.set.point.position;
@@ -89,7 +90,8 @@ impl Motion {
     }
 
     /// Returns the velocities and accelerations that the limits of torque and tool speed allow for a jog at the `wanted` velocities
-    /// (rad/s). Returns `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins at the held position.
+    /// (rad/s). Returns `None` if a torque limit allows no motion. The function uses the inertia of a ramp that begins at the held
+    /// position.
     pub(crate) fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
         let wanted = &if config.tool_speed_max > 0.0 { self.slowed(wanted, inputs) } else { *wanted };
@@ -117,8 +119,8 @@ impl Motion {
     }
 
     /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The absolute contributions of all joints to the flange
-    /// speed are added, because joints whose motions cancel out may accelerate differently. Joints that become faster share the flange
-    /// speed that remains. The other joints become slower or keep their speed.
+    /// speed are added, because joints whose contributions cancel out may accelerate differently. Joints that become faster share the
+    /// flange speed that remains. Joints that do not become faster become slower or keep their present speed.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // Distance of the flange from the axis of each joint, m.
@@ -136,8 +138,8 @@ impl Motion {
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
             v.abs().max(after.abs())
         });
-        // The present speed of joints that must not become faster is subtracted. If less speed remains for the other joints, more joints
-        // may belong to this group.
+        // The present speed of the joints that must not become faster is subtracted first. If less speed remains for the other joints, the
+        // function may find more joints that must not become faster.
         let mut rising = share;
         for _ in 0..JOINTS {
             let (mut slower, mut faster) = (0.0, 0.0);
@@ -165,8 +167,8 @@ impl Motion {
         self.least_share(wanted, needed, inputs)
     }
 
-    /// Returns the share (0..1) of the torque `needed` by each joint (N·m) that is available. The available torque is the share
-    /// [`SHARE_OF_REST`] of the torque that remains during a jog at `velocity` (rad/s).
+    /// Returns the share (0..1) of the torque `needed` by the joints (N·m) that is available for every joint. The available torque is the
+    /// share [`SHARE_OF_REST`] of the torque that remains during a jog at `velocity` (rad/s).
     fn least_share(
         &self,
         velocity: &[f64; JOINTS],
@@ -180,13 +182,13 @@ impl Motion {
         })
     }
 
-    /// Returns the torque that remains within each torque limit during a jog at `velocity` (rad/s), N·m. The present position and the
-    /// position at the end of the jog are both taken into account. Friction is subtracted for both directions, because a joint that was
-    /// lowered must be raised again.
+    /// Returns the torque of each joint that remains within its limit during a jog at `velocity` (rad/s), N·m. The function considers the
+    /// present position and the position at the end of the jog. The function subtracts friction for both directions, because a joint that
+    /// was lowered must be raised again.
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
-        // The jog continues as long as a command lasts, and then comes to rest.
+        // The jog continues until a command expires, and then comes to rest.
         let ahead_s = f64::from(jog::LASTS_MS) / 1_000.0 + 0.5 * REST_S;
         let rest = core::array::from_fn(|j| {
             let (low, high) = config.position_range(j);
@@ -200,7 +202,7 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that moves towards a lower holding torque may move as long as any torque is available.
+            // A joint that moves towards a lower holding torque may move if any torque is available.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;
@@ -208,8 +210,8 @@ impl Motion {
         })
     }
 
-    /// Returns the torques that hold the arm at `q` (rad). Each torque is gravity plus the found load, or gravity plus the integral if this
-    /// sum is larger. While the integrals release the torque of a payload that is now in the model, returns gravity alone.
+    /// Returns the torques that hold the arm at `q` (rad). Each torque is gravity plus the learned load, or gravity plus the integral if
+    /// this sum is larger. While the integrals release the torque of a payload that is now part of the model, returns gravity alone.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {
@@ -223,7 +225,7 @@ impl Motion {
     }
 }
 
-/// Returns the highest torque of a joint at the two ends of a motion, N·m.
+/// Returns the highest of the torques at the two ends of a motion for a joint, N·m.
 fn highest(torques: &[[f64; JOINTS]; 2], j: usize) -> f64 {
     torques.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()))
 }

@@ -15,30 +15,30 @@ use crate::{DT, JOINTS};
 /// Operate, [`approach`](Self::approach) and [`follow`](Self::follow) step the motion.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SetValues {
-    /// Set values of this tick.
+    /// Set values of the present tick.
     pub point: SetPoint,
     /// Set values of the last ticks (J-62).
     pub commanded: Commanded,
-    /// The joint is enabled and its set position is latched.
+    /// `true` if the joint is enabled and its set position is latched.
     pub(super) holding: [bool; JOINTS],
-    /// The joint is marked as absent (J-53), so the controller does not need to hold it.
+    /// `true` if the joint is marked as absent (J-53), so that the controller need not hold the joint.
     absent: [bool; JOINTS],
     /// Joints whose set values have been restarted from the measured motion since the last tick.
     found_moving: [bool; JOINTS],
-    /// Joints whose load is being caught.
+    /// State of the catch of each joint.
     pub(super) catch: [Catch; JOINTS],
-    /// Joints that decelerate to rest.
+    /// Deceleration of each joint that comes to rest.
     pub(super) deceleration: [Option<Deceleration>; JOINTS],
-    /// The joints decelerate after a hand has led the arm.
+    /// `true` if the joints decelerate after a hand has moved the arm.
     led: bool,
-    /// The arm is jogged (J-58).
+    /// State of the present jog (J-58).
     jog: Option<Jog>,
 }
 
 bit_codec!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
 
 impl SetValues {
-    /// Releases all joints. No joint is held, and the set position equals the measured position.
+    /// Releases all joints, because the torque is off. No joint is then held, and the set position is equal to the measured position.
     pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog } = self;
         *point = SetPoint::still(*nodes.positions());
@@ -54,27 +54,27 @@ impl SetValues {
     pub(crate) fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
         self.commanded.rest(position);
-        // J-63: the restart of the set values does not stop a joint, in particular a joint that had not followed its set values.
+        // J-63: the restart of the set values does not stop a joint, even if the joint did not follow its set values.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
         self.led = false;
         self.jog = None;
     }
 
-    /// Sets the set position to the measured position while a hand leads the arm.
+    /// Sets the set position to the measured position while a hand moves the arm.
     pub(crate) fn follow_measured(&mut self, nodes: &Nodes) {
         self.point = SetPoint::still(*nodes.positions());
         self.commanded.rest(nodes.positions());
     }
 
-    /// Begins the next tick. Returns the joints whose set values were restarted in the last tick. The restart did not change the motion of
-    /// these joints, because the new set values began with the measured motion.
+    /// Begins the next tick of the set values. Returns the joints whose set values were restarted in the last tick. The restart did not
+    /// change the motion of these joints, because the new set values began with the measured motion.
     pub(crate) fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
         core::mem::take(&mut self.found_moving)
     }
 
-    /// Returns the commanded positions (rad) for the time of the measurement of this tick (J-62).
+    /// Returns the set positions (rad) for the time of the measurement of this tick (J-62).
     pub(crate) fn due(&self, config: &Config) -> &[f64; JOINTS] {
         self.commanded.position(config.delay_ticks)
     }
@@ -90,7 +90,7 @@ impl SetValues {
         self.jog.as_mut().is_some_and(Jog::ends)
     }
 
-    /// Runs one tick of a jog. `ramp` advances the clock of the jog for the commanded set values.
+    /// Executes one tick of a jog. `ramp` advances the clock of the jog for the commanded set values.
     pub(crate) fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
         let Some(jog) = &mut self.jog else { return };
         jog.step(&mut self.point, config, ramp);
@@ -127,13 +127,13 @@ impl SetValues {
     }
 
     /// Begins to hold the arm at its measured position. An arm that still moves after hand guiding first comes to rest within `length_ms`.
-    /// A moving arm is caught like a falling load.
+    /// The controller catches a moving arm like a falling load.
     pub(crate) fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
         let moving = velocity.iter().any(|&v| moves(v));
         for j in 0..JOINTS {
-            // Each joint that is enabled later begins separately.
+            // A joint that is enabled later begins with its own latch.
             self.deceleration[j] = None;
             if moving && self.holding[j] {
                 let led = Deceleration::led(from[j], velocity[j], length_ms, &config.joints[j]);
@@ -146,8 +146,8 @@ impl SetValues {
         }
     }
 
-    /// Returns `true` when the joints that a hand has led have come to rest. After that, a joint that swings may need to be caught like a
-    /// load.
+    /// Returns `true` if the joints that a hand has moved have come to rest. After this tick, a joint may swing, and the controller must
+    /// then catch it.
     pub(crate) fn led_to_rest(&mut self, config: &Config) -> bool {
         self.led = self.deceleration.iter().any(Option::is_some);
         if !self.led {
@@ -165,25 +165,25 @@ impl SetValues {
     fn decelerate(&mut self, j: usize, mut deceleration: Deceleration, config: &Config) {
         let (from, velocity) = deceleration.start();
         self.commanded.begin(j, from, velocity, config.delay_ticks);
-        // J-62: the joint has moved since the measurement.
+        // J-62: the joint has moved since the encoder was read.
         deceleration.shift(self.commanded.position(0)[j] - from);
         self.deceleration[j] = Some(deceleration);
         self.found_moving[j] = true;
     }
 
-    /// Returns `true` for each joint that moves according to its set value or its measurement.
+    /// Returns `true` for each joint whose set velocity or measured velocity shows a motion.
     pub(crate) fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
         core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
     }
 
-    /// Sets the state as if every joint were enabled and its position latched.
+    /// Sets the state as if every joint were enabled and its set position latched.
     #[cfg(test)]
     pub(crate) fn hold_for_test(&mut self) {
         self.holding = [true; JOINTS];
     }
 
-    /// Moves the set position of a yielding joint to the position to which its spring pulls, rad. This change of the set values does not
-    /// count as a motion.
+    /// Moves the set position of a yielding joint to the `position` to which its spring pulls, rad. The change of the set values of a
+    /// yielding joint does not count as a motion.
     pub(crate) fn lead(&mut self, j: usize, position: f64) {
         (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
         self.commanded.begin(j, position, 0.0, 0);
@@ -196,7 +196,7 @@ impl SetValues {
         self.catch[joint].settled()
     }
 
-    /// Returns `true` if every joint that is not absent is enabled and held at rest.
+    /// Returns `true` if every joint is enabled and held at rest, except absent joints.
     pub(crate) fn all_holding(&self) -> bool {
         self.jog.is_none()
             && self.deceleration.iter().all(Option::is_none)
@@ -204,9 +204,9 @@ impl SetValues {
             && !self.catch.iter().any(Catch::busy)
     }
 
-    /// Latches the set positions of joints that have just been enabled, and brings moving joints among these to rest. The set values of
-    /// joints that are not enabled follow the measurements without torque. Returns the joints that were already held, and the joints that
-    /// have just been enabled.
+    /// Latches the set positions of joints that have just been enabled. If such a joint moves, the function brings it to rest. The set
+    /// position of a joint that is not enabled, and therefore has no torque, is its measured position. Returns the joints that were already
+    /// held, and the joints that have just been enabled.
     pub(crate) fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
         let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
@@ -228,7 +228,7 @@ impl SetValues {
                     self.decelerate(j, falling, config);
                 }
             } else if another {
-                // If the load of another joint moves, the load of this joint moves as well.
+                // Another joint was just enabled. If the load of that joint moves, the load of this joint moves as well.
                 self.catch[j] = Catch::begin(config);
             }
         }
@@ -236,7 +236,7 @@ impl SetValues {
         Latched { held, just_enabled }
     }
 
-    /// Runs one tick of the position hold in HoldPos.
+    /// Executes one tick of the position hold in HoldPos.
     pub(crate) fn hold(&mut self, config: &Config) {
         (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
         for j in 0..JOINTS {
@@ -250,8 +250,8 @@ impl SetValues {
         }
     }
 
-    /// Runs one tick on the path or during the approach. The full-speed values `at` are scaled with the rate of path time and the slope
-    /// (1/s) of the rate (J-33).
+    /// Executes one tick on the path or during the approach. The values `at` for full speed are scaled with the rate of path time and with
+    /// the slope (1/s) of this rate (J-33).
     pub(crate) fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {
@@ -260,8 +260,8 @@ impl SetValues {
         }
     }
 
-    /// Moves the set position of a joint whose load is being caught towards the measured position. The step corresponds to the torque above
-    /// the limit (`excess`, N·m), but is at most the position error (`error`, rad). Returns the step, rad.
+    /// During a catch, moves the set position of the joint towards its measured position. The distance corresponds to the torque above the
+    /// limit (`excess`, N·m), but is at most the position error (`error`, rad). Returns this distance, rad.
     pub(crate) fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         let step = self.catch[j].sag(excess, kp, error, limits);
         self.point.position[j] += step;

@@ -1,4 +1,5 @@
-//! Soft end of a joint's range. A spring acts against the joint if a hand or a push moves the joint towards a position limit (J-25, J-68).
+//! Soft end of the position range of a joint. A spring acts against the joint if a hand or a push moves the joint towards a position limit
+//! (J-25, J-68).
 
 /// Distance from a position limit at which the spring begins to act, rad.
 pub(crate) const SOFT_END: f64 = 0.1;
@@ -12,7 +13,7 @@ pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     above - below
 }
 
-/// Returns the torque of a spring that is compressed by `depth` (rad), N·m. At the position limit, the torque is `most`.
+/// Returns the torque of a soft-end spring that is compressed by `depth` (rad), N·m. At the position limit, the torque is `most`.
 pub(crate) fn spring(depth: f64, most: f64) -> f64 {
     -most * depth / SOFT_END
 }

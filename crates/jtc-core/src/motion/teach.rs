@@ -1,9 +1,10 @@
-//! Torques that Teaching adds to gravity (J-25): the found load, damping, dry friction at standstill, partial compensation of the joint
-//! friction, and soft ends.
+//! Torques that Teaching adds to gravity (J-25): learned load, damping, dry friction at standstill, partial friction compensation, and soft
+//! ends.
 //!
-//! A hand leads the arm. When the hand lets go, the arm must stay in its pose. From the torques that HoldPos found, a mass at the flange is
-//! estimated and carried to other poses. The remaining torques fade while a hand leads the arm ([`carried`]). Every motion is damped. A
-//! joint that is too fast for the damping ends Teaching ([`joint`]).
+//! In Teaching, a hand moves the arm. When the hand lets go of the arm, the arm must stay in its pose. The controller estimates a mass at
+//! the flange from the torques that HoldPos has learned. The controller uses this mass to compute the load in other poses. Learned torques
+//! that this mass does not explain fade while a hand moves the arm ([`carried`]). Every motion in Teaching is damped. If a joint is too
+//! fast for this damping, Teaching ends ([`joint`]).
 mod carried;
 mod joint;
 
@@ -18,49 +19,52 @@ use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
 use joint::{TaughtJoint, rotor};
 
-/// Number of ticks in a round that computes slowly changing values, and number of ticks before the first round. Before the first round, one
-/// tick begins Teaching and one tick computes the mass at the flange. Another tick computes the inertia of the whole arm, which a ramp
-/// needs, and one tick per joint computes the inertia of the joint.
+/// Number of ticks in a round that computes the slowly changing values. The second constant is the number of ticks before the first round.
+/// Before the first round, one tick begins Teaching, and one tick computes the mass at the flange. Another tick computes the inertia of the
+/// whole arm, which a ramp needs, and one tick per joint computes the inertia of this joint.
 const TURNS: u8 = 76;
 const FIRST: u8 = 9;
-/// Time between two checks of the load, in ticks and in s.
+/// Time between two comparisons of the load with the motion, in ticks and in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Torque of 1 kg at the flange on all joints together, as the root of the sum of squares (N·m/kg). Up to the first value, no load is
-/// attributed to a mass. Above the second value, the complete fitted mass is used. HoldPos cannot distinguish a load from static friction,
-/// and a small friction must not be interpreted as a large mass in another pose.
+/// Two thresholds for the torque of 1 kg at the flange on all joints together, as the root of the sum of squares (N·m/kg). If the torque of
+/// 1 kg is below the first threshold, the controller does not attribute any load to a mass. Above the second threshold, the controller uses
+/// the complete fitted mass. HoldPos cannot distinguish a load from static friction. A small friction torque must not become a large mass
+/// in another pose.
 const LOADS: (f64, f64) = (2.0, 6.0);
-/// Time for which a mass must have driven the arm by itself before the mass is removed, ms, and time constant of the removal, s.
+/// Time for which a mass must have driven the arm without a hand before the controller removes the mass, ms. The second constant is the
+/// time constant of the removal, s.
 const DRIVEN_MS: u16 = 1_000;
 const GOES_S: f64 = 1.5;
-/// Time for which a joint must have sunk without a removed mass before the mass is added again, ms, and time constant of the return, s.
+/// Time for which a joint must have sunk without the removed mass before the controller adds the mass again, ms. The second constant is the
+/// time constant of the return of the mass, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed above which a joint is considered to be led by a hand, rad/s. Distance of the fastest joint over which a torque that is not
-/// explained by a mass falls to a third, rad.
+/// Speed above which the controller assumes that a hand moves a joint, rad/s. Distance of the fastest joint over which a torque that no
+/// mass explains falls to a third, rad.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 
-/// Computation of a tick. An index is the index of a joint.
+/// Computation that a tick of Teaching executes. The number in a variant is the index of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
-    /// First tick, in which all found loads are carried.
+    /// First tick of Teaching, in which all learned loads act.
     Begin,
-    /// Computes the mass at the flange that explains the loads.
+    /// Computes the mass at the flange that explains the learned loads.
     Mass,
-    /// Leaves time for the computation of the inertia of the whole arm by the ramp.
+    /// Leaves the time of the tick for the ramp, which computes the inertia of the whole arm.
     Ramp,
     Inertia(usize),
     /// Computes the friction of a joint, and the torque of 1 kg at the flange on all joints.
     Friction(usize),
-    /// Checks the load against the motion.
+    /// Compares the load with the motion of the joints.
     Judge,
     /// Computes the torques of the joints.
     Joints,
 }
 
 impl Turn {
-    /// Returns the computation with this number. In each round, every fourth tick computes a slowly changing value.
+    /// Returns the computation of the tick with this number. In each round, every fourth tick computes a slowly changing value.
     fn of(number: u8) -> Self {
         let Some(turn) = number.checked_sub(FIRST) else {
             return match number {
@@ -85,21 +89,22 @@ impl Turn {
     }
 }
 
-/// State of Teaching. Single precision, because the flight recorder stores it.
+/// State of Teaching. The values have single precision, because the flight recorder stores them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Taught {
     joints: [TaughtJoint; JOINTS],
     carried: [Carried; JOINTS],
-    /// Mass at the flange that the model does not contain, kg. `found` is the mass that was found, and `mass` is the mass that is carried.
-    /// Both values are negative if the modelled arm is too heavy.
+    /// Mass at the flange that the model does not contain, kg. `found` is the mass that was estimated, and `mass` is the mass whose torque
+    /// acts now. Both masses are negative if the arm is lighter than its model.
     found: f32,
     mass: f32,
     /// Torque of 1 kg at the flange on each joint, N·m.
     unit: [f32; JOINTS],
-    /// Time for which the mass alone has explained the motion, and time for which a joint has sunk because the mass was removed, ms.
+    /// Time for which the mass alone has explained the motion, ms. The next field is the time for which a joint has sunk because the mass
+    /// was removed, ms.
     driven_ms: u16,
     sinks_ms: u16,
-    /// Excess of the flange speed over the tool speed limit, as a value from 0 to 1.
+    /// Excess of the flange speed over the tool speed limit, scaled to the range from 0 to 1.
     haste: f32,
     /// Tick counter, which selects the computation of a tick.
     turn: u8,
@@ -108,7 +113,7 @@ pub(crate) struct Taught {
 bit_codec!(Taught { joints, carried, found, mass, unit, driven_ms, sinks_ms, haste, turn });
 
 impl Taught {
-    /// Begins Teaching of an arm at rest at `q` (rad) that has found these loads (N·m).
+    /// Begins Teaching of an arm at rest at `q` (rad), with these learned `loads` (N·m).
     #[inline(never)]
     pub(crate) fn begin(q: &[f64; JOINTS], loads: &[f64; JOINTS], config: &Config) -> Self {
         let mut taught = Self::default();
@@ -120,7 +125,7 @@ impl Taught {
         taught
     }
 
-    /// Fits a mass at the flange to the found loads, by least squares over the joints of the arm at `q` (rad).
+    /// Fits a mass at the flange to the learned loads, by least squares over the joints of the arm at `q` (rad).
     fn fit(&mut self, q: &[f64; JOINTS], dynamics: &Dynamics) {
         let unit = dynamics.flange_torque(q);
         let (mut load, mut moment) = (0.0, 0.0);
@@ -137,16 +142,16 @@ impl Taught {
         }
     }
 
-    /// Reduces the found mass by `mass` (kg) at the flange, which the model contains from this tick on (J-60). The found mass does not
-    /// change its sign, because an excess of `mass` was not present when the mass was found.
+    /// Reduces the estimated mass by `mass` (kg), because the model contains this mass at the flange from this tick on (J-60). The
+    /// estimated mass does not change its sign. If `mass` is larger, the excess was not present when the controller estimated the mass.
     pub(crate) fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
         (self.found, self.mass) = (left(self.found), left(self.mass));
     }
 
-    /// Evaluates the answer of a joint in each tick. `late` is the delay of this tick in ms. `fresh` means that the joint has answered with
-    /// this `position`, rad. Returns the speed computed from the joint positions, rad/s.
+    /// Evaluates the answer of a joint in each tick of Teaching. `late` is the delay of this tick in ms. `fresh` is `true` if the joint has
+    /// answered with this `position`, rad. Returns the speed computed from the joint positions, rad/s.
     #[inline(always)]
     pub(crate) fn hear(&mut self, j: usize, fresh: bool, position: f64, late: u16) -> f32 {
         self.joints[j].hear(fresh, position, late)
@@ -157,19 +162,19 @@ impl Taught {
         Turn::of(self.turn) == Turn::Begin
     }
 
-    /// Returns `true` in the tick that computes no other value, to leave time for the inertia of the whole arm.
+    /// Returns `true` in the tick that computes no other value, because this tick leaves its time for the inertia of the whole arm.
     pub(crate) fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
 
-    /// Returns the torque that a joint carries in the first tick, N·m. This torque is the whole found load, because no part of the load is
-    /// attributed to a mass yet.
+    /// Returns the load torque of a joint in the first tick of Teaching, N·m. The load torque in the first tick is the whole learned load,
+    /// because no part of the load has been attributed to a mass yet.
     pub(crate) fn first_load(&self, j: usize) -> f64 {
         self.carried[j].rest.into()
     }
 
-    /// Computes the slowly changing values, at most one in a tick. Returns `true` if the tick has no time left to compute the torques of the
-    /// joints. The very first tick adds only the load, because the torque would step without the load.
+    /// Computes the slowly changing values, at most one of them per tick. Returns `true` if this tick has no time left to compute the
+    /// torques of the joints. The first tick of Teaching adds only the load, because the torque would have a step without the load.
     #[inline(never)]
     pub(crate) fn look(
         &mut self,
@@ -220,7 +225,7 @@ impl Taught {
         f64::from(self.mass) * f64::from(self.unit[j])
     }
 
-    /// Runs one tick of a joint.
+    /// Executes one tick of Teaching for a joint.
     #[inline(always)]
     pub(crate) fn step(&mut self, j: usize, led: &LedJoint<'_>, config: &Config) -> TaughtTorque {
         let by_mass = self.by_mass(j);
@@ -230,7 +235,7 @@ impl Taught {
         torque
     }
 
-    /// Checks the load against the motion of the last [`JUDGED_MS`].
+    /// Compares the load with the motion of the last [`JUDGED_MS`].
     fn judge(&mut self, v: &[f64; JOINTS]) {
         let (mut driven, mut sinks, mut fastest) = (false, false, 0.0_f64);
         for j in 0..JOINTS {
@@ -256,7 +261,8 @@ impl Taught {
         }
     }
 
-    /// Returns the torque that holds a joint at `position` (rad), N·m. This torque is the sum of the load and the dry friction.
+    /// Returns the torque that holds a joint at `position` (rad), N·m. The holding torque is the sum of the torques of the load and of the
+    /// dry friction.
     pub(crate) fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         self.carried[j].torque(self.by_mass(j)) + self.joints[j].dry_spring(position, limits, config)
     }

@@ -5,7 +5,7 @@ use crate::interpolation::SetPoint;
 use crate::motion::catch::Catch;
 use crate::motion::deceleration::Deceleration;
 
-/// Returns the motion of an arm that holds these joints.
+/// Returns the motion of an arm in which these joints are held.
 fn holding(joints: [bool; JOINTS]) -> Motion {
     let mut motion = Motion::default();
     motion.set.holding = joints;
@@ -29,8 +29,8 @@ fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_posi
     assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
-/// The arm must be held at once. During a ramp to rest, the torque limits would not apply although the arm is at rest, and no motion could
-/// begin.
+/// If an arm is at rest, the controller must hold it at once. During a ramp to rest, the torque limits would not apply although the arm is
+/// at rest, and no motion could begin.
 #[test]
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
@@ -82,8 +82,8 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching begins when the arm is held and its load is known. If a contact may press on the arm, the load need not be known after
-/// `KNOWN_MS`.
+/// Teaching begins when the arm is held and the loads of its joints are known. If a contact may press on the arm, Teaching begins after
+/// `KNOWN_MS`, even if the loads are not known.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     for (held, contact, waits_ms, known, may) in [
@@ -108,7 +108,7 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     }
 }
 
-/// Returns the motion after joint 4 was measured at this velocity (rad/s), enabled or not, while the arm holds the other joints.
+/// Returns the motion of an arm that holds the other joints, after joint 4 was measured at this velocity (rad/s), enabled or not.
 fn latched(held: bool, enabled: bool, velocity: f64) -> Motion {
     let (config, at, off) = (Config::avena(), [0.3; JOINTS], 3);
     let mut velocities = [0.0; JOINTS];
@@ -128,11 +128,12 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
     for (held, enabled, velocity, follows, catches, falls) in [
         (true, true, 0.0, false, false, false),
         (true, true, 0.5, false, false, false),
-        // The joint was just enabled, so it is latched at its measured position. The load of this joint moves the loads of the other
+        // The joint was just enabled, so it is latched at its measured position. The load of this joint also moves the loads of the other
         // joints.
         (false, true, 0.0, true, true, false),
         (false, true, 0.5, true, true, true),
-        // If the joint is not enabled, or is not enabled any more, the set values follow the joint.
+        // If the joint is not enabled, its set values are equal to its measured values. After a joint was disabled, its set values are also
+        // equal to its measured values.
         (false, false, 0.0, true, false, false),
         (false, false, 0.5, true, false, false),
         (true, false, 0.5, true, false, false),
@@ -164,7 +165,8 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     }
 }
 
-/// An arm that a hand has led comes to rest and is caught like a load. An arm at rest is held at once.
+/// An arm that a hand has moved comes to rest, and the controller catches it like a load. If the arm is at rest, the controller holds it at
+/// once.
 #[test]
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
     for (velocity, moves) in [(0.0, false), (0.02, false), (0.3, true)] {
@@ -193,7 +195,7 @@ fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     motion.set.begin_at(&[0.1; JOINTS]);
     motion.release(&nodes);
     assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
-    // J-62: the position error of the joint is also zero.
+    // J-62: the due position is also the measured position.
     assert_eq!(motion.set.due(&Config::avena()), &[0.3; JOINTS]);
     assert_eq!((motion.set.holding, motion.law.torque), Default::default());
     assert!(!motion.set.catch[1].busy());

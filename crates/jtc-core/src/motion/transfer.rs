@@ -1,4 +1,4 @@
-//! Bumpless transfer, which blends out the torque steps at a change of state, at a change of the model, and at enabling (J-25, J-44).
+//! Bumpless transfer: blends out torque steps at a change of state, at a change of the model, and at enabling (J-25, J-44).
 use super::torque::JointTorque;
 use crate::JOINTS;
 use crate::bit_codec::{BitCodec, BitSink, BitSource, bit_codec};
@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::nodes::Nodes;
 
-/// Time in which the torque of a joint that begins to yield falls, ms.
+/// Time in which the torque of a joint that begins to yield falls to its new value, ms.
 const FALL_MS: u16 = 10;
 
 /// Parts of the last torque that the next torque must continue without a step.
@@ -14,7 +14,7 @@ const FALL_MS: u16 = 10;
 pub(super) enum Continued {
     /// All parts of the torque except the model torque.
     Correction,
-    /// All parts.
+    /// All parts of the torque.
     Everything,
 }
 
@@ -27,24 +27,24 @@ impl Continued {
     }
 }
 
-/// Last torque, if the next torque must continue it.
+/// Values of the last torque that the next torque must continue, if any.
 pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
 
 /// Torque steps that are being blended out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Transfer {
-    /// Step that is blended out, N·m, and the time since its start.
+    /// Torque step that is being blended out, N·m, and the time since its start.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
-    /// The step is blended out within [`FALL_MS`].
+    /// `true` if the step is blended out within [`FALL_MS`].
     falls: [bool; JOINTS],
     /// Time left until all steps are blended out, ms.
     left_ms: u16,
-    /// Joints that yield from this tick on. The torque of these joints falls within [`FALL_MS`].
+    /// `true` for each joint that yields from this tick on. The torque of these joints falls within [`FALL_MS`].
     yields: [bool; JOINTS],
-    /// Joints that were latched in this tick. The torque of these joints begins at the torque of the model.
+    /// `true` for each joint that was latched in this tick. The torque of these joints begins at the torque of the model.
     just_enabled: [bool; JOINTS],
-    /// Part of the last torque that the next torque must continue.
+    /// Parts of the last torque that the next torque must continue.
     next: Option<Continued>,
 }
 
@@ -71,7 +71,7 @@ impl Transfer {
         self.next = Some(Continued::Everything);
     }
 
-    /// Prepares the yield of a joint from the next tick on. Only the torque of the model may step, and excess torque falls within
+    /// Prepares the yield of a joint from the next tick on. Only the torque of the model may step, and the excess torque falls within
     /// [`FALL_MS`] (J-68).
     #[inline(always)]
     pub(super) fn begin_yield(&mut self, joint: usize) {
@@ -84,12 +84,12 @@ impl Transfer {
         self.just_enabled = just_enabled;
     }
 
-    /// Prepares the computation of the next torque. Returns the part of the last torque that the next torque must continue, if any.
+    /// Prepares the computation of the next torque. Returns the values of the last torque that the next torque must continue, if any.
     pub(super) fn begin(&mut self, last: &[JointTorque; JOINTS]) -> Before {
         self.next.take().map(|continued| (continued, core::array::from_fn(|j| continued.of(&last[j]))))
     }
 
-    /// Adds the remainder of the steps to `torque`, and clears the torque of joints that are not enabled.
+    /// Adds the remainder of the torque steps to `torque`, and clears the torque of joints that are not enabled.
     #[inline(always)]
     pub(super) fn blend(
         &mut self,
@@ -127,13 +127,13 @@ impl Transfer {
         }
     }
 
-    /// Begins to blend out a step of a joint.
+    /// Begins to blend out a torque step of a joint.
     fn begin_step(&mut self, j: usize, step: f64, falls: bool, config: &Config) {
         (self.step[j], self.step_ms[j], self.falls[j]) = (step, 0, falls);
         self.left_ms = config.blend_ms.max(FALL_MS);
     }
 
-    /// Adds the remainder of the steps in this tick.
+    /// Adds the remainder of the torque steps in this tick.
     fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS], config: &Config) {
         for j in 0..JOINTS {
             let length_ms = if self.falls[j] { FALL_MS } else { config.blend_ms };
@@ -157,8 +157,8 @@ mod tests {
         torque.map(|torque| torque.blend)
     }
 
-    /// The torque of a joint that begins to yield falls at once. The torque of the other joints is blended as for any change of state. No
-    /// torque steps.
+    /// The excess torque of a joint that begins to yield falls within 10 ms. The torque of the other joints is blended out as at any other
+    /// change of state. The torque of no joint has a step.
     #[test]
     fn j44_j68_the_torque_of_a_joint_that_begins_to_yield_falls_within_10_ms() {
         let mut transfer = Transfer::default();

@@ -1,12 +1,13 @@
 //! Behaviour of a joint that yields to a push (J-68), or lowers a load that its torque limit cannot hold (J-70).
 //!
-//! The position controller opposes a push with the whole torque limit within a few milliradians. The joint would clamp an obstacle, and
-//! only the torque limit would bound the force. A yielding joint has a damper and a weak spring instead. The other end of the spring is
-//! dragged along with the joint. So the joint follows a hand with a share of its torque limit, and stops a shove with the whole torque
-//! limit. Meanwhile, the model torque and the load that the integral had found continue to carry the arm.
+//! The position controller reaches the whole torque limit against a push within a few milliradians. With the position controller alone, the
+//! joint would clamp an obstacle, and only the torque limit would bound the force. A yielding joint has a damper and a weak spring in place
+//! of the position controller. The free end of the spring is dragged along with the joint. The joint therefore follows a hand with a share
+//! of its torque limit, and stops a shove with the whole torque limit. During the yield, the model torque and the learned load continue to
+//! hold the arm.
 //!
-//! A joint that lowers a load has no spring. The damper alone lets the load sink slowly, at any torque within the limit. The torque that
-//! the damper needs becomes part of the load, so a load that the limit can hold comes to rest.
+//! A joint that lowers a load has no spring. With the damper alone, the load sinks slowly, at any torque within the limit. The torque that
+//! the damper needs becomes part of the learned load. A load within the torque limit therefore comes to rest.
 use crate::bit_codec::bit_codec;
 use crate::config::limits::{JointConfig, within};
 use crate::motion::pid::PidTorque;
@@ -17,24 +18,24 @@ mod swing;
 
 use swing::Swing;
 
-/// Longest extension of the spring, rad.
+/// Longest extension of the spring of a yielding joint, rad.
 const STRETCH: f64 = 0.02;
-/// Highest natural frequency of the spring with the inertia of the joint, 1/s.
+/// Highest natural frequency of the spring together with the inertia of the joint, 1/s.
 pub(crate) const SPRING_RATE: f64 = 30.0;
 /// Rate at which the damper of a lowered load reduces a speed, 1/s. If several joints lower loads, these joints share this rate. Held
-/// joints affect each other at frequencies at which an old speed measurement makes the loop unstable. A joint then feels only a third of
-/// the inertia that it has while the other joints are fixed.
+/// joints affect each other at frequencies at which a delayed speed measurement makes the control loop unstable. The effective inertia of a
+/// joint is then only a third of its inertia while the other joints are fixed.
 const LOWERING_RATE: f64 = 40.0;
-/// Change per tick of the damper and the spring, as a fraction of the remaining change.
+/// Change of the damper and the spring per tick, as a fraction of the remaining change.
 const SETTLES: f64 = 0.2;
-/// Change per tick of the brake, as a fraction of the remaining change, like [`SETTLES`].
+/// Change of the brake per tick, as a fraction of the remaining change, like [`SETTLES`].
 const BRAKE_SETTLES: f64 = 0.5;
-/// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them. A damper above
-/// 200 1/s would make a joint oscillate, and this bound is lower if joints affect each other.
+/// Highest rate at which a damper reduces the speed of a joint, 1/s. Measured speeds are about 8 ms old, because the drives average these
+/// speeds. A rate above 200 1/s would make a joint oscillate, and this bound is lower if joints affect each other.
 const DAMPING_RATE: f64 = 100.0;
-/// Speeds, as multiples of the velocity limit, at which the brake of a joint begins and at which the brake uses the whole torque limit. The
-/// brake acts if its torque is higher than the torque of the damper. `BRAKES_LOWERED` is for a joint that lowers a load. `BRAKE_RATE`
-/// bounds the rate at which the brake reduces a speed, 1/s, because positions are about 4 ms old.
+/// Speeds, as multiples of the velocity limit, at which the brake of a joint begins to act and at which the brake uses the whole torque
+/// limit. The brake acts if its torque is higher than the torque of the damper. `BRAKES_LOWERED` applies to a joint that lowers a load.
+/// `BRAKE_RATE` bounds the rate at which the brake reduces a speed, 1/s, because positions are about 4 ms old.
 const BRAKES: (f64, f64) = (0.2, 0.8);
 const BRAKES_LOWERED: (f64, f64) = (0.4, 1.0);
 const BRAKE_RATE: f64 = 250.0;
@@ -42,66 +43,67 @@ const BRAKE_RATE: f64 = 250.0;
 const CALM: f64 = 0.05;
 /// Speed below which a lowered load is at rest, rad/s.
 const AT_REST: f64 = 0.02;
-/// Time for which a joint must be calm before it is held again, ms. A joint is not calm if its load has seemed to drive it for
-/// `DRIVEN_CALM_MS`.
+/// Time for which a joint must be calm before the controller holds the joint again, ms. A joint does not count as calm if its load seems to
+/// have driven it for `DRIVEN_CALM_MS`.
 const CALM_MS: u16 = 200;
 const DRIVEN_CALM_MS: u16 = 50;
-/// Lowest torque of gravity and load on a joint, as a share of the torque limit, at which a motion is considered sinking.
+/// Lowest torque of gravity and load on a joint, as a share of the torque limit, at which a motion counts as sinking.
 const LOADED: f64 = 0.05;
-/// Distance (rad) and time (ms) of sinking after which the joint is considered overloaded.
+/// Distance (rad) and time (ms) of sinking after which the joint counts as overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
-/// Time constant for the load to take over the torque of the damper, s.
+/// Time constant for the torque of the damper to become part of the load, s.
 const LEARNS_S: f64 = 0.5;
-/// Range of the torque of spring and damper against a joint that its own load drives, as shares of this load. The remaining share is
-/// friction. If a load has driven the joint for [`DRIVEN_MS`], the load is interpreted as a person who leaned on the arm. The load fades
-/// with the time constant [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint sinks without the load.
+/// Range of the torque of spring and damper against a joint that its load drives, as shares of this load. The remaining share of this load
+/// is friction. If a load has driven the joint for [`DRIVEN_MS`], the controller assumes that a person leaned on the arm while the load was
+/// learned. A load that drives its joint fades with the time constant [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint
+/// sinks without the load.
 const DRIVEN: (f64, f64) = (0.5, 1.2);
-/// Speed above which a load is considered to drive its joint, rad/s.
+/// Speed above which a load seems to drive its joint, rad/s.
 const CREEPS: f64 = 0.002;
 const DRIVEN_MS: u16 = 300;
 const GOES_S: f64 = 1.0;
 const COMES_BACK_S: f64 = 0.3;
 /// Share of the torque limit up to which the position controller holds a lowered load again. The remaining share is for encoder noise.
 const HOLDABLE: f64 = 0.95;
-/// Number of missing answers after which the spring does not act.
+/// Number of missing answers after which the spring of a yielding joint does not act.
 const MISSING: u8 = 2;
-/// Number of yields of a joint. The last of these yields continues until the host clears it. Yields are counted together if each yield of
-/// the arm begins within [`AGAIN_MS`] after the previous yield.
+/// Number of the yield of a joint that does not end without the host. This yield continues until the host clears the yield. Yields are
+/// counted together if each yield of the arm begins within [`AGAIN_MS`] after the previous yield.
 const TIMES: u8 = 3;
-/// See [`TIMES`].
+/// Time within which yields are counted together (see [`TIMES`]), ticks.
 const AGAIN_MS: u16 = 10_000;
 
 /// State of a joint that yields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Yield {
-    /// The joint lowers a load, without a spring (J-70).
+    /// `true` if the joint lowers a load, without a spring (J-70).
     lowers: bool,
-    /// The yield continues until the host clears it.
+    /// `true` if the yield continues until the host clears the yield.
     stays: bool,
-    /// Position to which the spring pulls, rad.
+    /// Position to which the spring of the joint pulls, rad.
     set: f64,
     /// Lower bound of the inertia that the joint moves, kg·m².
     inertia: f64,
-    /// Torque of the load that the model does not contain, N·m. `least` is the value of this torque at the beginning of the yield or of the
+    /// Torque of the unmodelled load of the joint, N·m. `least` is the value of this torque at the beginning of the yield or of the
     /// lowering. A lowered load never falls below `least`.
     load: f64,
     least: f64,
     /// Time for which the load has driven the joint, ms.
     driven_ms: u16,
-    /// Damping, N·m·s/rad.
+    /// Damping of the joint, N·m·s/rad.
     damping: f64,
-    /// Acting shares of the brake and of the spring.
+    /// Acting share of the brake. The next field is the acting share of the spring.
     braking: f64,
     grip: f64,
     swing: Swing,
-    /// `holdable` means that the position controller can hold the load of the joint. `cleared` means that the host requires the position
-    /// controller to hold the load.
+    /// `holdable` is `true` if the position controller can hold the load of the joint. `cleared` is `true` if the host requires the
+    /// position controller to hold the load.
     holdable: bool,
     cleared: bool,
     calm_ms: u16,
     /// Number of consecutive missing answers of the joint.
     missing: u8,
-    /// Distance (rad) and time (ms) of sinking in the direction of gravity.
+    /// Distance (rad) and time (ms) for which the joint has sunk in the direction of gravity.
     sunk: f64,
     sinks_ms: u16,
 }
@@ -128,27 +130,28 @@ bit_codec!(Yield {
 
 /// Inputs of a yielding joint in one tick.
 pub(crate) struct Joint<'a> {
-    /// Measured position, rad.
+    /// Measured position of the joint, rad.
     pub position: f64,
-    /// Measured velocity, rad/s.
+    /// Measured velocity of the joint, rad/s.
     pub velocity: f64,
-    /// Velocity over the last 5 ms, rad/s.
+    /// Velocity of the joint over the last 5 ms, rad/s.
     pub young_velocity: f64,
-    /// All values of the joint were measured for this tick.
+    /// `true` if all values of the joint were measured for this tick.
     pub fresh: bool,
-    /// Torque of the model, N·m.
+    /// Torque of the model on the joint, N·m.
     pub model: f64,
     pub limits: &'a JointConfig,
-    /// Lowest and highest position, rad.
+    /// Lowest and highest position of the joint, rad.
     pub range: (f64, f64),
     /// Highest torque of spring and damper against a slow push, as a share of the torque limit.
     pub share: f64,
-    /// Number of joints that lower their loads, including this one.
+    /// Number of joints that lower their loads, including this joint.
     pub lowering: u8,
 }
 
 impl Yield {
-    /// Begins the yield of a joint. `set` is the commanded position in rad. `load` is the torque that the model does not contain, N·m.
+    /// Begins the yield of a joint. `set` is the commanded position of the joint, rad. `load` is the torque of the unmodelled load of the
+    /// joint, N·m.
     pub(crate) fn begin(lowers: bool, stays: bool, set: f64, inertia: f64, load: f64) -> Self {
         Self {
             lowers,
@@ -171,18 +174,18 @@ impl Yield {
         }
     }
 
-    /// Drags the free end of the spring along with a joint at `position` (rad). Returns the new position of this end.
+    /// Drags the free end of the spring along with a joint at `position` (rad). Returns the new position of this end of the spring, rad.
     pub(crate) fn drag(&mut self, position: f64) -> f64 {
         self.set = self.set.max(position - STRETCH).min(position + STRETCH);
         self.set
     }
 
-    /// Returns `true` if the joint has been calm for [`CALM_MS`]. The host may still need to end the yield.
+    /// Returns `true` if the joint has been calm for [`CALM_MS`]. The yield may nevertheless continue until the host clears the yield.
     pub(crate) fn is_calm(&self) -> bool {
         self.calm_ms >= CALM_MS
     }
 
-    /// Returns `true` if the position controller holds the joint again.
+    /// Returns `true` if the position controller may hold the joint again.
     pub(crate) fn is_over(&self) -> bool {
         self.is_calm() && (self.holdable || self.cleared) && !self.stays
     }
@@ -204,13 +207,14 @@ impl Yield {
         self.least = self.load;
     }
 
-    /// Returns `true` if the load may differ from the load that was found before the yield.
+    /// Returns `true` if the load may differ from the load that was learned before the yield.
     pub(crate) fn has_learned(&self) -> bool {
         self.lowers || self.load != self.least
     }
 
-    /// Returns the torque that the position controller must take over, N·m. The spring (`spring`, N·m) may have opposed a part of the load,
-    /// and this part no longer acts. If the spring carried a part of a doubted load, the position controller continues to carry this part.
+    /// Returns the torque that the position controller must continue after the yield, N·m. The spring (`spring`, N·m) may have opposed a
+    /// part of the load. The opposed part of the load no longer acts after the yield. If the spring held a part of a doubted load, the
+    /// position controller continues to hold this part.
     pub(crate) fn left(&self, spring: f64) -> f64 {
         if self.lowers {
             self.load
@@ -219,18 +223,18 @@ impl Yield {
         }
     }
 
-    /// Returns the torque that Teaching carries, N·m. If the load is doubted, Teaching carries only the part that the `spring` (N·m) has
-    /// not opposed, because the opposed part may not exist.
+    /// Returns the load torque for Teaching, N·m. If the load is doubted, Teaching uses only the part that the `spring` (N·m) has not
+    /// opposed, because the opposed part may not exist.
     pub(crate) fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }
 
-    /// Returns the torque of the load that the model does not contain, N·m.
+    /// Returns the torque of the unmodelled load of the joint, N·m.
     pub(crate) fn load(&self) -> f64 {
         self.load
     }
 
-    /// Runs one tick. Returns spring, load and damper as the parts of a PID torque, N·m.
+    /// Executes one tick of the yield. Returns the torques of spring, load and damper as the parts of a PID torque, N·m.
     pub(crate) fn step(&mut self, joint: &Joint<'_>) -> PidTorque {
         let limit = joint.limits.torque_max;
         let most = joint.share * limit;
@@ -238,7 +242,7 @@ impl Yield {
         self.missing = if joint.fresh { 0 } else { self.missing.saturating_add(1) };
 
         let soft = self.swing.step(velocity);
-        // With the damping `wanted`, a joint at half of its velocity limit is braked with the whole torque limit.
+        // With the damping `wanted`, the damper torque at half of the velocity limit is the torque limit minus the share.
         let wanted = 2.0 * (limit - most) / joint.limits.velocity_max;
         let damping = if self.lowers {
             LOWERING_RATE / f64::from(joint.lowering.max(1)) * self.inertia
@@ -246,7 +250,7 @@ impl Yield {
             wanted.min(soft * DAMPING_RATE * self.inertia)
         };
         self.damping += SETTLES * (damping - self.damping);
-        // The brake is zero in the first tick, because an initial torque would be blended in.
+        // The brake is zero in the first tick, because a torque in this tick would be blended in.
         let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
         let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);
@@ -257,7 +261,7 @@ impl Yield {
         let end = soft_end::spring(soft_end::depth(joint.position, joint.range), most);
         let pull = stiffness * (self.set - joint.position) + end;
         let spring = self.grip * pull.max(-most).min(most);
-        // The sum of spring and damper exceeds the share only for a shove.
+        // The sum of spring and damper exceeds the share only during a shove.
         let p = if self.lowers { 0.0 } else { within(spring, d, most) };
 
         let carried = joint.model + if self.lowers { self.least } else { self.load };
@@ -271,7 +275,8 @@ impl Yield {
         if !self.lowers {
             self.doubt(velocity, p + d);
         } else if loaded {
-            // The load never exceeds the torque limit. If the joint is lifted, the load does not fall below its initial torque.
+            // The sum of model torque and load never exceeds the torque limit. If the joint is lifted, the load does not fall below its
+            // torque at the beginning.
             let learned = self.load + damper * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
             self.load = learned.max(-limit - joint.model).min(limit - joint.model);
@@ -286,8 +291,8 @@ impl Yield {
         PidTorque { p, i: self.load, d }
     }
 
-    /// Reduces a load that drives the joint by itself against the `torque` (N·m) of spring and damper. The load returns if the joint sinks
-    /// without the load.
+    /// Reduces a load that drives the joint against the `torque` (N·m) of spring and damper. The load returns if the joint sinks without
+    /// this load.
     fn doubt(&mut self, velocity: f64, torque: f64) {
         let (along, has) = (velocity * self.least.signum(), self.load.abs());
         let against = -torque * self.least.signum();
@@ -305,8 +310,8 @@ impl Yield {
     }
 }
 
-/// Returns the torque of a brake against a fast motion of a joint with this `inertia` (kg·m²), N·m. The damper of a light joint cannot stop
-/// a shove, because the measured speed is too old.
+/// Returns the torque of a brake against a fast motion of a joint with this `inertia` (kg·m²), N·m. The damper of a joint with little
+/// inertia cannot stop a shove, because the measured speed is too old.
 fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
     let JointConfig { torque_max, velocity_max, .. } = *joint.limits;
     let slope = (torque_max / ((to - from) * velocity_max)).min(BRAKE_RATE * inertia);
@@ -314,7 +319,7 @@ fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
     if beyond > 0.0 { -(slope * beyond).min(torque_max) * joint.young_velocity.signum() } else { 0.0 }
 }
 
-/// Number of yields of each joint within the last seconds.
+/// Number of yields of each joint that are counted together (see [`TIMES`]).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Yielded {
     times: [u8; JOINTS],
@@ -325,7 +330,7 @@ pub(crate) struct Yielded {
 bit_codec!(Yielded { times, since_ms });
 
 impl Yielded {
-    /// Runs one tick.
+    /// Executes one tick of the count.
     pub(crate) fn step(&mut self) {
         self.since_ms = self.since_ms.saturating_add(1).min(AGAIN_MS);
         if self.since_ms == AGAIN_MS {
@@ -333,7 +338,8 @@ impl Yielded {
         }
     }
 
-    /// Counts a yield of the joint. Returns `true` if the joint yields too often, so that the yield continues until the host clears it.
+    /// Counts a yield of the joint. Returns `true` if the joint yields too often. The yield of such a joint then continues until the host
+    /// clears the yield.
     pub(crate) fn count(&mut self, joint: usize) -> bool {
         self.since_ms = 0;
         let Some(times) = self.times.get_mut(joint) else { return false };

@@ -1,18 +1,18 @@
-//! Selects the frame of each tick: a Move, or a frame for the bring-up of a node (J-12, J-20).
+//! Selection of the frame of each tick: a Move, or a frame for the bring-up of a node (J-12, J-20).
 use jtc_bus::{Frame, NodeState, Request, Target};
 
 use super::{GRIPPER, Goal, Node, Nodes};
 use crate::config::Config;
 use crate::{JOINTS, NODES};
 
-/// Number of Moves between two frames that replace a Move (J-12: at most one tick of four).
+/// Number of Moves between two frames that the controller sends instead of a Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
-/// Like [`MOVES_BETWEEN`], while torque is on and only the gripper needs such a frame.
+/// Like [`MOVES_BETWEEN`], while the torque is on and only the gripper needs such a frame.
 const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {
-    /// Creates the frame of this tick (J-12). `must_move` means that this frame must be a Move, because it is the first frame after an
-    /// error or after the removal of the torque.
+    /// Creates the frame of this tick (J-12). `must_move` is `true` if this frame must be a Move, because it is the first frame after an
+    /// error or after the torque was switched off.
     pub(crate) fn frame(
         &mut self,
         config: &Config,
@@ -33,7 +33,7 @@ impl Nodes {
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         if goal == Goal::Enabled && self.all().iter().all(Node::wants_nothing_enabled) {
-            // Nearly every tick with torque returns at this point.
+            // In nearly every tick with torque, the function returns at this point.
             return None;
         }
         let present = self.present();
@@ -55,10 +55,10 @@ impl Nodes {
             && self.gripper_answers(config)
             && self.gripper_node().is_some_and(Node::wants_configuration);
         if goal == Goal::Enabled && self.moves < MOVES_ASIDE && all_unchanged(&target[..JOINTS]) {
-            // A frame for the gripper alone is sent rarely, so that nearly every tick sends the torque of the arm (J-23).
+            // A frame for the gripper alone is sent rarely, because nearly every tick must send the torque of the arm (J-23).
             return None;
         }
-        // Enabled nodes refuse a configuration. Therefore the controller first disables such nodes.
+        // Enabled nodes refuse a configuration. Therefore the controller first disables enabled nodes.
         let to_disable = self
             .nodes
             .iter()
@@ -76,7 +76,7 @@ impl Nodes {
         change.then_some(Request::ChangeFsm { target })
     }
 
-    /// Returns the requested state of each node.
+    /// Returns the state that the controller requests from each node.
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
@@ -89,7 +89,8 @@ impl Nodes {
         target
     }
 
-    /// Returns the requested state of the gripper. The gripper is also brought up in states with torque, in addition to the joints (J-23).
+    /// Returns the state that the controller requests from the gripper. In states with torque, the controller also brings up the gripper
+    /// (J-23).
     fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
         let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
             return Target::NoChange;

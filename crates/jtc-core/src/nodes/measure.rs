@@ -1,13 +1,14 @@
 //! Measured position and velocity of a joint, and their prediction while its answers are missing (J-35, J-63).
 //!
-//! An answer is *usable* if the joint can have reached the answered position since the last usable answer. In a tick without a usable
-//! answer, the *prediction* is used. The prediction is the last usable answer, extrapolated with the rate of the joint, plus the change of
-//! the commanded velocity since that answer. The first usable answer after missing answers differs from the prediction by an *offset*. The
-//! offset fades, so that missing and returning answers do not cause a step of the position or of the derivative of the position error. A
-//! *late* answer ([`Lateness`]) belongs to the time at which it was due. The late answer is compared with the prediction for that time, and
-//! the prediction continues from this answer. A late answer that is close to its prediction is used directly, like an answer in time. With
-//! an offset that fades in each tick, the position loop would contain a filter and would swing. The offset is not part of the prediction.
-//! The prediction depends only on answers and commands, so that the position loop stays closed even if many answers are lost.
+//! An answer is *usable* if the joint can have moved from the last usable answer to this position in the time between both answers. In a
+//! tick without a usable answer, the controller uses the *prediction*. The prediction is the last usable answer, extrapolated with the rate
+//! of the joint, plus the change of its commanded velocity since that answer. The first usable answer after missing answers differs from
+//! the prediction by an *offset*. The offset fades, so that missing and returning answers do not cause a step of the position or of the
+//! derivative of the position error. A *late* answer ([`Lateness`]) belongs to the time at which it was due. The late answer is compared
+//! with the prediction for that time, and the new prediction starts from this answer. A late answer that is close to its prediction is used
+//! directly, like an answer that arrives on time. An offset that fades in each tick would act as a filter in the position loop, and the
+//! loop would swing. The offset is not a part of the prediction. The prediction depends only on answers and commands, so the position loop
+//! stays closed even if many answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -25,31 +26,31 @@ pub(super) use jump::Ways;
 use jump::{Jumps, Seen};
 use lateness::Lateness;
 
-/// Impossible speed of a joint, as a multiple of its velocity limit. If an answer is further from the prediction than a joint could move at
-/// this speed, the answer is not usable (J-35).
+/// Speed that a joint cannot reach, as a multiple of its velocity limit. If the distance between an answer and the prediction is more than
+/// a joint could move at this speed, the answer is not usable (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Distance from the prediction, as a share of the implausible distance, above which an answer is not used for the rate. After a jump of
-/// its encoder, a joint has not moved.
+/// Distance from the prediction, as a share of the implausible distance, above which an answer is not used for the rate of the joint. An
+/// answer far from the prediction may show a jump of the encoder, in which the joint has not moved.
 const UNEXPECTED: f64 = 0.1;
-/// Largest difference between a late answer and its prediction for which the answer is used directly, in steps of the encoder. Positions
-/// and predicted rates have this resolution.
+/// Largest difference between a late answer and its prediction for which the answer is used directly, in steps of the encoder. The
+/// positions and the predicted rates have the resolution of the encoder.
 const IN_ITS_PLACE: f64 = 2.0;
-/// Coarsest encoder step to which [`IN_ITS_PLACE`] is applied, rad. An answer that is used directly may cause a step of this size.
+/// Largest encoder step to which [`IN_ITS_PLACE`] is applied, rad. An answer that is used directly may cause a position step of this size.
 const COARSEST: f64 = 1e-4;
-/// Highest distance from the prediction, as a share of the implausible distance, after the jump of the encoder was subtracted from an
+/// Highest distance from the prediction, as a share of the implausible distance, after the jump of the encoder is subtracted from an
 /// answer.
 const NEAR: f64 = 0.5;
-/// Highest difference between the predicted rate and the reported velocity, rad/s.
+/// Highest difference between the predicted rate of a joint and its reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
-/// Highest ratio of two deviations from the due velocity. The first is the deviation of the velocity over the last 5 ms, the second is the
-/// deviation of the reported mean over 10 ms. With a constant acceleration the ratio is 2.
+/// Highest ratio of two deviations from the due velocity. The first deviation belongs to the velocity over the last 5 ms, the second to the
+/// reported mean over 10 ms. With a constant acceleration, this ratio is 2.
 const YOUNGER: f64 = 2.5;
-/// Highest rate of a prediction, as a multiple of the velocity limit.
+/// Highest rate of a joint in a prediction, as a multiple of the velocity limit.
 const FASTEST: f64 = 1.2;
-/// Double pole of a fading offset, times the configured time. After the configured time a fifth of the offset remains, and after twice this
-/// time a fiftieth.
+/// Double pole of the filter for a fading offset, multiplied by the configured time. After the configured time a fifth of the offset
+/// remains, and after twice this time a fiftieth.
 const FADING: f64 = 3.0;
-/// Value below which an offset is set to zero, rad or rad/s.
+/// Magnitude below which an offset is set to zero, rad or rad/s.
 const FADED: f64 = 1e-9;
 
 /// Position and velocity of a joint.
@@ -64,21 +65,21 @@ pub(crate) struct Reading {
 /// Measurements of one joint in one tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
-    /// Answer of the joint, if an answer has arrived.
+    /// Answer of the joint, if an answer has arrived in this tick.
     pub answer: Option<Reading>,
-    /// A Move requested an answer in this tick.
+    /// `true` if a Move requested an answer in this tick.
     pub expected: bool,
-    /// The Move was acknowledged.
+    /// `true` if the bus acknowledged this Move.
     pub asked: bool,
-    /// Number of answers in this tick. All answers except the last answer were late.
+    /// Number of answers in this tick. All answers except the last one were late.
     pub answers: u8,
-    /// Commanded velocity, rad/s.
+    /// Commanded velocity of the joint, rad/s.
     pub commanded: f64,
-    /// Milliseconds since the last tick.
+    /// Time since the last tick, ms.
     pub elapsed_ms: u32,
     /// Velocity limit of the joint, rad/s.
     pub velocity_max: f64,
-    /// The drive is enabled.
+    /// `true` if the drive is enabled.
     pub enabled: bool,
     /// Index of the joint.
     pub joint: usize,
@@ -87,33 +88,33 @@ pub(crate) struct Tick {
 /// Result of one tick for one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// The answer is usable.
+    /// The answer is usable, and the control law uses it.
     Used,
-    /// The answer is not usable, or is missing.
+    /// The answer is not usable or is missing, so the control law uses the prediction.
     Predicted,
     /// The answer is usable and confirms that the encoder has jumped (J-35).
     Jumped,
 }
 
-/// Answer that is far from its expected position.
+/// Answer that is far from its predicted position.
 struct Unexpected {
     answer: Reading,
     /// Prediction minus answer, rad.
     off: f64,
-    /// The implausible distance, rad.
+    /// Implausible distance, rad.
     reach: f64,
     /// Time at which the answer was due, ms.
     at_ms: u32,
-    /// The answer must be checked for a jump of the encoder.
+    /// `true` if the answer must be checked for a jump of the encoder.
     looked_at: bool,
     /// Index of the joint.
     joint: usize,
 }
 
-/// Late answer, and the motion that was commanded since the answer was due.
+/// Lateness of a late answer, and the motion that was commanded since the answer was due.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
-    /// Lateness, ms.
+    /// Lateness of the answer, ms.
     pub ms: u32,
     /// Velocity that was commanded when the answer was due, rad/s.
     pub commanded: f64,
@@ -121,16 +122,16 @@ pub(crate) struct Late {
     pub commanded_way: f64,
 }
 
-/// Known motion of a joint.
+/// State of the measurement of a joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measurement {
     /// Position and velocity that the control law uses.
     used: Reading,
-    /// At least one usable answer has arrived.
+    /// `true` if at least one usable answer has arrived.
     known: bool,
-    /// Time, ms. The clock wraps around after 49 days, which does not affect time differences.
+    /// Time of the measurement, ms. The clock overflows after 49 days, which does not affect time differences.
     clock_ms: u32,
-    /// Last usable answer, with a position that is extrapolated to the present tick.
+    /// Last usable answer. Its position is extrapolated to the present tick.
     answer: Reading,
     /// Time to which the last usable answer belongs, ms.
     answered_ms: u32,
@@ -138,30 +139,31 @@ pub(crate) struct Measurement {
     commanded: f64,
     /// Rate of the answered positions at the time of the last usable answer, rad/s.
     rate: f64,
-    /// Rate that a prediction uses, rad/s. This rate is limited to the neighbourhood of the reported velocity.
+    /// Rate that a prediction uses, rad/s. The rate for a prediction is limited to values near the reported velocity.
     carried: f64,
     /// Last usable answers of the joint.
     history: History,
     /// Lateness of the answers.
     lateness: Lateness,
-    /// Jumps of the encoder.
+    /// State of the detection of encoder jumps.
     jumps: Jumps,
-    /// An answer has been missing since the last usable answer.
+    /// `true` if an answer has been missing since the last usable answer.
     missing: bool,
-    /// Part of the difference between prediction and answer that has not faded yet.
+    /// Remainder of the difference between prediction and answer that has not faded yet.
     position_offset: Fading,
     velocity_offset: Fading,
-    /// At least one offset has not faded yet.
+    /// `true` if at least one offset has not faded yet.
     fading: bool,
 }
 
 /// Offset that fades without a step of its value or slope, like a critically damped filter of second order. The offset continues to fade
-/// when another difference is added to it. If the fading restarted instead, the offset would never fade while every second answer is lost.
+/// when a further difference is added to the offset. If the fading restarted instead, the offset would never fade while every second answer
+/// is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
-    /// Remaining offset, rad or rad/s.
+    /// Remainder of the offset, rad or rad/s.
     left: f64,
-    /// Change per millisecond.
+    /// Change of the offset per millisecond.
     slope: f64,
 }
 
@@ -186,7 +188,7 @@ bit_codec!(Measurement {
 });
 
 impl Fading {
-    /// Runs one tick.
+    /// Executes one tick, in which the offset fades.
     fn step(&mut self, elapsed_ms: u32, config: &Config) {
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
@@ -200,21 +202,21 @@ impl Fading {
         }
     }
 
-    /// Reduces the offset by `by` if the signs are opposite. The offset does not change beyond zero.
+    /// Reduces the offset by `by` if the signs are opposite. The offset does not change its sign.
     fn take_back(&mut self, by: f64) {
         let left = self.left + by;
         self.left = if self.left > 0.0 { left.max(0.0).min(self.left) } else { left.min(0.0).max(self.left) };
     }
 }
 
-/// Returns the highest distance between a late answer and its prediction at which the answer is used directly, rad.
+/// Returns the highest distance between a late answer and its prediction at which the controller uses the answer directly, rad.
 fn place(config: &Config) -> f64 {
     config.encoder_step.min(COARSEST) * IN_ITS_PLACE
 }
 
 impl Late {
-    /// Creates a late answer of this joint that is `ticks` late. The lateness is limited to the ticks for which the commanded motion is
-    /// stored.
+    /// Creates the data of an answer of this joint that is `ticks` late. The lateness is limited to the ticks for which the commanded
+    /// motion is stored.
     #[cold]
     pub(super) fn new(ticks: u8, joint: usize, commanded: &Commanded, config: &Config) -> Self {
         let now = config.delay_ticks.max(1);
@@ -227,7 +229,7 @@ impl Late {
         }
     }
 
-    /// Returns the distance that the joint has moved since the answer was due, rad, if the rate at that time was `carried` (rad/s).
+    /// Returns the distance that the joint has moved since the answer was due, rad, for a rate of `carried` (rad/s) at that time.
     fn way(&self, carried: f64) -> f64 {
         self.commanded_way + (carried - self.commanded) * (f64::from(self.ms) * DT)
     }
@@ -239,17 +241,17 @@ impl Measurement {
         self.used
     }
 
-    /// Returns the speed of the joint, rad/s. The speed is the reported velocity or the rate of the positions, whichever is higher.
-    /// Reported velocities alone are not trusted, because the full scale of the velocity depends on the drive (J-11).
+    /// Returns the highest known speed of the joint, rad/s. The speed is the reported velocity or the rate of the positions, whichever is
+    /// higher. The reported velocities alone are not sufficient, because the full scale of the velocity depends on the drive (J-11).
     pub(super) fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. The difference from the `due` velocity
-    /// (rad/s) is limited to [`YOUNGER`] times the difference between the reported and the `due` velocity. If the two differences have
-    /// opposite signs, an encoder has jumped and the joint has not moved. In this case the `due` velocity is returned.
+    /// Returns the velocity over the last 5 ms, rad/s, which is more recent than the reported velocity. The difference from the `due`
+    /// velocity (rad/s) is limited to [`YOUNGER`] times the difference between the reported and the `due` velocity. If the two differences
+    /// have opposite signs, an encoder has jumped and the joint has not moved. The function then returns the `due` velocity.
     pub(super) fn young_velocity(&self, due: f64) -> f64 {
-        // The remainder of a fading offset is subtracted, because the offset is even older.
+        // The reported velocity includes the remainder of a fading offset, which is even older. The remainder of the offset is subtracted.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
@@ -260,18 +262,19 @@ impl Measurement {
         self.jumps.taken_off()
     }
 
-    /// Returns the disagreement of the two encoders that was found since the drive was configured. The value is the size of a jump (rad) or
-    /// the factor of a speed.
+    /// Returns the disagreement of the two encoders of the joint since its drive was configured. The second element is the size of a jump
+    /// (rad) or the factor of a speed.
     pub(super) fn misfit(&self) -> Option<(StopKind, f64)> {
         self.jumps.found()
     }
 
-    /// Stores that positions change `factor` times as fast as the reported speed.
+    /// Records that the positions of the joint change `factor` times as fast as the reported speed.
     pub(super) fn find_factor(&mut self, factor: f32) {
         self.jumps.find_factor(factor);
     }
 
-    /// Returns the two distances of the answer in this tick. Returns `None` if no answer exists, or if the distances are not known.
+    /// Returns the distances of the joint within the window of its reported speed, according to its positions and according to this speed.
+    /// Returns `None` if the distances are not known.
     pub(super) fn ways(&self, config: &Config) -> Option<Ways> {
         let window_ms = config.drive_speed_window_ms;
         let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
@@ -279,18 +282,18 @@ impl Measurement {
         Ways::of(&Reading { position, ..self.answer }, from, config)
     }
 
-    /// Discards the prediction, so that the next answer is used without a correction.
+    /// Discards the prediction, so that the controller uses the next answer without a correction.
     pub(super) fn forget(&mut self) {
         self.known = false;
     }
 
-    /// Sets the reference for changes of the commanded velocity, rad/s.
+    /// Sets the velocity (rad/s) from which changes of the commanded velocity are counted.
     pub(super) fn go_on_moving(&mut self, commanded: f64) {
         self.commanded = commanded;
     }
 
-    /// Runs one tick. The jump of the encoder has already been subtracted from the answer. `past` returns the commanded motion since a
-    /// number of ticks ago.
+    /// Executes one tick of the measurement. The jump of the encoder has already been subtracted from the answer in `tick`. `past` returns
+    /// the motion that was commanded in the last ticks, for a number of ticks.
     pub(super) fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
@@ -300,7 +303,7 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
-        // Answers are rarely late. The code for late answers is compiled separately.
+        // Answers are rarely late. The code for late answers is therefore compiled as a separate function.
         if self.lateness.stands(tick.answers) {
             self.take(tick, None, config)
         } else {
@@ -308,20 +311,22 @@ impl Measurement {
         }
     }
 
-    /// Runs the remainder of a tick whose answer may be late. `tick` is passed by value, because a `tick` in memory would slow down every
-    /// tick.
+    /// Executes the remaining steps of a tick whose answer may be late. `tick` is passed by value, because a `tick` in memory would slow
+    /// down every tick.
     #[cold]
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
-        // The answer is younger than the last answer. The count may be wrong, because a repeated frame also counts as evidence.
+        // An answer is always more recent than the last answer, which limits its lateness. The counted lateness may be wrong, because a
+        // repeated frame also counts as a late answer.
         let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
         let ticks = if self.known { counted.min(since.min(u8::MAX.into()) as u8) } else { counted };
         let late = self.late(ticks, &tick, past, config);
         self.take(&tick, late, config)
     }
 
-    /// Uses the answer of a tick if it is usable. The function is inlined, because half of the code is not needed without a late answer.
+    /// Uses the answer of a tick if it is usable. The function is inlined, because in a tick without a late answer the compiler can remove
+    /// half of its code.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -364,7 +369,7 @@ impl Measurement {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
-            // If a suspected jump is not confirmed, the difference is bridged like a missing answer.
+            // If later answers do not confirm a suspected jump, the difference is bridged like a missing answer.
             self.missing = self.jumps.watching();
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
@@ -383,7 +388,7 @@ impl Measurement {
     #[inline(never)]
     fn unexpected(&mut self, unexpected: Unexpected, config: &Config) -> (Option<Reading>, Outcome) {
         let Unexpected { answer, off, reach, at_ms, looked_at, joint } = unexpected;
-        // A position minus its jump may be on the other side of the point at which the positions of the drive wrap around.
+        // A position minus the jump of its encoder may be on the other side of the point at which the positions of the drive wrap around.
         let turn = if self.jumps.taken_off() == 0.0 || off.abs() <= PI { 0.0 } else { off.signum() * TAU };
         let (answer, off) = (Reading { position: answer.position + turn, ..answer }, off - turn);
         let seen = if off.abs() <= UNEXPECTED * reach || !looked_at {
@@ -393,7 +398,8 @@ impl Measurement {
             let twist = torque_max / config.gear_stiffness;
             self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
         };
-        // After the jump is subtracted, the position must be near the predicted position. Otherwise the reported speed is wrong as well.
+        // After the jump is subtracted, the position must be near the predicted position. If the position is not near the predicted
+        // position, the reported speed is also wrong.
         let near = |way: f64| (off + way).abs() <= NEAR * reach;
         let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
         match seen {
@@ -409,9 +415,9 @@ impl Measurement {
         }
     }
 
-    /// Bridges the difference between the answer of this tick and `predicted`, so that the difference does not become a step. An answer
-    /// close to its prediction does not make a step. Such an answer reduces the remainder of earlier differences, because the differences
-    /// would otherwise add up.
+    /// Bridges the difference between the answer of this tick and `predicted`, so that this difference does not cause a step. An answer
+    /// close to its prediction does not cause a step. An answer close to its prediction reduces the remaining offset of earlier
+    /// differences, because these differences would otherwise add up.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -426,7 +432,7 @@ impl Measurement {
         }
     }
 
-    /// Returns the motion that was commanded since the answer of this tick was due. The counted lateness of the answer is `ticks`.
+    /// Returns the motion that was commanded since the answer of this tick was due. `ticks` is the counted lateness of the answer.
     fn late(&mut self, ticks: u8, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Option<Late> {
         let answer = tick.answer?;
         let counted = past(ticks);
@@ -437,7 +443,8 @@ impl Measurement {
         if !self.known || in_its_place(&counted) {
             return Some(counted);
         }
-        // If a joint is fast, a lost answer is detected at once, because the positions in the next answers correspond to less lateness.
+        // If a joint is fast, the controller detects a lost answer at once, because the positions in the next answers correspond to less
+        // lateness.
         let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
             return Some(counted);
         };
@@ -445,16 +452,17 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Computes the rate between the youngest answer that is old enough, and this answer. The rate is computed only from answers. While
-    /// every second answer is lost, a rate computed from predictions would confirm itself for any motion of the joint. `as_predicted` means
-    /// that the answer was close to its prediction. The function is inlined for the ticks without a late answer.
+    /// Computes the rate of the joint from this answer and the most recent answer that is old enough. The rate is computed only from
+    /// answers, not from predictions. While every second answer is lost, a rate computed from predictions would confirm itself for any
+    /// motion of the joint. `as_predicted` is `true` if the answer was close to its prediction. The function is inlined, so that ticks
+    /// without a late answer need less code.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;
         let answered = Answered { position, at_ms };
         let rate = self.history.take(&answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);
-        // If the encoder of the joint has jumped, only the velocity that the drive reports is used.
+        // If the encoder of the joint has jumped, the prediction uses only the velocity that the drive reports.
         let carried = match rate {
             Some(rate) if as_predicted && rate.as_predicted => rate.rad_s,
             _ => velocity,

@@ -23,13 +23,13 @@ pub(crate) enum Goal {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Node {
     pub report: JointReport,
-    /// The node has answered a Move since its start or reset.
+    /// `true` if the node has answered a Move since its start or reset.
     pub(super) seen: bool,
-    /// The node has accepted its configuration.
+    /// `true` if the node has accepted its configuration.
     pub(super) configured: bool,
-    /// The node has answered a Move after it accepted its configuration, so position and velocity are valid.
+    /// `true` if the node has answered a Move after it accepted its configuration, so that position and velocity are valid.
     pub(super) valid: bool,
-    /// The node has refused its configuration in its present state.
+    /// `true` if the node has refused its configuration in its present state.
     pub(super) refused: bool,
     /// Number of consecutive Moves that the node has not answered.
     pub(super) silent: u8,
@@ -37,25 +37,26 @@ pub(crate) struct Node {
     pub(super) missed: u8,
     /// Measured position and velocity, as soon as both values are valid.
     pub(super) measured: Measurement,
-    /// Number of ticks in which a missing answer of the node is not an error yet.
+    /// Remaining number of ticks in which a missing answer of the node is not an error yet.
     pub(super) boot_left: u32,
     pub(super) deaf_left: u8,
-    /// The node is commanded to Init to clear its errors, until the node is in Init (J-21).
+    /// `true` while the controller requests Init from the node to clear its errors (J-21).
     pub(super) clear: bool,
-    /// A reset frame must be sent.
+    /// `true` if the controller must send a reset frame to the node.
     pub(super) reset: bool,
-    /// The node reported OperationEnable while OperationEnable was requested.
+    /// `true` if the node reported OperationEnable while the controller requested this state.
     pub(super) enabled: bool,
     pub(super) enable_wait: u32,
-    /// A usable answer has come since the last tick, so the measurement is not a prediction.
+    /// `true` if a usable answer has arrived since the last tick, so that the measurement is not a prediction.
     pub(super) fresh: bool,
-    /// The joint is marked as absent (J-53).
+    /// `true` if the joint is marked as absent (J-53).
     pub(super) absent: bool,
     /// State that the node reported while its answers were ignored.
     pub(super) unasked: Option<NodeState>,
-    /// Number of answers since the last tick. All answers except the last answer were late.
+    /// Number of answers since the last tick. All answers except the last one were late.
     pub(super) answers: u8,
-    /// The node misbehaved in this tick, because it left OperationEnable, was not enabled in time, or reported implausible positions.
+    /// `true` if the node misbehaved in this tick: it left OperationEnable, was not enabled before the timeout, or reported implausible
+    /// positions.
     pub(super) misbehaved: bool,
 }
 
@@ -82,7 +83,7 @@ bit_codec!(Node {
 });
 
 impl Node {
-    /// Returns `true` if a usable answer has come since the last tick.
+    /// Returns `true` if a usable answer has arrived since the last tick.
     pub(crate) fn fresh(&self) -> bool {
         self.fresh
     }
@@ -97,7 +98,8 @@ impl Node {
         self.absent
     }
 
-    /// Returns the reported state. For an absent joint, the state is Start, unless the drive of the joint still reports a state.
+    /// Returns the state that the node reports. For an absent joint, the state is Start, unless the drive of the joint still reports a
+    /// state.
     pub(crate) fn state(&self) -> NodeState {
         if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }
@@ -110,19 +112,19 @@ impl Node {
         self.report.state.is_starting()
     }
 
-    /// Returns `true` if the node lost its configuration, or is back in Start or Init (J-20).
+    /// Returns `true` if the node has lost its configuration, or has changed back to Start or Init (J-20).
     pub(crate) fn fallen_back(&self) -> bool {
         !self.valid || self.starting()
     }
 
-    /// Returns `true` if the node reports an error. A gripper has no warnings.
+    /// Returns `true` if the node reports an error or a safety-line warning. Other warnings do not count.
     pub(crate) fn faulty(&self) -> bool {
-        // Drives also set this warning before they are configured, at any level of the safety line.
+        // Drives also set the safety-line warning before they are configured, at any level of the safety line.
         let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
         self.in_fault() || (self.seen && safety_line)
     }
 
-    /// Returns `true` if the node reports a fault of its own.
+    /// Returns `true` if the node reports a fault of the node itself.
     pub(crate) fn in_fault(&self) -> bool {
         let r = &self.report;
         self.seen && (r.state.is_fault() || (r.errors | r.mc_current) != 0)
@@ -133,8 +135,9 @@ impl Node {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
     }
 
-    /// Sets the node of an absent joint to configured, ready and silent in every tick (J-53). So the controller does not request a state
-    /// from the node, and does not wait for the node. A drive that answers is an error, because either the drive or the setting is wrong.
+    /// Sets the node of an absent joint to configured, ready and silent in every tick (J-53). The controller then does not request a state
+    /// from the node, and does not wait for the node. A drive of an absent joint that answers is an error, because either the drive or the
+    /// setting is wrong.
     pub(crate) fn stand_in(&mut self) {
         let unasked = self.unasked;
         *self = Self {
@@ -149,13 +152,14 @@ impl Node {
         self.report.state = NodeState::READY;
     }
 
-    /// Discards the configuration, which must be accepted again. Until the configuration is accepted, position and velocity are not valid.
+    /// Discards the configuration, so that the node must accept a configuration again. Until the node has accepted a configuration, its
+    /// position and velocity are not valid.
     pub(crate) fn lose_configuration(&mut self) {
         (self.configured, self.valid, self.refused) = (false, false, false);
         self.measured = Measurement::default();
     }
 
-    /// Returns the state that is requested from the node (J-16).
+    /// Returns the state that the controller requests from the node (J-16).
     pub(crate) fn request(&self, goal: Goal) -> Target {
         let state = self.report.state;
         if !self.seen {
@@ -164,7 +168,7 @@ impl Node {
             return if powered { Target::Ready } else { Target::NoChange };
         }
         if self.clear {
-            // A drive ignores Init while it is enabled.
+            // A drive ignores a request for Init while it is enabled.
             return if state == NodeState::ENABLED { Target::Ready } else { Target::Init };
         }
         let moving = state.is_transition();
@@ -205,7 +209,7 @@ impl Node {
 mod tests {
     use super::*;
 
-    /// The short check and the long check have the same result.
+    /// The short check and the long check of an enabled node have the same result.
     #[test]
     fn j12_j16_an_enabled_node_wants_nothing() {
         for bits in 0..16u8 {
@@ -224,7 +228,7 @@ mod tests {
         }
     }
 
-    /// A drive that was enabled before the controller started keeps its state, but its configuration is not known.
+    /// A drive that was enabled before the controller started is still enabled, but its configuration is not known.
     #[test]
     fn j16_a_node_is_enabled_when_it_says_so_and_its_configuration_is_known() {
         for (valid, state, enabled) in [

@@ -1,7 +1,8 @@
-//! Checks whether the positions and the speed that a drive reports agree (J-35).
+//! Check that the positions and the speed that a drive reports agree (J-35).
 //!
-//! Positions and speed come from two encoders, so each encoder shows a fault of the other encoder. A wrong full scale makes all speeds
-//! wrong by a factor. A slipping encoder moves while the motor is at rest. An encoder that has stopped is at rest while the motor moves.
+//! Positions and speed come from two encoders, so each encoder reveals a fault of the other encoder. If the configured full scale is wrong,
+//! all speeds are wrong by the same factor. The position of a slipping encoder changes while the motor is at rest. The position of an
+//! encoder that has stopped is constant while the motor moves.
 use super::measure::Ways;
 use super::node::Node;
 use crate::JOINTS;
@@ -11,12 +12,12 @@ use crate::config::limits::JointConfig;
 
 /// Number of ticks between two checks of the same joint. Each tick checks at most one joint.
 const PERIOD: u8 = 10;
-/// Number of consecutive checks of a joint that must show a difference in the same direction.
+/// Number of consecutive checks of a joint that must show a difference in the same direction before the fault is reported.
 const LOOKS: u8 = 5;
-/// Multiple of the largest gear twist that the sum of the differences must exceed. A hand or a wall may twist the gear by less than this
-/// amount.
+/// Lowest sum of the differences that counts as a fault, as a multiple of the largest gear twist. A hand or a wall may twist the gear by
+/// less than this angle.
 const TWISTS: f64 = 2.0;
-/// Ratio of the two distances above which the encoder with the shorter distance is considered at rest.
+/// Ratio of the two distances above which the encoder with the shorter distance is considered to be at rest.
 const STANDS: f32 = 10.0;
 
 /// Differences between the position and the speed of a joint in its last checks.
@@ -29,7 +30,7 @@ struct Differs {
     reported: f32,
 }
 
-/// Number and size of the differences between the two encoders.
+/// State of the check that compares the two encoders of each joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SpeedCheck {
     /// Index of the joint that is checked next.
@@ -43,8 +44,8 @@ bit_codec!(Differs { looks, measured, reported });
 bit_codec!(SpeedCheck { turn, differs, torque });
 
 impl SpeedCheck {
-    /// Runs one tick. Returns a mask with the joint whose speed has another scale than configured. If only one encoder of a joint moves,
-    /// the node of the joint is marked as misbehaved.
+    /// Executes one tick of the check. Returns a mask with the joint whose reported speed does not have the configured scale. If only one
+    /// encoder of a joint moves, the node of the joint is marked as misbehaved.
     #[inline(always)]
     pub(super) fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
         let turn = self.turn;
@@ -69,8 +70,8 @@ impl SpeedCheck {
 }
 
 impl Differs {
-    /// Adds a difference. Returns `true` if the differences show that the speed has another scale. `before` is the torque at the last
-    /// check, N·m.
+    /// Adds a difference between the two encoders of a joint. Returns `true` if the differences show that the reported speed does not have
+    /// the configured scale. `before` is the torque at the last check, N·m.
     #[cold]
     fn differ(
         &mut self,
@@ -80,7 +81,7 @@ impl Differs {
         limits: &JointConfig,
         config: &Config,
     ) -> bool {
-        // Possible twist of the gear since the last check.
+        // `twist` is the possible twist of the gear since the last check.
         let twist = (node.report.torque - f64::from(before)).abs() / config.gear_stiffness;
         if ways.unexplained().abs() <= ways.tolerance(config) + twist {
             self.looks = 0;

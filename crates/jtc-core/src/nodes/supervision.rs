@@ -1,4 +1,4 @@
-//! Detects errors of the nodes: missing answers (J-14, J-35), and joints that leave OperationEnable or do not reach this state (J-16).
+//! Detection of node errors: missing answers (J-14, J-35), and joints that leave OperationEnable or do not reach this state (J-16).
 use jtc_bus::{NodeState, warning};
 use jtc_wire::can_flag;
 
@@ -11,7 +11,7 @@ impl Nodes {
     /// Counts Moves without an answer, without a usable answer, and without an acknowledgement (J-14, J-35).
     pub(super) fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
-        // While all nodes start, no node acknowledges a frame.
+        // While all nodes are starting, no node acknowledges a frame.
         let any_booted = || self.all().iter().any(|node| node.boot_left == 0 && !node.absent);
         if on_the_bus {
             self.unacknowledged = 0;
@@ -26,8 +26,8 @@ impl Nodes {
             }
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
-            // A frame without an acknowledgement cannot have an answer, but the transmit timeout has not been raised yet. Therefore the
-            // joint is still predicted (J-63).
+            // A frame that no node has acknowledged cannot have an answer, but the transmit timeout has not been raised yet. Therefore the
+            // controller still predicts the motion of the joint (J-63).
             let predicted =
                 self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
@@ -37,19 +37,20 @@ impl Nodes {
                 node.silent = more(node.silent);
             }
             if usable || self.unacknowledged >= config.missed_moves_max {
-                // In the second case, the transmit timeout is reported instead of missing answers of the joints.
+                // If too many frames were not acknowledged, the controller reports the transmit timeout instead of missing answers of the
+                // joints.
                 node.missed = 0;
             } else if answered || unanswered || predicted {
                 node.missed = more(node.missed);
             }
             let enabled_gripper = n == GRIPPER && node.report.state == NodeState::ENABLED;
             if node.silent == config.missed_moves_max && !enabled_gripper {
-                // In any state, the node may have lost its supply and therefore its configuration. The state of an enabled gripper shows
-                // this when the gripper answers again. If the gripper is still enabled, it has held its part meanwhile.
+                // In any state, a silent node may have lost its supply and therefore its configuration. When an enabled gripper answers
+                // again, its state shows whether it has lost its configuration. If the gripper is still enabled, it has kept its workpiece.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: either the answers of the joint contain impossible positions, or too few Moves were acknowledged to decide whether
-                // the joint answers. The prediction must not last longer than this (J-63).
+                // J-35: the answers of the joint contain impossible positions, or too few Moves were acknowledged to decide whether the
+                // joint answers. After `missed_moves_max` ticks, the controller must not predict the motion of the joint any longer (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();
@@ -57,7 +58,8 @@ impl Nodes {
         }
     }
 
-    /// Detects joints that leave OperationEnable without a request, do not reach this state in time (J-16), or lose their position.
+    /// Detects joints that leave OperationEnable without a request, do not reach this state before the timeout (J-16), or lose their
+    /// position.
     pub(super) fn watch(&mut self, config: &Config, goal: Goal) {
         let may_enable = self.may_enable(config);
         for node in self.nodes.iter_mut().take(JOINTS) {
@@ -76,7 +78,7 @@ impl Nodes {
                 node.misbehaved = true;
             }
             node.enabled = false;
-            // J-16: no state is requested while the arm falls.
+            // J-16: the controller does not request OperationEnable while the arm falls, so the waiting time is not counted.
             node.enable_wait = node.enable_wait.saturating_add(u32::from(may_enable));
             if node.enable_wait > config.enable_timeout_ms {
                 (node.misbehaved, node.enable_wait) = (true, 0);
@@ -84,8 +86,8 @@ impl Nodes {
         }
     }
 
-    /// Returns the CAN flags of this tick that are errors. These flags show a transmit timeout or bus-off, and the receive timeouts of the
-    /// joints.
+    /// Returns the CAN flags of this tick that are errors. The CAN flags report a transmit timeout, bus-off, or a receive timeout of a
+    /// joint.
     pub(crate) fn can_flags(&self, inputs: &Inputs<'_>, config: &Config) -> u32 {
         let transmit = inputs.bus_state.bus_off || self.unacknowledged >= config.missed_moves_max;
         let mut flags = can_flag::TRANSMIT_TIMEOUT * u32::from(transmit);
@@ -95,14 +97,14 @@ impl Nodes {
         flags
     }
 
-    /// Returns `true` if a joint has an error, or misbehaved in this tick. While the torque is off, errors that are being cleared are
-    /// ignored.
+    /// Returns `true` if a joint reports an error, or misbehaved in this tick. While the torque is off, the function ignores errors that
+    /// are being cleared.
     pub(crate) fn external_error(&self, powered: bool) -> bool {
         self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
     }
 
-    /// Returns `true` if a joint reports a fault that only a clear of this joint can end, and the clear has not been requested. A
-    /// safety-line warning ends by itself.
+    /// Returns `true` if a joint reports a fault that ends only when the controller clears it, and the host has not requested this. A
+    /// safety-line warning does not count, because it ends without a clear.
     pub(crate) fn fault_stays(&self) -> bool {
         self.joints().iter().any(|node| !node.clear && node.in_fault())
     }

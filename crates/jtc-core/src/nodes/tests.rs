@@ -20,7 +20,7 @@ fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
     nodes.take(&inputs(bus, bus_state), &Config::avena(), Goal::Ready, &Commanded::default());
 }
 
-/// Returns nodes that are all configured and ready. A Move has just been sent.
+/// Returns nodes that are all configured and ready. The controller has just sent a Move.
 fn ready() -> Nodes {
     let mut nodes = Nodes::new(&Config::avena());
     for node in &mut nodes.nodes {
@@ -55,7 +55,7 @@ fn j16_joints_may_be_enabled_when_they_were_slow_and_rested_for_long_enough() {
     }
 }
 
-/// The time for which the arm is slow begins when the positions of all joints are known.
+/// The time for which the arm is slow is counted only after the positions of all joints are known.
 #[test]
 fn j16_an_arm_that_is_not_known_is_not_still() {
     let mut nodes = ready();
@@ -91,7 +91,7 @@ fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
     assert_eq!(watched(false, NodeState::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::READY, 0, 0, Goal::Enabled), (true, false, 0));
-    // According to J-20, this case is an error.
+    // If a joint has changed back to Init, the controller returns to Init (J-20). The check of J-16 does not report such a joint.
     assert_eq!(watched(true, NodeState::INIT, 0, 0, Goal::Enabled), (false, false, 0));
     for goal in [Goal::Ready, Goal::Down] {
         assert_eq!(watched(true, NodeState::READY, 7, still, goal), (false, false, 0), "it was asked to");
@@ -173,10 +173,10 @@ fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
     assert!(nodes.node(2).configured && !nodes.node(2).valid);
     tick(&mut nodes, &[joint(2, NodeState::INIT)], GOOD);
     assert!(nodes.node(2).valid);
-    // A later refusal does not revoke the acceptance.
+    // A later refusal of a configuration does not cancel the earlier acceptance.
     tick(&mut nodes, &[Answer::Mode { node: 2, accepted: false }.emit(SCALE)], GOOD);
     assert!(nodes.node(2).configured && nodes.node(2).refused);
-    // After a reset, frames that still arrive are ignored.
+    // Frames of the node that arrive directly after its reset are ignored.
     nodes.nodes[2].restart(&Config::avena());
     tick(&mut nodes, &[accepted, joint(2, NodeState::READY)], GOOD);
     assert!(!nodes.node(2).configured && !nodes.node(2).seen);

@@ -1,4 +1,4 @@
-//! In a held stop (J-69), moving joints come to rest, the arm is held, and the cause is stored for the host.
+//! Held stop (J-69): moving joints come to rest, the controller holds the arm, and stores the cause for the host.
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, Reactions, StopCause, StopKind};
 
 use crate::controller::Controller;
@@ -7,22 +7,22 @@ use crate::motion::RUSH;
 use crate::motion::too_fast;
 use crate::{JOINTS, TrajectoryState, joint_error};
 
-/// Returns this `error` for each joint of a mask.
+/// Returns `error` for each joint of a mask, and 0 for the other joints.
 fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {
     core::array::from_fn(|j| if joints & 1 << j != 0 { error } else { 0 })
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Begins a held stop. `errors` are the joint errors to show.
+    /// Begins a held stop. `errors` are the joint errors that the status shows.
     pub(crate) fn hold_stop(&mut self, errors: &[u16; JOINTS], kind: StopKind) {
         let joint = errors.iter().position(|bits| *bits != 0).unwrap_or(0);
         let (value, limit) = self.measure(kind, joint);
         self.hold_stop_for(errors, self.cause(kind, joint, value, limit));
     }
 
-    /// Like [`Self::hold_stop`], for a cause that is already known.
+    /// Like [`Self::hold_stop`], for a stop whose cause is already known.
     pub(crate) fn hold_stop_for(&mut self, errors: &[u16; JOINTS], cause: StopCause) {
-        // A cause that occurs while the arm is already held is usually a consequence of the first one.
+        // A cause that occurs while the arm is already held is usually a consequence of the first cause.
         if !self.errors.held_stop() {
             self.keep_cause(cause);
         }
@@ -40,7 +40,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// Brings the arm to rest and holds it, also in Teaching, because the encoders of a joint do not agree (J-35).
+    /// Brings the arm to rest and holds it, also in Teaching, because the two encoders of a joint disagree (J-35).
     #[cold]
     pub(crate) fn hold_misfits(&mut self) {
         let misfits = self.nodes.misfits();
@@ -56,14 +56,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Ends Teaching if a hand leads a joint too fast, before the over-speed of the joint would release the arm (J-25). The arm comes to
-    /// rest and is held. `late` is the delay of this tick in ms.
+    /// Ends Teaching if a hand moves a joint too fast, before the over-speed of the joint would make the controller switch the torque off
+    /// (J-25). The arm then comes to rest, and the controller holds it. `late` is the delay of this tick in ms.
     pub(crate) fn end_fast_teaching(&mut self, late: u16) {
         let speeds = self.motion.law.hear_led_joints(&self.nodes, late);
         for j in 0..JOINTS {
             let speed = f64::from(speeds[j]);
             let limit = too_fast(&self.config.joints[j], &self.config);
-            // The speed reported by the drive is older than the computed speed, but it shows that the encoder has not jumped.
+            // The speed that the drive reports is older than the computed speed, but it shows whether the encoder has jumped.
             if speed.abs() > limit && self.nodes.node(j).report.velocity * speed.signum() > 0.5 * limit {
                 self.teaching = false;
                 let cause = self.cause(StopKind::Shove, j, speed, limit);
@@ -73,7 +73,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Refuses to execute a trajectory while the positions are not trusted (J-35), and records this as an occurred error.
+    /// Refuses to execute a trajectory while the controller does not trust the positions (J-35), and records this as an occurred error.
     pub(crate) fn check_trust(&mut self) -> Result<(), DataStatus> {
         match self.nodes.untrusted() {
             0 => Ok(()),
@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Creates the stop cause for the joint with this index.
+    /// Creates the cause of a held stop for the joint with this index.
     pub(crate) fn cause(&self, kind: StopKind, joint: usize, value: f64, limit: f64) -> StopCause {
         StopCause { kind, joint: joint as u8 + 1, value: value as f32, limit: limit as f32 }
     }
@@ -94,9 +94,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.last_stop = LastStop { cause, tick: self.observed.tick };
     }
 
-    /// Returns the measured value of a joint and the limit of that value, in the unit of this kind of cause.
+    /// Returns the measured value of a joint and its limit, in the unit of this kind of cause.
     fn measure(&self, kind: StopKind, joint: usize) -> (f64, f64) {
-        // The index comes from this crate. With `min`, the compiler can see that the index is in range.
+        // The index of the joint always comes from this crate and is valid. With `min`, the compiler can see that the index is in range.
         let j = joint.min(JOINTS - 1);
         let limits = &self.config.joints[j];
         let (law, set) = (&self.motion.law, &self.motion.set);
@@ -117,7 +117,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             StopKind::Velocity | StopKind::FrictionTable => (of(&set.point.velocity), limits.velocity_max),
             StopKind::Acceleration => (of(&set.point.acceleration), limits.acceleration_max),
-            // For these kinds of causes, the caller sets the value, or no value exists.
+            // For these kinds of causes, the caller sets the value, or the cause has no value.
             _ => (0.0, 0.0),
         }
     }

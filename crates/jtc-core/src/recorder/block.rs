@@ -1,30 +1,31 @@
 //! Format of a block in the flight recorder's memory (J-56).
 //!
 //! A block has a head of [`HEAD`] words, followed by bits. The *commit* word of a block contains the number of bits and the check value of
-//! the bits, and is written last, once per tick. Bits after the committed bits are not read, because an interrupted tick may have written
-//! them. If memory was never written or is damaged, the check fails and the memory is not read as a block.
+//! the bits. The commit word is written last, once per tick. Bits after the committed bits are ignored, because an interrupted tick may
+//! have written them. If the memory was never written or is damaged, the check value is wrong, and the memory does not count as a block.
 use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
 
-/// "JTCF" and the version of the layout. Raise the version with each change of the written data, including a list of `bit_codec!`.
+/// "JTCF" and the version of the layout. Increase this version with each change of the recorded data, including each change of a list in
+/// `bit_codec!`.
 pub(super) const MAGIC: u32 = 0x4A46_000A;
-/// Number of words before the bits.
+/// Number of words in the head of a block.
 pub(super) const HEAD: usize = 5;
-/// Number of bits in a block.
+/// Number of bits that a block can contain after its head.
 pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
 
-/// Indices of the words of the head.
+/// Indices of the words in the head of a block.
 pub(super) mod head {
     pub(crate) const MAGIC: usize = 0;
     /// Number of the block.
     pub(crate) const SEQUENCE: usize = 1;
     /// Number of bits (low half) and check value of the bits.
     pub(crate) const COMMIT: usize = 2;
-    /// Start of the first snapshot (low half) and complement of this number. The number is [`super::NONE`] if the block contains no start
-    /// of a snapshot.
+    /// Bit at which the first snapshot of the block starts (low half), and the complement of this number. The bit number is [`super::NONE`]
+    /// if no snapshot starts in the block.
     pub(crate) const SNAPSHOT: usize = 3;
-    /// State of the log (low half) and complement of this number.
+    /// State of the log (low half), and the complement of this number.
     pub(crate) const FLAGS: usize = 4;
 }
 
@@ -41,7 +42,7 @@ pub(super) const fn doubled(value: u16) -> u32 {
     value as u32 | (!value as u32) << 16
 }
 
-/// Returns the number if its complement is correct.
+/// Returns the number in the low half if the high half is its complement.
 fn halved(word: u32) -> Option<u16> {
     let value = word as u16;
     (doubled(value) == word).then_some(value)
@@ -51,21 +52,21 @@ pub(super) fn mix(hash: u32, word: u32) -> u32 {
     (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(7)
 }
 
-/// Returns the commit word for this number of `bits`. `rest` contains the last bits.
+/// Returns the commit word for this number of `bits`. `rest` contains the bits of the last, incomplete word.
 pub(super) fn commit(hash: u32, rest: u32, bits: u32) -> u32 {
     let hash = mix(hash, rest);
     bits | (hash ^ hash << 16) & 0xFFFF_0000
 }
 
-/// Block that was written, with a valid head and valid bits.
+/// Block in the memory with a valid head and valid bits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Whole<'a> {
     pub sequence: u32,
     /// Number of committed bits.
     pub bits: u32,
-    /// The next block continues the bits of this block.
+    /// `true` if the next block continues the bits of this block.
     pub closed: bool,
-    /// Start of the first snapshot.
+    /// Bit at which the first snapshot of the block starts.
     pub snapshot: Option<u32>,
     pub state: LogState,
     pub powered: bool,
@@ -95,7 +96,7 @@ impl<'a> Whole<'a> {
     }
 }
 
-/// Creates a block with these bits in the recorder's format, for tests of code that reads a log.
+/// Creates a block with these bits in the recorder's format, for tests of programs that read a log.
 #[doc(hidden)]
 pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
     let mut block = [0; BLOCK_WORDS];
@@ -116,7 +117,7 @@ pub(super) fn flags(state: LogState, powered: bool) -> u16 {
     state as u16 | if powered { POWERED } else { 0 }
 }
 
-/// Returns `true` if the block has this number. The content is not checked.
+/// Returns `true` if the head of the block contains this number. The function does not check the content of the block.
 pub(super) fn in_place(block: &Block, sequence: u32) -> bool {
     block[head::MAGIC] == MAGIC && block[head::SEQUENCE] == sequence
 }

@@ -1,7 +1,8 @@
-//! Encodes the inputs of a tick relative to the inputs of earlier ticks. Values that change in each tick are written as whole words, which
-//! takes little time. All other values are written as bits. A bit of the first word shows whether they are present.
+//! Encodes the inputs of a tick relative to the inputs of earlier ticks. Values that change in each tick are written as whole words,
+//! because this takes little time. All other values are written as bits. A bit of the first word shows whether the tick contains other
+//! values.
 //!
-//! Writer and reader each store an identical [`Reference`]. A snapshot resets the reference on both sides.
+//! Writer and reader each keep an identical [`Reference`]. A snapshot resets the reference of writer and reader.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, Segment, UrgentCommand, UrgentCommands};
 
@@ -12,30 +13,30 @@ use crate::io::{HostEvent, Inputs};
 use crate::nodes::FRAMES_MAX;
 use crate::{JOINTS, NODES};
 
-/// Longest frame of a host whose bytes are recorded.
+/// Longest host frame whose bytes the log contains.
 pub(super) const HOST_BYTES: usize = 48;
-/// Number of recorded bytes of host frames: the average per tick, and the highest number at one time.
+/// Allowance for the bytes of host frames in the log: the average per tick, and the highest number at one time.
 const ALLOWANCE: (u16, u16) = (2, 500);
-/// Bytes that are subtracted from the allowance for an event, in addition to the bytes of its frame. An event takes 15 to 20 bits.
+/// Bytes that an event takes from the allowance, in addition to the bytes of its frame. An event takes 15 to 20 bits.
 const EVENT_BYTES: u16 = 2;
 
-/// Reference for encoding the next inputs.
+/// Values to which the encoding of the next inputs refers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
-    /// Lengths and words (from [`words`]) of the last answers to a Move. Velocity and torque belong to the last tick in which another value
-    /// had changed.
+    /// Lengths and words (from [`words`]) of the last answers to a Move. Velocity and torque belong to the last tick in which another word
+    /// of the answer had changed.
     pub(super) len: [u8; NODES],
     pub(super) words: [Words; NODES],
-    /// Number of nodes that answer.
+    /// Number of nodes that are expected to answer.
     pub(super) expected: u8,
-    /// Bytes of host frames that may still be recorded.
+    /// Number of bytes of host frames that the log may still contain.
     allowance: u16,
 }
 
-/// Words of a payload.
+/// Words of the payload of an answer.
 pub(super) type Words = [u32; MAX_LEN / 4];
 
-/// Returns the words of an answer as in memory. Only the position is converted to a number.
+/// Returns the words of an answer in their order in memory. The function converts only the position to a number.
 #[inline]
 fn words(frame: &Frame) -> Words {
     let mut words = frame.words();
@@ -54,49 +55,49 @@ impl Default for Reference {
     }
 }
 
-/// Index of the word with the position in an answer, and index of the word with velocity and torque.
+/// Index of the word with the position in an answer, and index of the word with velocity and torque in an answer.
 pub(super) const POSITION: usize = 0;
 pub(super) const RATES: usize = 1;
-/// Number of bits for the distance of a joint in a tick, in steps of a 16-bit encoder. These bits are used if the distances of all joints
-/// fit.
+/// Number of bits for the distance of a joint in a tick, in steps of a 16-bit encoder. The log contains these bits if the distances of all
+/// joints fit into them.
 const WAY_BITS: u32 = 5;
-/// Mask of [`WAY_BITS`], and half of its range.
+/// Mask of [`WAY_BITS`] bits, and half of the range of a distance.
 const WAY: u32 = (1 << WAY_BITS) - 1;
 const WAY_HALF: u32 = 1 << (WAY_BITS - 1);
 
-/// Returns the position of joint `n`, which was at `before`, from the word with the distances of all joints.
+/// Returns the new position of joint `n`, which was at `before`, from the word with the distances of all joints.
 pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
     let way = (ways >> (WAY_BITS * n as u32) & WAY).wrapping_sub(WAY_HALF);
     before.wrapping_add(way << 16)
 }
 
-/// Bits of the first word of a tick. Bit 0 is 0 for a tick and 1 for a snapshot.
+/// Bits of the first word of a tick. Bit 0 of this word is 0 for a tick and 1 for a snapshot.
 pub(super) mod head {
     pub(crate) const STATUS_FREE: u32 = 1 << 1;
-    /// The tick has no inputs except answers.
+    /// The tick has no inputs except answers of the nodes.
     pub(crate) const QUIET: u32 = 1 << 2;
-    /// Each expected node has answered in order. Words with the distances of the joints follow.
+    /// Each expected node has answered in order. Words with the distances of all joints follow.
     pub(crate) const ORDERED: u32 = 1 << 3;
     /// The distance of a joint is too large for [`super::WAY_BITS`], so the words contain all positions.
     pub(crate) const FAR: u32 = 1 << 4;
-    /// Values other than the motion have changed.
+    /// Words of the answers other than the motion have changed.
     pub(crate) const CHANGED: u32 = 1 << 5;
-    /// First bit of the check value of the outputs.
+    /// Index of the lowest bit of the check value of the outputs.
     pub(crate) const CHECK: u32 = 16;
 }
 
-/// Motion of the joints in answers that came in order.
+/// Motion of the joints in answers that arrived in order.
 struct Answers {
     positions: [u32; JOINTS],
     rates: [u32; JOINTS],
-    /// Distances of the joints, and bits that are not zero if a joint has moved too far for [`WAY_BITS`].
+    /// Distances of the joints. The next field is not zero if a joint has moved too far for [`WAY_BITS`].
     ways: u32,
     far: u32,
-    /// Bits in which the other words differ from the reference.
+    /// Bits in which the other words of the answers differ from the reference.
     changed: u32,
 }
 
-/// Writes the words that have changed.
+/// Writes the words that differ from the words `before`.
 #[inline(never)]
 fn write_words<S: BitSink>(now: &[u32], before: &[u32], to: &mut S) {
     for (now, before) in now.iter().zip(before) {
@@ -115,7 +116,8 @@ impl Reference {
     /// Writes the inputs of a tick, and a check value of the outputs. Returns `true` if all inputs are written, so that a replay of this
     /// tick has the same result.
     ///
-    /// Drives send new positions in each tick, but the other values in the answers rarely change. A tick usually takes eight words.
+    /// Drives send new positions in each tick, but other values in the answers rarely change. The inputs of a tick therefore usually take
+    /// eight words.
     pub(super) fn write<P, const N: usize>(
         &mut self,
         inputs: &Inputs<'_>,
@@ -154,7 +156,7 @@ impl Reference {
         (quiet && !changed) || self.write_more(head, inputs, done, to)
     }
 
-    /// Returns the motion if each expected node has answered in order.
+    /// Returns the motion of the joints if each expected node has answered in order.
     #[inline]
     fn ordered(&self, bus: &[Frame]) -> Option<Answers> {
         if bus.len() != usize::from(self.expected) {
@@ -162,7 +164,7 @@ impl Reference {
         }
         let mut answers = Answers { positions: [0; JOINTS], rates: [0; JOINTS], ways: 0, far: 0, changed: 0 };
         let mut misplaced = 0;
-        // Differences are collected without a branch for each value.
+        // The loop collects the differences without a branch for each value.
         let nodes = bus.iter().zip(self.len.iter().zip(&self.words)).zip(id::MOVE_ANSWER..);
         for (n, ((frame, (len, before)), id)) in nodes.enumerate() {
             let now = words(frame);
@@ -185,7 +187,7 @@ impl Reference {
         (misplaced == 0).then_some(answers)
     }
 
-    /// Writes all inputs of a tick except the motion, according to the bits of the first word.
+    /// Writes all inputs of a tick except the motion, as the bits of the first word require.
     #[inline(never)]
     fn write_more<P, const N: usize>(
         &mut self,
@@ -212,7 +214,7 @@ impl Reference {
         whole
     }
 
-    /// Writes frames in any order.
+    /// Writes bus frames that may have any order.
     #[inline(never)]
     fn write_frames<S: BitSink>(&mut self, bus: &[Frame], to: &mut S) {
         to.put(bus.len() as u32, 6);
@@ -258,7 +260,7 @@ impl Reference {
         }
     }
 
-    /// Writes all unusual inputs except the inputs of the joint bus.
+    /// Writes all inputs that occur rarely, except the inputs of the joint bus.
     #[inline(never)]
     fn write_rest<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
         to.put(inputs.safety_input.into(), 1);
@@ -275,7 +277,8 @@ impl Reference {
                 to.put(count.into(), 8);
             }
         }
-        // The completed events and the next event, which was executed in part or has waited. At most as many events as fit are written.
+        // `looked_at` contains the completed events and the next event, which the controller has executed in part or not at all. The log
+        // contains at most as many of these events as the allowance permits.
         let looked_at = inputs.host.get(..done + 1).unwrap_or(inputs.host);
         let left = looked_at.iter().take(EVENTS_MAX).position(|event| !self.allows(event));
         let count = left.unwrap_or(looked_at.len().min(EVENTS_MAX));
@@ -299,7 +302,7 @@ impl Reference {
         rest.is_some()
     }
 
-    /// Writes one event. Returns `false` if the bytes of the event were omitted.
+    /// Writes one event. Returns `false` if the log does not contain the bytes of the event.
     fn write_event<S: BitSink>(&self, event: &HostEvent<'_>, to: &mut S) -> bool {
         to.put(event.line.min(3) as u32, 2);
         to.put(event.overtaken.into(), 1);
@@ -336,13 +339,13 @@ fn begins_upload(frame: FrameRef<'_>) -> bool {
         && Segment::parse(frame.body()).is_some_and(|segment| segment.segment == 0)
 }
 
-/// Returns `true` if the bytes of the frame are recorded. Bytes of parameters are never recorded, because parameters change the arm and the
-/// next snapshot identifies the changed arm.
+/// Returns `true` if the log contains the bytes of the frame. The log never contains the bytes of parameters. Parameters change the arm,
+/// and the next snapshot identifies the changed arm.
 fn has_bytes(frame: FrameRef<'_>) -> bool {
     frame.bytes.len() <= HOST_BYTES && !changes_arm(frame.frame_type)
 }
 
-/// Returns `true` for frames that change the parameters. A log contains only the hash of the parameters.
+/// Returns `true` for a frame that changes the parameters. A log contains only the hash of the parameters.
 fn changes_arm(frame_type: FrameType) -> bool {
     use FrameType::*;
     frame_type.is_default() || matches!(frame_type, FrictionTable | PidParam | ArmModel | FrictionPolynomial)

@@ -1,4 +1,5 @@
-//! Memory of the flight recorder, which is a ring of blocks. The blocks stay readable even if a reset interrupts the writing (J-56).
+//! Memory of the flight recorder, which is a ring of blocks. The blocks stay readable even if a reset interrupts the recorder while it
+//! writes (J-56).
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use jtc_wire::LogState;
@@ -14,7 +15,7 @@ struct Place {
     block: usize,
 }
 
-/// Memory that consists of one or more pieces and is used as one ring.
+/// Memory that consists of one or more pieces and is used as a single ring.
 pub(super) struct Ring<P, const N: usize> {
     pieces: [P; N],
 }
@@ -36,7 +37,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         None
     }
 
-    /// Returns the position of the block with this number, which consists of the piece and the index in that piece.
+    /// Returns the place of the block with this number: the piece and the index of the block in that piece.
     fn place(&self, sequence: u32) -> Place {
         let mut at = sequence.checked_rem(self.len()).unwrap_or(0) as usize;
         for (piece, blocks) in self.pieces.iter().enumerate() {
@@ -59,16 +60,16 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         self.block(sequence).and_then(Whole::parse).filter(|whole| whole.sequence == sequence)
     }
 
-    /// Returns the newest block.
+    /// Returns the number of the newest block.
     fn newest(&self) -> Option<u32> {
-        // The heads are searched first, because the memory is slow and the drives wait for the first frame after a reset.
+        // The loop reads only the heads of the blocks, because the memory is slow and the drives wait for the first frame after a reset.
         let mut below = None;
         for _ in 0..self.len() {
             let blocks = self.pieces.iter().flat_map(|piece| piece.as_ref());
             let numbers =
                 blocks.filter(|block| block[head::MAGIC] == MAGIC).map(|block| block[head::SEQUENCE]);
             let next = numbers.filter(|number| below.is_none_or(|below| *number < below)).max()?;
-            // The block must also be at its position. Other blocks may remain from a memory with another size.
+            // The newest block must also be at the place of its number. Other blocks may remain from a log in a memory of another size.
             if self.whole(next).is_some() {
                 return Some(next);
             }
@@ -84,30 +85,30 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
     }
 }
 
-/// Writer of bits into the ring.
+/// Writer of bits into the ring of blocks.
 pub(super) struct Writer<P, const N: usize> {
     ring: Ring<P, N>,
-    /// Number of the open block. `None` before the first block.
+    /// Number of the open block. `None` before the first block is opened.
     open: Option<u32>,
-    /// Position of the open block.
+    /// Place of the open block.
     place: Place,
     /// Number of the next block.
     next: u32,
-    /// The head of the open block has been written.
+    /// `true` if the head of the open block has been written.
     begun: bool,
-    /// Index of the word that is filled next. `rest` contains the first `fill` bits of this word.
+    /// Index of the word of the open block that is filled next. `rest` contains the first `fill` bits of this word.
     word: usize,
     rest: u32,
     fill: u32,
     hash: u32,
-    /// A snapshot begins in the open block.
+    /// `true` if a snapshot begins in the open block.
     marked: bool,
     pub state: LogState,
     pub powered: bool,
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
-    /// Creates a writer for any content of the memory.
+    /// Creates a writer, for any content of the memory.
     pub(super) fn new(pieces: [P; N]) -> Self {
         let ring = Ring { pieces };
         let newest = ring.newest();
@@ -150,7 +151,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.open.is_none()
     }
 
-    /// Discards all blocks.
+    /// Discards all blocks of the log.
     pub(super) fn clear(&mut self) {
         self.ring.wipe();
         (self.open, self.state, self.powered) = (None, LogState::Recording, false);
@@ -161,8 +162,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.open_block();
     }
 
-    /// Marks the start of a snapshot at the present position. Until the snapshot is committed, the mark points beyond the committed bits
-    /// and is not used.
+    /// Records that a snapshot starts at the present bit. Until the snapshot is committed, this record points after the committed bits and
+    /// is ignored.
     pub(super) fn mark_snapshot(&mut self) {
         if !self.marked {
             self.marked = true;
@@ -224,13 +225,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Ends the log for this reason.
+    /// Ends the log with this `state` as the reason.
     pub(super) fn freeze(&mut self, state: LogState) {
         self.state = state;
         self.set_head(head::FLAGS, doubled(flags(state, self.powered)));
     }
 
-    /// Returns the number of the oldest block, and the number after the newest block.
+    /// Returns the number of the oldest block, and the number of the block after the newest block.
     pub(super) fn range(&self) -> (u32, u32) {
         let Some(newest) = self.open else { return (self.next, self.next) };
         let mut oldest = newest;
@@ -244,7 +245,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         (oldest, newest.wrapping_add(1))
     }
 
-    /// Reads bytes of a block from `offset` on, as little-endian words. Returns the number of bytes that were read.
+    /// Reads bytes of a block, starting at byte `offset`, as little-endian words. Returns the number of bytes that were read.
     pub(super) fn read(&self, sequence: u32, offset: usize, out: &mut [u8]) -> usize {
         let Some(block) = self.ring.block(sequence).filter(|block| in_place(block, sequence)) else {
             return 0;
@@ -258,7 +259,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         read
     }
 
-    /// Fills up the present word, so that the next data begins at a whole word.
+    /// Fills the present word up, so that the next data begins with a whole word.
     pub(super) fn align(&mut self) {
         if self.fill != 0 {
             let word = core::mem::take(&mut self.rest);
@@ -267,7 +268,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Appends whole words to whole words, within one block.
+    /// Appends whole words, all in the same block. The preceding data must end with a whole word.
     #[inline]
     pub(super) fn append<const K: usize>(&mut self, words: [u32; K]) {
         if self.word + K > BLOCK_WORDS {
@@ -285,7 +286,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Writes a full word. The bits in `rest` and `fill` follow it.
+    /// Writes a full word. The bits in `rest` and `fill` follow this word.
     #[inline]
     fn full(&mut self, word: u32) {
         if let Some(place) = self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word)) {
@@ -304,8 +305,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     #[cold]
     #[inline(never)]
     fn next_block(&mut self) {
-        // The bits so far are committed, even if the bits end in the middle of a tick. The remaining bits of the tick follow in the next
-        // block.
+        // The bits that the block contains are committed, even if they end in the middle of a tick. The remaining bits of the tick follow
+        // in the next block.
         self.commit();
         self.set_head(head::FLAGS, doubled(flags(self.state, self.powered) | CLOSED));
         self.open_block();
@@ -322,7 +323,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             return;
         }
         let word = self.rest;
-        // Bits that did not fit into the block, if any.
+        // `rest` now contains the bits that did not fit into the word.
         let used = 32 - self.fill;
         (self.rest, self.fill) = (value.checked_shr(used).unwrap_or(0), fill - 32);
         self.full(word);
@@ -338,7 +339,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             let over = |word: u32| (word >> 1) >> (31 - fill);
             let words = [self.rest | a << fill, over(a) | b << fill];
             self.rest = over(b) | c << fill;
-            // Two words are written at once, unless one of these words is the last word of the block.
+            // Two words are written at once, except at the end of the block.
             let place =
                 self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word..BLOCK_WORDS - 1));
             match place.and_then(|place| place.first_chunk_mut()) {

@@ -7,7 +7,7 @@ use crate::bit_codec::BitSource;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reader<'a> {
     blocks: &'a [Block],
-    /// Index of the block in the list, and of the bit in the block.
+    /// Index of the present block in the list. The next field is the index of the next bit in this block.
     block: usize,
     bit: u32,
     current: Option<Whole<'a>>,
@@ -15,13 +15,13 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Creates a reader that begins at bit `bit` of the first of `blocks`.
+    /// Creates a reader that begins at bit `bit` of the first block in `blocks`.
     pub(super) fn new(blocks: &'a [Block], bit: u32) -> Self {
         let current = blocks.first().and_then(Whole::parse);
         Self { blocks, block: 0, bit, current, damaged: false }
     }
 
-    /// Moves to the next whole word.
+    /// Moves the reader to the next whole word.
     pub(super) fn align(&mut self) {
         self.bit = self.bit.next_multiple_of(32);
     }
@@ -36,13 +36,13 @@ impl<'a> Reader<'a> {
         self.block
     }
 
-    /// Returns `true` if no bits are left, or the next block does not continue this block.
+    /// Returns `true` if no bits remain, or if the next block does not continue the present block.
     pub(super) fn at_end(&mut self) -> bool {
         self.advance();
         self.current.is_none_or(|whole| self.bit >= whole.bits)
     }
 
-    /// Moves to the next block if all bits of this block were read and the next block continues this block.
+    /// Moves to the next block if all bits of the present block were read and the next block continues the present block.
     fn advance(&mut self) {
         let Some(whole) = self.current else { return };
         if self.bit < whole.bits || !whole.closed {

@@ -1,4 +1,4 @@
-//! Inputs of a tick as read from a log.
+//! Inputs of a tick, as read from a log.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{
     EVENTS_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Response, UrgentCommand, UrgentCommands,
@@ -15,17 +15,17 @@ use crate::response_queue::HOST_LINES;
 /// Recorded event of a host.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedEvent {
-    /// Line.
+    /// Index of the host line of the event.
     pub line: usize,
-    /// An urgent command has overtaken the event (J-04).
+    /// `true` if an urgent command has overtaken the event (J-04).
     pub overtaken: bool,
-    /// The event came on a plain line (J-51).
+    /// `true` if the event came on a plain line (J-51).
     pub plain: bool,
-    /// Type byte of the frame. The byte is 0 if the type was not known.
+    /// Type byte of the frame. The type byte is 0 if the frame type is not known.
     pub frame_type: u8,
     /// Kind of the event.
     pub kind: RecordedKind,
-    /// The event was segment 0 of a trajectory, whose bytes are not in the log.
+    /// `true` if the event was segment 0 of a trajectory, whose bytes are not in the log.
     begins_upload: bool,
     bytes: [u8; HOST_BYTES],
     len: usize,
@@ -37,13 +37,13 @@ const EMPTY_SEGMENT: &[u8] = &[0; 14];
 /// Kinds of [`RecordedEvent`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordedKind {
-    /// A valid frame with its bytes.
+    /// Valid frame whose bytes are in the log.
     Frame,
     /// Valid frame whose bytes are not in the log, because the frame is too long or contains parameters, or too many frames arrived.
     Unrecorded,
-    /// Damaged frame with its status.
+    /// Damaged frame, with the reason why it is damaged.
     Bad(FrameStatus),
-    /// Noise with its status.
+    /// Bytes that are not a frame, with their status.
     Noise(FrameStatus),
 }
 
@@ -64,7 +64,7 @@ impl RecordedEvent {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns the event as an input of the controller. A frame that was not recorded is replaced by a frame that does not change the
+    /// Returns the event as an input of the controller. A frame without bytes in the log is replaced by a frame that does not change the
     /// controller. Segment 0 of a trajectory is replaced by a segment without points, which has the same effect in Operate as any segment 0
     /// (J-30).
     pub fn event(&self) -> HostEvent<'_> {
@@ -118,7 +118,7 @@ pub struct RecordedInputs {
     pub missed_ticks: u16,
     /// Stop and Pause commands that arrived.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The host lines could accept a status.
+    /// `true` if the host lines could accept a status.
     pub status_free: bool,
     bus: [Option<Frame>; FRAMES_MAX],
     host: [RecordedEvent; EVENTS_MAX],
@@ -195,13 +195,13 @@ impl RecordedInputs {
 
 /// Form of the recorded positions.
 enum Way {
-    /// Form with the distances of all joints.
+    /// The word contains the distances of all joints since the last tick.
     Moved(u32),
-    /// Form with the position of each joint.
+    /// The words contain the position of each joint.
     Far([u32; JOINTS]),
 }
 
-/// Motion of the joints.
+/// Motion of the joints in a recorded tick.
 struct Motion {
     rates: [u32; JOINTS],
     way: Way,
@@ -280,7 +280,7 @@ impl Reference {
     }
 }
 
-/// Reads an answer that has changed. Words that have not changed keep their values.
+/// Reads the words of an answer that have changed. The words that have not changed keep their values.
 fn read_words<S: BitSource>(words: &mut Words, from: &mut S) {
     if from.take(1) != 0 {
         for word in words {
@@ -291,7 +291,7 @@ fn read_words<S: BitSource>(words: &mut Words, from: &mut S) {
     }
 }
 
-/// Returns an answer of node `n` to a Move.
+/// Returns the frame that contains the answer of node `n` to a Move.
 fn answer(n: usize, len: u8, words: &Words) -> Option<Frame> {
     let mut bytes = [0; MAX_LEN];
     for (at, (to, word)) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words).enumerate() {

@@ -1,4 +1,4 @@
-//! Reads a log and replays it through the controller.
+//! Reader of a log, and replay of the log through the controller.
 use jtc_bus::Frame;
 use jtc_wire::{EVENTS_MAX, FrameType, IMAGE_MAX, LogState, RawPoint};
 
@@ -15,24 +15,24 @@ use crate::io::{HostEvent, Inputs, Outputs};
 use crate::nodes::FRAMES_MAX;
 use crate::telemetry::Telemetry;
 
-/// Record of a log.
-// A snapshot is large, but a log contains only a few snapshots.
+/// Part of a log: a snapshot or a tick.
+// The enum is large because of the snapshot, but a log contains only a few snapshots.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub enum Record {
-    /// State after the previous tick.
+    /// State of the controller after the previous tick.
     Snapshot(Snapshot),
-    /// One tick.
+    /// A recorded tick.
     Tick {
         /// Inputs of the tick.
         inputs: RecordedInputs,
-        /// Check value of the outputs of all ticks since the last snapshot.
+        /// Check value of the outputs of all ticks after the last snapshot.
         check: u16,
     },
 }
 
-/// Log that consists of blocks in the order of their numbers. Reading never fails. For any content of the blocks, the reader returns the
-/// records of the valid blocks, beginning with the first snapshot.
+/// Log, as a list of blocks in the order of their numbers. Reading of a log never fails. For any content of the blocks, the reader returns
+/// the records of the valid blocks, beginning with the first snapshot.
 #[derive(Clone, Debug)]
 pub struct Log<'a> {
     blocks: &'a [Block],
@@ -43,7 +43,7 @@ pub struct Log<'a> {
 }
 
 impl<'a> Log<'a> {
-    /// Creates a log that is read from the oldest block on.
+    /// Creates a log whose reading begins with the oldest block.
     pub fn new(blocks: &'a [Block]) -> Self {
         Self { blocks, next: 0, reader: None, reference: Reference::default() }
     }
@@ -53,7 +53,7 @@ impl<'a> Log<'a> {
         self.blocks.iter().rev().find_map(Whole::parse).map(|whole| (whole.sequence, whole.state))
     }
 
-    /// Returns a reader at the next snapshot after the blocks that were read.
+    /// Returns a reader at the next snapshot in the blocks that were not read yet.
     fn find(&mut self) -> Option<Reader<'a>> {
         while let Some(rest) = self.blocks.get(self.next..).filter(|rest| !rest.is_empty()) {
             self.next += 1;
@@ -76,7 +76,8 @@ impl Iterator for Log<'_> {
             };
             let before = reader.block();
             if reader.at_end() {
-                // Blocks may be missing here, or recording was paused. The replay continues at the next snapshot.
+                // At this point of the log, blocks may be missing, or recording may have paused. The replay then continues at the next
+                // snapshot.
                 continue;
             }
             let record = if reader.peek() {
@@ -99,24 +100,24 @@ impl Iterator for Log<'_> {
     }
 }
 
-/// Result of comparing a replayed tick with the log.
+/// Result of the comparison of a replayed tick with the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The outputs and the log agree.
+    /// The replayed outputs and the log agree.
     Same,
-    /// The outputs and the log differ.
+    /// The replayed outputs and the log differ.
     Differs,
-    /// For the contained reason, the outputs may differ from the log until the next snapshot.
+    /// The replayed outputs may differ from the log until the next snapshot, for the contained reason.
     Unsure(Unsure),
 }
 
 /// Reason why a replay may differ from the recorded ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsure {
-    /// An input is not in the log, because of a long frame, parameters, or too many frames. Another cause is a StoreArm, which depends on
-    /// memory that the replay does not have.
+    /// An input is not in the log, because a frame was too long, contained parameters, or exceeded the allowance. A StoreArm has the same
+    /// effect, because it depends on memory that the replay does not have.
     Input,
-    /// The arm differs from the recorded arm.
+    /// The arm of the replay differs from the recorded arm.
     Arm,
     /// The points of the recorded trajectory are not known.
     Points,
@@ -124,18 +125,18 @@ pub enum Unsure {
     NoSnapshot,
 }
 
-/// One tick of a replay.
+/// Result of one tick of a replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Everything that the controller computed.
+    /// All values that the controller computed in this tick.
     pub telemetry: Telemetry,
     /// Number of starts of the device.
     pub boots: u32,
-    /// Inputs. `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
+    /// Recorded inputs of this tick. `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
     pub inputs: Option<RecordedInputs>,
-    /// Outputs. `None` for a snapshot.
+    /// Outputs of the replayed tick. `None` for a snapshot.
     pub outputs: Option<Outputs>,
-    /// Comparison with the log.
+    /// Comparison of the tick with the log.
     pub outcome: Outcome,
 }
 
@@ -147,16 +148,16 @@ pub struct Replay<'a, M> {
     boots: Option<u32>,
     chain: u32,
     outcome: Outcome,
-    /// An input is not in the log, but the outputs since that input have still been equal.
+    /// `true` if an input is not in the log, but all outputs since that input have been equal.
     follows: bool,
     arm: Option<u64>,
     points_hash: Option<u32>,
 }
 
 impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
-    /// Creates a replay of this log. The controller has an arm, and its memory contains the points with this hash.
+    /// Creates a replay of this log. `controller` has the recorded arm, and its memory contains the points with the hash `points_hash`.
     pub fn new(log: Log<'a>, mut controller: Controller<M>, points_hash: Option<u32>) -> Self {
-        // This number of calls is far above the number of parts of an image.
+        // The number of calls is far above the number of parts in which the hash is computed.
         for _ in 0..IMAGE_MAX {
             controller.hash_arm();
         }
@@ -167,12 +168,12 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         Self { log, controller, boots: None, chain: 0, outcome, follows: false, arm, points_hash }
     }
 
-    /// Returns `true` if the memory contains the points with this hash.
+    /// Returns `true` if the memory of the controller contains the points with this hash.
     fn knows(&self, points_hash: u32) -> bool {
         self.points_hash == Some(points_hash)
     }
 
-    /// Returns the outcome that a replay after this snapshot can have.
+    /// Returns the outcome that the ticks after this snapshot can have.
     fn worth(&self, snapshot: &Snapshot) -> Outcome {
         let Origin { arm, points_hash, .. } = snapshot.origin;
         if arm != self.arm {
@@ -194,7 +195,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         &self.controller
     }
 
-    /// Processes a snapshot. A difference in the state is reported at the snapshot, which also corrects it.
+    /// Processes a snapshot of the log. If the replayed state differs from the snapshot, the outcome reports this, and the snapshot
+    /// replaces the state.
     fn snapshot(&mut self, snapshot: &Snapshot) -> Option<Step> {
         let follows = self.boots == Some(snapshot.origin.boots)
             && self.controller.observed.tick == snapshot.tick()
@@ -214,7 +216,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         (self.outcome, self.follows) = (self.worth(snapshot), false);
         (self.boots, self.chain) = (Some(snapshot.origin.boots), 0);
         let outcome = if follows { Outcome::Differs } else { self.outcome };
-        // If the tick has already been replayed, it is not returned again.
+        // A snapshot of a tick that was already replayed is not returned as another step.
         (next || follows).then(|| self.step(None, None, outcome))
     }
 
@@ -259,7 +261,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.chain = chain(self.chain, &self.controller, self.controller.errors.word(), &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
         let same = check(self.chain) == recorded_check;
-        // A replay has no permanent memory. A device with permanent memory takes some ticks for a StoreArm, which the replay refuses at
+        // A replay has no non-volatile memory. A device with such memory takes some ticks for a StoreArm. The replay refuses a StoreArm at
         // once.
         let stores = |event: &RecordedEvent| event.frame_type == FrameType::StoreArm as u8;
         let repeatable = recorded.is_whole() && !recorded.host().iter().any(stores);
@@ -274,7 +276,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        // A missing input possibly had no effect. The replay assumes this as long as the outputs are equal.
+        // A missing input possibly had no effect. The replay assumes that a missing input had no effect, as long as its outputs are equal
+        // to the log.
         self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
         let outcome = if self.follows { Outcome::Same } else { self.outcome };
         self.step(Some(*recorded), Some(outputs), outcome)
@@ -298,13 +301,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Iterator for Replay<'_, M> {
     }
 }
 
-/// Placeholder for positions without a frame.
+/// Placeholder for entries without a bus frame.
 const NO_FRAME: Frame = match Frame::new(0, &[]) {
     Some(frame) => frame,
     None => unreachable!(),
 };
 
-/// Placeholder for positions without an event.
+/// Placeholder for entries without a host event.
 const NO_EVENT: HostEvent<'_> = HostEvent {
     line: 0,
     overtaken: false,
@@ -312,7 +315,7 @@ const NO_EVENT: HostEvent<'_> = HostEvent {
     event: jtc_wire::LinkEvent::Noise(jtc_wire::Response::NONE),
 };
 
-/// Digest of bits, for comparing two states.
+/// Digest of bits, for the comparison of two states.
 #[derive(Default, PartialEq)]
 struct Digest {
     hash: u64,

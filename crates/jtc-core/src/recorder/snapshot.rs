@@ -1,8 +1,8 @@
-//! State of the controller in a snapshot, with all values that affect the motion of the arm and the reports of the controller. The arm and
-//! the points of the trajectory are not included, because a log identifies both by their hashes.
+//! State of the controller in a snapshot. The state in a snapshot contains all values that affect the motion of the arm and the reports of
+//! the controller. The state does not contain the arm and the points of the trajectory, because a log identifies both by their hashes.
 //!
-//! The state of the host link (waiting records, frames to send, progress of a long frame) is not included. A replay reproduces the frames
-//! on the joint bus and the states, but not the bytes on the host lines.
+//! The snapshot does not contain the state of the host link: waiting response records, frames to send, and the progress of a long frame. A
+//! replay reproduces the frames on the joint bus and the states, but not the bytes on the host lines.
 use jtc_dynamics::Payload;
 use jtc_wire::RawPoint;
 
@@ -31,10 +31,10 @@ pub struct Origin {
     pub boots: u32,
     /// Hash of the firmware's version and revision (FNV-1a, 64 bits).
     pub firmware: u64,
-    /// Hash of the arm in use (J-52). `None` if the hash was not known yet.
+    /// Hash of the arm in use (J-52). `None` if this hash was not known yet.
     pub arm: Option<u64>,
-    /// Flags that show whether gains, model and friction polynomial are the built-in values. The built-in values have more digits than an
-    /// arm image can contain.
+    /// Flags that show whether gains, model and friction polynomial have their built-in values. The built-in values have more digits than
+    /// an arm image can contain.
     pub built_in: [bool; 3],
     /// Hash of the points of the trajectory in memory.
     pub points_hash: u32,
@@ -44,7 +44,7 @@ pub struct Origin {
 
 bit_codec!(Origin { boots, firmware, arm, built_in, points_hash, points });
 
-/// Settings that are not part of the arm.
+/// Settings that are not part of the arm file.
 #[derive(Clone, Copy, Debug)]
 struct LiveSettings {
     speed: f64,
@@ -69,7 +69,7 @@ impl LiveSettings {
     }
 }
 
-/// State of the controller.
+/// State of the controller that a snapshot contains.
 #[derive(Clone, Debug)]
 pub(crate) struct Dynamic {
     state: ControllerState,
@@ -167,9 +167,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Appends the state in the order of [`Dynamic`].
+    /// Appends the state of the controller, in the order of the fields of [`Dynamic`].
     pub(crate) fn write_state<S: BitSink>(&self, to: &mut S) {
-        // Every field is listed, so that a new field needs a decision.
+        // The pattern lists every field, so each new field requires a decision about the snapshot.
         let Self {
             config,
             state,
@@ -223,8 +223,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         extensions.jogs_refused_ms.write(to);
     }
 
-    /// Continues from a snapshot. The controller must have the recorded arm. If the snapshot executes a trajectory, the controller must
-    /// also have this trajectory.
+    /// Continues the controller from the state in a snapshot. The controller must have the recorded arm. If the snapshot was taken during a
+    /// trajectory, the controller must also have this trajectory.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         let Dynamic {
             state,
@@ -265,17 +265,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.jogs_refused_ms = jogs_refused_ms;
     }
 
-    /// Returns the hash of the points of a trajectory in memory.
+    /// Returns the hash of the trajectory points in memory.
     pub fn points_hash(&self) -> u32 {
         self.store.points_hash().0
     }
 
-    /// Returns the points of a trajectory in memory.
+    /// Returns the trajectory points in memory.
     pub fn points(&self) -> &[RawPoint] {
         self.store.held_points(0)
     }
 
-    /// Copies points of a trajectory, from number `first` on, into the memory of a controller that replays a log.
+    /// Copies trajectory points into the memory of a controller that replays a log, starting with number `first`.
     pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         self.store.put_points(first, points);
     }
@@ -290,7 +290,7 @@ mod tests {
     use crate::bit_codec::tests::Bits;
     use crate::settings::{self, TABLE};
 
-    /// Each setting that is not covered by the hash of the arm is in the snapshot.
+    /// A snapshot contains each setting that the hash of the arm does not cover.
     #[test]
     fn j56_every_setting_that_is_no_part_of_the_arm_is_remembered() {
         let points = || [RawPoint::default(); 4];

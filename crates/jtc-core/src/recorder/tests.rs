@@ -1,4 +1,4 @@
-//! Any frames that the bus carries are read back unchanged.
+//! The reader returns any frames of the bus unchanged.
 extern crate std;
 use std::vec;
 use std::vec::Vec;
@@ -20,11 +20,11 @@ enum Change {
     Motion(Vec<(i32, i16, i16)>),
     /// A byte of an answer changes.
     Byte { node: usize, at: usize, to: u8 },
-    /// A node answers with this number of bytes, or does not answer.
+    /// A node answers with `len` bytes, or does not answer.
     Length { node: usize, len: usize },
     /// Two answers are swapped.
     Swap { first: usize, second: usize },
-    /// A frame that is not an answer to a Move comes first.
+    /// A frame that is not an answer to a Move arrives first.
     Other { id: u16, len: usize },
 }
 
@@ -45,7 +45,7 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
-/// Returns the frames of each tick.
+/// Returns the bus frames of each tick.
 fn ticks(changes: &[Change]) -> Vec<Vec<Frame>> {
     let mut answers = [[0u8; 24]; NODES];
     let mut lengths = [16; NODES];

@@ -1,14 +1,14 @@
 //! Table of settings (J-53), with the wire number, name, unit, range, meaning and field of each setting. Docs, arm files and the output of
-//! `jtc arm show` are generated from it. A number of a removed setting is never reused. For example, 59 to 63 belonged to an earlier
-//! version of Teaching.
+//! `jtc arm show` are generated from this table. A number of a removed setting is never reused. For example, the numbers 59 to 63 belonged
+//! to an earlier version of Teaching.
 use super::{Kind, Live, Setting};
 use crate::config::Config;
 
-/// Declares the table and the functions that read and write a value. The functions use `match`, because calls through a table of functions
-/// cannot be analysed before they run.
+/// Declares the table of settings and the functions that read and write a value. Both functions use `match`, because a static analysis
+/// cannot follow calls through a table of functions.
 macro_rules! settings {
     ($($kind:ident $number:literal $name:literal [$unit:literal] $low:literal..=$high:literal $live:ident $meaning:literal ($($place:tt)+);)+) => {
-        /// Every setting, in the order of the numbers.
+        /// Table of all settings, in the order of their numbers.
         pub static TABLE: [Setting; [$($number),+].len()] = [$(Setting {
             number: $number,
             name: $name,
@@ -21,7 +21,7 @@ macro_rules! settings {
             kind: Kind::$kind,
         },)+];
 
-        /// Value of a setting. For a setting of the joints, the value of the joint with this index.
+        /// Returns the value of a setting. For a setting of the joints, this is the value of the joint with index `joint`.
         pub(super) fn get(config: &Config, number: u8, joint: usize) -> Option<f64> {
             match number {
                 $($number => settings!(@get $kind config joint $($place)+),)+
@@ -29,7 +29,7 @@ macro_rules! settings {
             }
         }
 
-        /// Writes the value. Returns `false` if the joint does not exist.
+        /// Writes the value of a setting. Returns `false` if the joint does not exist.
         pub(super) fn set(config: &mut Config, number: u8, joint: usize, value: f64) -> bool {
             match number {
                 $($number => settings!(@set $kind config joint value $($place)+),)+

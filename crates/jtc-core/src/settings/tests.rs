@@ -11,7 +11,7 @@ fn j53_every_setting_is_read_and_set_and_its_default_is_in_its_range() {
     let all: Vec<_> = values(&config, 0, false).collect();
     assert_eq!(all.len(), count(false));
     assert_eq!(with_values(&config, all.iter().copied()), Ok(config.clone()));
-    // Each value changes only its own setting.
+    // Each setting changes only its own field of the configuration.
     for value in &all {
         let row = setting(value.setting).expect("it is in the table");
         let half = 0.5 * (row.low + row.high);
@@ -40,7 +40,7 @@ fn j53_numbers_and_names_are_unique_and_in_order() {
     }
 }
 
-/// The table contains every field of the configuration, because the table has as many values as the configuration has numbers.
+/// The table contains every field of the configuration: it has as many values as the configuration has numbers.
 #[test]
 fn j53_every_field_has_a_row() {
     let text = std::format!("{:?}", Config::avena());
@@ -83,7 +83,7 @@ fn j53_what_is_out_of_range_is_refused_and_named() {
         }
     }
     assert_eq!(set(200, 0, 1.0), Err(SettingError::Unknown { setting: 200, joint: 0 }));
-    // The combination of these values is not valid.
+    // Each of these values is in its range, but the resulting configuration is not valid.
     assert!(matches!(set(1, 1, 2.98), Err(SettingError::Config(ConfigError::Range { joint: 1, .. }))));
     assert!(matches!(set(8, 2, 9.0), Err(SettingError::Config(ConfigError::TorqueScale { joint: 2, .. }))));
     assert!(matches!(set(3, 4, 5.0), Err(SettingError::Config(ConfigError::SpeedScale { joint: 4, .. }))));

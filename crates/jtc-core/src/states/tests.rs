@@ -1,4 +1,4 @@
-//! Tests of the state machine under all conditions, and of the diagram in docs/protocol-jtc.md.
+//! Tests of the state machine under all combinations of conditions, and of the diagram in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
 use std::string::String;
@@ -19,7 +19,7 @@ const STATES: [ControllerState; 6] = [
     ControllerState::Error,
 ];
 
-/// Condition, with the texts in the diagram for the cases that the condition is met and not met.
+/// Condition, with its text in the diagram if it is met, and its text if it is not met.
 type Named = (fn(&Conditions) -> bool, &'static str, &'static str);
 const NAMES: [Named; 6] = [
     (|c| c.error, "an error", "errors cleared"),
@@ -44,7 +44,7 @@ fn all_conditions() -> impl Iterator<Item = Conditions> {
     })
 }
 
-/// Returns the conditions after the host has sent this frame in a state that followed HoldPos, while a trajectory was loaded.
+/// Returns the conditions after the host has sent this frame in `state`. Before, the controller was in HoldPos and a trajectory was loaded.
 fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditions {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
     controller.state = ControllerState::HoldPos;
@@ -63,9 +63,9 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     Conditions { teaching, execute, ..Conditions::default() }
 }
 
-/// Returns the conditions that are possible in a state. Some conditions need a command that the host sends and the state accepts.
+/// Returns the conditions that are possible in a state. Some conditions require a command that the host sends and that the state accepts.
 fn possible(state: ControllerState) -> Vec<Conditions> {
-    // In Start, host commands are not executed, so all parameters are missing.
+    // In Start, the controller does not execute host commands, so all parameters are missing.
     let start = state == ControllerState::Start;
     let teaching = !start
         && (state == ControllerState::Teaching
@@ -78,8 +78,8 @@ fn possible(state: ControllerState) -> Vec<Conditions> {
         .collect()
 }
 
-/// Returns the conditions of an arrow in the diagram, which are met at every transition along this arrow. Conditions that only exclude a
-/// state with higher priority are omitted.
+/// Returns the conditions for an arrow of the diagram. These conditions are met in every transition along this arrow. Conditions that only
+/// exclude a state with a higher priority are omitted.
 fn label(from: ControllerState, to: ControllerState) -> Option<String> {
     let all = possible(from);
     let taken: Vec<_> = all.iter().filter(|c| next_state(from, c) == to).collect();
@@ -124,7 +124,7 @@ fn j20_the_diagram_is_what_the_code_does() {
     is_in_the_protocol("states", &diagram());
 }
 
-/// Tests all combinations of conditions, possible or not.
+/// Tests all combinations of conditions, including impossible combinations.
 #[test]
 fn j20_j21_torque_is_on_with_no_error_and_all_initialised_only() {
     for (state, conditions) in STATES.iter().flat_map(|state| all_conditions().map(move |c| (*state, c))) {

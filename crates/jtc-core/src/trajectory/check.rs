@@ -1,13 +1,14 @@
 //! Check of a trajectory during its upload, point by point, before the arm moves (J-36).
 //!
-//! Between two points (J-32) the commanded velocity is a cubic and the position a quintic. The derivative of the position is a quartic,
-//! which is the cubic plus a bump for the distance that the velocities do not explain. In Bernstein form each curve lies within the hull of
-//! a few control points. An interval passes the check at once if a rough estimate of its hulls is within the limits (`screen`). For any
-//! other interval the curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
+//! Between two points (J-32), the commanded velocity is a cubic polynomial and the commanded position is a quintic polynomial. The
+//! derivative of the position is a quartic polynomial: the cubic plus a bump. The bump covers the distance that the velocities do not
+//! explain. In Bernstein form, each curve lies within the convex hull of a few control points. An interval passes the check at once if a
+//! rough estimate of the hulls of its curves is within the limits (`screen`). For any other interval, the check halves the curves until the
+//! hull is within the limits or a point of the curve is outside (`curve`).
 //!
-//! Positions are rounded to steps of 96 µrad. The effect of this rounding on the derivative is not an error of the path. The check
-//! therefore reduces the distance of each interval by one step. `range` handles the effect of rounding on the positions, and paths that
-//! begin outside the limits of a joint.
+//! The wire format rounds positions to steps of 96 µrad. The derivative of the rounded positions can exceed a limit that the path itself
+//! does not exceed. The check therefore reduces the distance of each interval by one rounding step. The module `range` handles the effect
+//! of rounding on the positions, and paths that begin outside the limits of a joint.
 mod curve;
 mod range;
 mod screen;
@@ -33,9 +34,10 @@ pub const REST_SPEED: f64 = 0.02;
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until the distance of its hull from
-/// the curve is at most about a thousandth of the height of the curve. If six joints are at their limits in one interval, they share the
-/// halvings. When all halvings are used, the check uses the hull.
+/// Highest number of times that the check halves curves in one interval, for all joints together. The check halves a curve until the
+/// distance of its hull from the curve is at most about a thousandth of the height of the curve. If six joints are at their limits in one
+/// interval, all six joints together may use this number of halvings. After the last permitted halving, the check compares the hull with
+/// the limits.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.
@@ -47,7 +49,7 @@ pub enum Quantity {
     Velocity,
     /// Acceleration at a point, rad/s².
     Acceleration,
-    /// Derivative of the position between two points, rad/s. The distance is first reduced by one int16 step.
+    /// Derivative of the position between two points, rad/s. The distance between the two points is first reduced by one int16 step.
     PositionSpeed,
     /// Speed at the first or the last point, at which the joint must be at rest, rad/s.
     Rest,
@@ -102,17 +104,17 @@ pub struct Violation {
 
 bit_codec!(Violation { point, fraction, joint, quantity, value, limit });
 
-/// Bounds of one joint.
+/// Bounds of the trajectory in one joint.
 #[derive(Clone, Copy, Debug)]
 struct JointBounds {
     position: PathRange,
     speed: f64,
     acceleration: f64,
-    /// Velocity range of the friction table; unbounded if no table is used.
+    /// Velocity range of the friction table. The range is unbounded if the controller uses no table.
     friction: (f64, f64),
 }
 
-/// State of one check, with its bounds and the last point.
+/// State of the check of one trajectory, with the bounds and the last point.
 #[derive(Clone, Debug)]
 pub struct TrajectoryCheck {
     bounds: [JointBounds; JOINTS],
@@ -125,12 +127,12 @@ pub struct TrajectoryCheck {
     passed: Passed,
 }
 
-/// State of the check after all points so far.
+/// State of the check after all points that have been checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Passed {
-    /// Velocity range of each joint.
+    /// Range of the velocities of each joint at and between the points that have been checked.
     pub speeds: [SpeedRange; JOINTS],
-    /// Joints that began outside their limits and have not moved inside yet.
+    /// Joints that began outside their position limits and have not moved inside yet.
     coming_in: [bool; JOINTS],
 }
 
@@ -149,7 +151,7 @@ impl Violation {
 }
 
 impl TrajectoryCheck {
-    /// Begins the check of a trajectory whose points are `step_ms` apart, with the friction `tables` if the controller uses tables.
+    /// Begins the check of a trajectory whose points are `step_ms` apart. `tables` are the friction tables, if the controller uses tables.
     pub fn new(config: &Config, step_ms: u16, tables: Option<&[TableOf<f32>; JOINTS]>) -> Self {
         let bounds = core::array::from_fn(|j| JointBounds {
             position: PathRange::of(config, j, step_ms),
@@ -169,14 +171,15 @@ impl TrajectoryCheck {
         }
     }
 
-    /// Continues a check after `points` points that have passed. `last` is the last of these points, and `passed` is the state after them.
+    /// Continues a check in which the first `points` points have passed. `last` is the last of these points, and `passed` is the state of
+    /// the check after these points.
     pub(crate) fn behind(mut self, points: u32, last: RawPoint, passed: Passed) -> Self {
         (self.points, self.last, self.last_steps, self.passed) = (points, last, (&last).into(), passed);
         self
     }
 
-    /// Checks the next point, and the interval from the last point to it. The check then continues from this point, even if the point was
-    /// refused.
+    /// Checks the next point, and the interval from the last point to this point. The check then continues from this point, even if the
+    /// point was rejected.
     pub fn take(&mut self, point: &RawPoint) -> Result<(), Violation> {
         let steps = Steps::from(point);
         let verdict = if self.points == 0 {
@@ -205,7 +208,7 @@ impl TrajectoryCheck {
         at_rest(&self.last, self.points.saturating_sub(1))
     }
 
-    /// Returns the state after the points that were checked so far.
+    /// Returns the state of the check after the points that were checked so far.
     pub(crate) fn passed(&self) -> Passed {
         self.passed
     }
@@ -216,13 +219,13 @@ impl TrajectoryCheck {
         core::array::from_fn(|j| !self.bounds[j].position.limits_contain(positions[j]))
     }
 
-    /// Checks the first point.
+    /// Checks the first point of a trajectory.
     fn begins(&self, point: &RawPoint) -> Result<(), Violation> {
         self.stands(point)?;
         at_rest(point, 0)
     }
 
-    /// Checks a point without the interval before it.
+    /// Checks a point of a trajectory, without the interval before this point.
     fn stands(&self, point: &RawPoint) -> Result<(), Violation> {
         let (at, before) = (SetPoint::from(point), self.last.position_rad());
         for (j, bounds) in self.bounds.iter().enumerate() {
@@ -246,14 +249,14 @@ impl TrajectoryCheck {
             outside(Quantity::Acceleration, a, (-bounds.acceleration, bounds.acceleration))?;
             outside(Quantity::FrictionVelocity, v, bounds.friction)?;
             if self.points == 0 {
-                // Every ramp of path time passes through zero velocity.
+                // When path time starts or stops, the velocity of each joint passes through zero.
                 outside(Quantity::FrictionVelocity, 0.0, bounds.friction)?;
             }
         }
         Ok(())
     }
 
-    /// Checks a point, and the interval from the last point to it.
+    /// Checks a point of a trajectory, and the interval from the last point to this point.
     fn judge(&self, point: &RawPoint) -> Result<(), Violation> {
         self.stands(point)?;
         let (a, b, h) = (SetPoint::from(&self.last), SetPoint::from(point), self.step);
@@ -302,8 +305,8 @@ impl TrajectoryCheck {
             if coming_in && !range.contains(p0) {
                 let (low, high) = range.inward(p0, VELOCITY_STEP + h * ACCELERATION_STEP);
                 let found = leaves(speed, low, high, &mut halvings);
-                // The result is the position in the interval at which the curve turns outwards. If the curve is still inside at this
-                // position, the check reports the point at the start of the interval.
+                // `at` is the position in the interval at which the curve turns outwards. If the curve is still inside the range at `at`,
+                // the check reports the point at the start of the interval.
                 let place = |Leaves { at, .. }: Leaves| {
                     let value = interpolate(&a, &b, h, at).position[j];
                     let value = if range.contains(value) { p0 } else { value };
@@ -316,7 +319,7 @@ impl TrajectoryCheck {
     }
 }
 
-/// Checks that every joint is at rest.
+/// Checks that every joint is at rest at this point.
 fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     for (j, value) in point.velocity_rad_s().into_iter().enumerate() {
         if let Some(limit) = bound_crossed(value, -REST_SPEED, REST_SPEED) {
@@ -327,8 +330,8 @@ fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     Ok(())
 }
 
-/// Checks that a trajectory with these `speeds` is inside the present `tables`. The trajectory was loaded while the controller used another
-/// friction model.
+/// Checks that a trajectory with these `speeds` is inside the present friction `tables`. The trajectory was loaded while the controller
+/// used another friction model.
 pub(crate) fn inside_tables(
     speeds: &[SpeedRange; JOINTS],
     tables: &[TableOf<f32>; JOINTS],
@@ -345,7 +348,7 @@ pub(crate) fn inside_tables(
     Ok(())
 }
 
-/// Checks that these bearing `temperatures` (°C) are inside the `tables`.
+/// Checks that these bearing `temperatures` (°C) are inside the friction `tables`.
 pub(crate) fn temperatures_inside(
     temperatures: &[f64; JOINTS],
     tables: &[TableOf<f32>; JOINTS],

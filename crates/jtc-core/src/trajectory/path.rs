@@ -1,11 +1,12 @@
-//! Controls the time along the path, so that pause, stop and resume do not leave the path (J-33). A trajectory is a path with a time
-//! parameterisation (Bobrow, Dubowsky and Gibson 1985; Pham and Pham 2018). This module changes only the rate of path time.
+//! Control of the time along the path, so that the arm stays on the path during a pause, a stop and a resume (J-33). A trajectory is a path
+//! with a time parameterisation (Bobrow, Dubowsky and Gibson 1985; Pham and Pham 2018). This module changes only the rate of path time.
 //!
-//! The *rate* is path time in seconds per second. The change of the rate is the *slope* (1/s). A resume takes as long as the limits
-//! require. A pause or a stop ends within a configured time. A pause or a stop begins along an S-shaped ramp with a margin to the limits.
-//! If this ramp would take too long, the pause or stop uses all available torque. In this case the slope is the slope that the arm can
-//! achieve at its torque limits, including the feedback torque. So the set values do not advance faster than the arm can follow (time
-//! scaling under torque limits, Dahl and Nielsen 1990).
+//! The *rate* is the speed of path time, in seconds of path time per second. The change of the rate is the *slope* (1/s). A resume takes as
+//! long as the limits require. A pause or a stop ends within the configured time. A pause or a stop begins along an S-shaped ramp that
+//! keeps a margin to the acceleration and torque limits. If the S-shaped ramp would take too long, the pause or stop uses all available
+//! torque. In such a hurried stop, the slope stays within the slopes that the arm can achieve at its torque limits, with its feedback
+//! torque. The set values therefore do not advance faster than the arm can follow (time scaling under torque limits, Dahl and Nielsen
+//! 1990).
 use jtc_dynamics::sqrt;
 
 use crate::DT;
@@ -16,24 +17,24 @@ use crate::bit_codec::bit_codec;
 pub(crate) struct PathClock {
     /// Path time since point 0, ms.
     pub time: f64,
-    /// Rate, in seconds of path time per second, 0..1.
+    /// Rate of path time, in seconds of path time per second, 0..1.
     pub rate: f64,
-    /// Change of `rate`, 1/s.
+    /// Change of the rate of path time, 1/s.
     pub slope: f64,
-    /// Target rate, which is 0 or the speed override (J-57).
+    /// Target rate of path time, which is 0 or the speed override (J-57).
     target: f64,
     /// Number of ticks since standstill was requested.
     halting_ms: f64,
-    /// The S-shaped ramp with its margins is too slow for the permitted time of a stop.
+    /// `true` if the S-shaped ramp with its margins is too slow for the permitted time of a stop.
     hurried: bool,
 }
 
 bit_codec!(PathClock { time, rate, slope, target, halting_ms, hurried });
 
-/// Lowest and highest slope of path time, 1/s. If no slope is possible, the first value is above the second.
+/// Lowest and highest slope of path time, 1/s. If no slope is possible, the first bound is above the second.
 pub(crate) type Bounds = (f64, f64);
 
-/// Slopes that the arm can follow.
+/// Ranges of the slopes of path time that the arm can follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SlopeBounds {
     /// Slopes within the acceleration and torque limits, with a margin for changes within a tick.
@@ -42,19 +43,19 @@ pub(crate) struct SlopeBounds {
     pub full: Bounds,
 }
 
-/// Factor by which a slope in the wrong direction (a pause during a resume) is removed faster than a ramp is rounded. A hurried stop
-/// changes its slope equally fast.
+/// Factor by which a slope in the wrong direction changes faster than the slope of a normal ramp, for example at a pause during a resume.
+/// The slope of a hurried stop also changes faster by this factor.
 const REVERSAL: f64 = 8.0;
 /// Change per tick of the slope of a path that is held back, as a fraction of the difference to the target slope.
 const SETTLES: f64 = 0.1;
-/// Share of the configured time within which a stop must end. The remaining time is for the part of the path that is still ahead.
+/// Share of the configured time within which a stop must end. The remaining time is a reserve for the part of the path that is still ahead.
 const PUNCTUAL: f64 = 0.6;
 
-/// S-shaped ramp from 0 to 1. The ramp consists of a parabola, a line and a parabola, each with a third of its length.
+/// S-shaped ramp of the rate from 0 to 1. The ramp consists of a parabola, a line and a parabola, each with a third of its length.
 struct Ramp {
-    /// Highest slope, 1/s.
+    /// Highest slope of the ramp, 1/s.
     steepest: f64,
-    /// Change of the slope in a tick, 1/s.
+    /// Change of the slope in one tick, 1/s.
     round: f64,
 }
 
@@ -64,12 +65,12 @@ impl Ramp {
         Self { steepest: 1.5 / length, round: 4.5 / (length * length) * DT }
     }
 
-    /// Returns the highest slope that can still be reduced to zero within `distance`, the remaining change of the rate.
+    /// Returns the highest slope that can still be reduced to zero while the rate changes by `distance`.
     fn flatten(&self, distance: f64) -> f64 {
         self.round * (sqrt(0.25 + 2.0 * distance / (self.round * DT)) - 0.5)
     }
 
-    /// Returns the next slope after `now`, for a rate that must still change by `distance`. `now` and `distance` are positive in the
+    /// Returns the next slope after `now`, for a rate that must still change by `distance`. Both `now` and `distance` are positive in the
     /// direction of the change.
     fn next(&self, now: f64, distance: f64) -> f64 {
         let step = if now < 0.0 { REVERSAL * self.round } else { self.round };
@@ -83,14 +84,14 @@ impl PathClock {
         Self { rate: pace, target: pace, ..Self::default() }
     }
 
-    /// Begins to ramp from standstill to the rate `pace`.
+    /// Begins to accelerate path time from standstill to the rate `pace`, along a ramp.
     pub(crate) fn go(&mut self, pace: f64) {
         self.target = pace;
         self.slope = 0.0;
     }
 
-    /// Changes the target rate. If standstill is the target, standstill stays the target. Returns `true` if path time begins to change its
-    /// rate.
+    /// Changes the target rate of path time. If the target is standstill, the target does not change. Returns `true` if path time begins to
+    /// change its rate.
     pub(crate) fn set_pace(&mut self, pace: f64) -> bool {
         let changes = self.target != 0.0 && self.target != pace;
         if changes {
@@ -99,7 +100,7 @@ impl PathClock {
         changes
     }
 
-    /// Begins to slow down to standstill. The permitted time starts at the first call.
+    /// Begins to slow path time down to standstill. The permitted time of the stop starts at the first call.
     pub(crate) fn halt(&mut self) {
         if self.target != 0.0 {
             (self.target, self.halting_ms, self.hurried) = (0.0, 0.0, false);
@@ -111,7 +112,7 @@ impl PathClock {
         *self = Self { time: self.time, ..Self::default() };
     }
 
-    /// Returns `true` if path time is at rest and will stay at rest.
+    /// Returns `true` if path time is at rest and its target is standstill.
     pub(crate) fn standing(&self) -> bool {
         self.rate == 0.0 && self.target == 0.0
     }
@@ -126,7 +127,7 @@ impl PathClock {
         self.target == 0.0 && self.rate != 0.0
     }
 
-    /// Returns `true` if the target rate of path time is not zero.
+    /// Returns `true` if the target rate of path time is not standstill.
     pub(crate) fn is_going(&self) -> bool {
         self.target != 0.0
     }
@@ -136,7 +137,7 @@ impl PathClock {
         self.rate != self.target
     }
 
-    /// Returns `true` if path time runs at full speed and will continue so.
+    /// Returns `true` if path time is at full speed and its target is full speed.
     pub(crate) fn at_full_speed(&self) -> bool {
         self.rate == 1.0 && self.target == 1.0
     }
@@ -146,13 +147,13 @@ impl PathClock {
         self.time = (self.time + self.rate).min(end);
     }
 
-    /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`. The change is slower if the slope would otherwise
-    /// leave `bounds`. If the target changes during a ramp, the slope changes as fast as permitted, without a step. Meanwhile the rate
-    /// continues to change, but never beyond the previous target.
+    /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`. The rate changes more slowly if the slope would
+    /// otherwise leave `bounds`. If the target changes during a ramp, the slope changes as fast as permitted, without a step. Until the
+    /// slope has changed, the rate continues to change, but never beyond the previous target.
     pub(crate) fn change_pace(&mut self, ramp_ms: f64, bounds: Bounds) {
         let ahead = self.target - self.rate;
         let sign = if ahead < 0.0 { -1.0 } else { 1.0 };
-        // In this function slopes are positive towards the target rate.
+        // In this function, slopes towards the target rate are positive.
         let (distance, now) = (ahead.abs(), sign * self.slope);
         let (low, high) = if sign < 0.0 { (-bounds.1, -bounds.0) } else { bounds };
         let ramp = Ramp::of(ramp_ms);
@@ -174,19 +175,20 @@ impl PathClock {
         }
     }
 
-    /// Keeps the present rate, or slows down if the slope would otherwise leave `bounds`. The rate is also kept if the bounds of several
-    /// joints contradict each other, or if only a faster path would relieve a joint.
+    /// Keeps the present rate of path time, or reduces the rate if the slope would otherwise leave `bounds`. The function also keeps the
+    /// rate if the bounds of several joints contradict each other. The function also keeps the rate if only a faster path would reduce the
+    /// torque of a joint.
     pub(crate) fn hold_back(&mut self, (low, high): Bounds) {
         let wanted = if low <= high { high.min(0.0) } else { 0.0 };
-        // The bounds come from noisy torques.
+        // The bounds come from noisy torques, so the slope follows these bounds through a filter.
         let slope = self.slope + SETTLES * (wanted - self.slope);
         self.rate = (self.rate + slope * DT).clamp(0.0, 1.0);
         self.slope = if self.rate > 0.0 { slope } else { 0.0 };
     }
 
-    /// Slows down to standstill, in at most `stop_ms` if the torque limits allow it. The clock follows an S-shaped ramp of `ramp_ms` while
-    /// that is possible within `bounds.easy`. If this would take too long, the clock uses `bounds.full`. In this case the rate may also
-    /// rise again, if the available torque cannot prevent the arm from gaining speed.
+    /// Slows path time down to standstill, in at most `stop_ms` if the torque limits allow this. The clock follows an S-shaped ramp of
+    /// `ramp_ms` while that is possible within `bounds.easy`. If the S-shaped ramp would take too long, the clock uses `bounds.full`. With
+    /// `bounds.full`, the rate may also rise again, if the available torque cannot prevent the arm from gaining speed.
     pub(crate) fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
         // In this function, slopes are decelerations, which are positive towards standstill.
         let (distance, now) = (self.rate, -self.slope);
@@ -195,7 +197,7 @@ impl PathClock {
         let (low, high) = (-bounds.easy.1, -bounds.easy.0);
         let eased = if low <= high { wanted.min(high).max(low.min(wanted)) } else { 0.0 };
 
-        // Deceleration that is needed to end in time, with a rounded end.
+        // `due` is the deceleration that ends the stop within the share [`PUNCTUAL`] of `stop_ms`, with a rounded end.
         let left_s = 0.001 * (PUNCTUAL * stop_ms - self.halting_ms);
         let due = if left_s > DT { distance / left_s } else { distance / DT };
         let due = due.min(ramp.flatten(distance)).min(now.max(0.0) + REVERSAL * ramp.round);
@@ -204,7 +206,8 @@ impl PathClock {
 
         let slope = if self.hurried {
             let (low, high) = (-bounds.full.1, -bounds.full.0);
-            // If the bounds of joints contradict each other, no slope satisfies all of them. The value nearest to standstill is used.
+            // If the bounds of several joints contradict each other, no slope satisfies all of them. The function then uses the bound that
+            // is nearest to standstill.
             eased.max(due).min(low.max(high)).max(low.min(high)).max(-ramp.steepest)
         } else {
             eased

@@ -1,4 +1,4 @@
-//! Trajectory store, which accepts segments (J-30) and contains the points.
+//! Trajectory store: accepts segments (J-30) and contains the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::bit_codec::bit_codec;
@@ -6,37 +6,40 @@ use crate::interpolation::{SetPoint, Step};
 use crate::trajectory::check::{Passed, SpeedRange, Violation};
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
-/// Share of a step before a point. A time within this share is treated as the time of the point.
+/// Tolerance before a trajectory point, as a share of the step between points. A time within this tolerance is treated as the time of the
+/// point.
 const AT_POINT: f64 = 1e-9;
 
-/// Received part of the current trajectory. `M` is the memory for the points.
+/// Trajectory with the segments that have been received. `M` is the memory for the points.
 #[derive(Clone, Debug)]
 pub(crate) struct Store<M> {
     points: M,
     /// Number of points in the accepted segments.
     received: usize,
-    /// Index of the next segment. The index is equal to `segments` when the trajectory is complete.
+    /// Index of the next segment. The index of the next segment is equal to `segments` when the trajectory is complete.
     next_segment: u16,
     segments: u16,
     number: u16,
-    /// Segment 0 came on a plain line.
+    /// `true` if segment 0 came on a plain line.
     plain: bool,
-    /// A Stop has dropped the upload. Further segments of this upload are refused until a segment 0 arrives.
+    /// `true` if a Stop has dropped the upload. The controller then refuses further segments of this upload until a segment 0 arrives.
     dropped: bool,
-    /// A Stop came during this upload, whose host cannot handle a refused segment. The upload is completed but not executed.
+    /// `true` if a Stop came during this upload and the host of this upload cannot handle a refused segment. The host can then complete the
+    /// upload, but the controller does not execute it.
     stopped: bool,
-    /// Violation that the check has found in an upload whose host cannot handle a refused segment. The upload is completed but not
-    /// executed.
+    /// Violation that the check has found in this upload. The host of this upload cannot handle a refused segment. The host can complete
+    /// this upload, but the controller does not execute it.
     refused: Option<Violation>,
     step: Step,
     /// State of the check after the accepted segments.
     passed: Passed,
-    /// Number of points in memory, and hash of these points. The points of a discarded trajectory are included.
+    /// Number of points in memory. The next field is the hash of these points. The number and the hash include the points of a discarded
+    /// trajectory.
     held: usize,
     hash: u32,
 }
 
-/// State of the trajectory, without its points.
+/// State of the trajectory store, without the points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoreState {
     received: usize,
@@ -54,7 +57,7 @@ pub(crate) struct StoreState {
 }
 
 impl StoreState {
-    /// Returns the time between points, ms.
+    /// Returns the time between points of the trajectory, ms.
     pub(crate) fn step_ms(&self) -> u16 {
         self.step_ms
     }
@@ -75,13 +78,14 @@ bit_codec!(StoreState {
     hash
 });
 
-/// Start value of a hash of points. `mix` adds a word to the hash with one multiplication, so that copying a segment takes little time.
+/// Start value of a hash of points. `mix` adds a word to the hash with a single multiplication, because copying a segment must take little
+/// time.
 const HASH_BEGIN: u32 = 0x811C_9DC5;
 fn mix(hash: u32, word: u32) -> u32 {
     (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
 }
 
-/// Returns the hash of all points if `hash` is the hash of the points before `points`.
+/// Returns the hash of all points, from the `hash` of the points before `points`.
 fn hash_points(hash: u32, points: &[RawPoint]) -> u32 {
     points.iter().fold(hash, |hash, point| {
         let pairs =
@@ -112,7 +116,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Returns the number of points that fit, which is the limit of the protocol or of the memory, whichever is lower.
+    /// Returns the number of points that the store can contain. The capacity is the lower of the limits of the protocol and of the memory.
     fn capacity(&self) -> usize {
         self.points.as_ref().len().min(POINTS_MAX)
     }
@@ -133,8 +137,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.segments > 0 && self.next_segment < self.segments
     }
 
-    /// Drops an incomplete upload because of a Stop (J-30). An upload that began on a plain line is completed but not executed, because its
-    /// host would otherwise wait for ever. Returns `true` if an upload was incomplete.
+    /// Drops an incomplete upload because of a Stop (J-30). An upload that began on a plain line can be completed but is not executed,
+    /// because its host would otherwise wait for ever. Returns `true` if an upload was incomplete.
     pub(crate) fn drop_upload(&mut self) -> bool {
         let receiving = self.receiving();
         if receiving && self.plain {
@@ -146,7 +150,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         receiving
     }
 
-    /// Returns `true` if a Stop came during the upload of this trajectory, so that it is not executed (J-30).
+    /// Returns `true` if a Stop came during the upload of this trajectory, so that the controller does not execute it (J-30).
     pub(crate) fn stopped(&self) -> bool {
         self.stopped
     }
@@ -161,7 +165,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.refused.get_or_insert(violation);
     }
 
-    /// Returns the violation that the check has found in this trajectory. A trajectory with a violation is not executed (J-36).
+    /// Returns the violation that the check has found in this trajectory. The controller does not execute a trajectory with a violation
+    /// (J-36).
     pub(crate) fn refused(&self) -> Option<Violation> {
         self.refused
     }
@@ -171,18 +176,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.dropped = true;
     }
 
-    /// Returns `true` if the upload was dropped and no other upload has begun after that.
+    /// Returns `true` if a Stop has dropped the upload and no other upload has begun after the Stop.
     pub(crate) fn dropped(&self) -> bool {
         self.dropped
     }
 
     /// Returns the time of the last point, ms.
     pub(crate) fn duration_ms(&self) -> u32 {
-        // The product is at most 11 999 · 65 535, which fits into 32 bits.
+        // The product of points and step is at most 11 999 · 65 535, which fits into 32 bits.
         (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
-    /// Checks that the segment may follow the received segments. The check does not change the store.
+    /// Checks that the segment may follow the segments that were received. The check does not change the store.
     pub(crate) fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
         let first = segment.segment == 0;
         let before = if first { 0 } else { self.received };
@@ -210,8 +215,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to copy an accepted segment. Segment 0 replaces the old trajectory. `plain` means that the line of the segment is plain.
-    /// `stopped` means that a Stop came before the segment was processed.
+    /// Begins to copy an accepted segment. Segment 0 replaces the old trajectory. `plain` is `true` if the segment came on a plain line.
+    /// `stopped` is `true` if a Stop came before the segment was processed.
     pub(crate) fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
         if segment.segment == 0 {
             self.clear();
@@ -223,7 +228,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Copies points `from..to` of the segment into the memory after the received points. The copied points become valid with `commit`.
+    /// Copies points `from..to` of the segment into the memory after the received points. The call of `commit` makes the copied points
+    /// valid.
     pub(crate) fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
         let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
@@ -232,7 +238,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.hash = hash_points(self.hash, slots);
     }
 
-    /// Adds the segment after all its points have been copied. `passed` is the state of the check after all points so far.
+    /// Adds the segment to the trajectory, after all its points have been copied. `passed` is the state of the check after all points that
+    /// have been received.
     pub(crate) fn commit(&mut self, segment: &Segment<'_>, passed: Passed) {
         self.passed = passed;
         self.received = (self.received + segment.len()).min(self.capacity());
@@ -250,7 +257,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.points.as_ref().get(first..self.held).unwrap_or(&[])
     }
 
-    /// Returns the state, without the points.
+    /// Returns the state of the store, without the points.
     pub(crate) fn state(&self) -> StoreState {
         let Self {
             points: _,
@@ -284,7 +291,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Restores the state. The points are restored separately.
+    /// Restores the state of the store. The caller restores the points separately.
     pub(crate) fn restore(&mut self, state: &StoreState) {
         let StoreState {
             received,
@@ -307,25 +314,26 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         (self.held, self.hash) = (held.min(self.capacity()), hash);
     }
 
-    /// Stores points, beginning with number `first`.
+    /// Writes points into the memory, starting with number `first`.
     pub(crate) fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         for (slot, point) in self.points.as_mut().iter_mut().skip(first).zip(points) {
             *slot = *point;
         }
     }
 
-    /// Returns the number of points, the last point, and the state of the check after the last point. Returns `None` without points.
+    /// Returns the number of points, the last point, and the state of the check after the last point. Returns `None` if the store contains
+    /// no points.
     pub(crate) fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
         let last = *self.points.as_ref().get(..self.received)?.last()?;
         Some((self.received as u32, last, self.passed))
     }
 
-    /// Returns the speeds of the points.
+    /// Returns the velocity ranges of the joints at and between the stored points.
     pub(crate) fn speeds(&self) -> &[SpeedRange; JOINTS] {
         &self.passed.speeds
     }
 
-    /// Returns the time between points, ms.
+    /// Returns the time between points of the trajectory, ms.
     pub(crate) fn step_ms(&self) -> u16 {
         self.step.ms
     }
@@ -335,23 +343,24 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.points.as_ref().get(..self.received)?.first().map(RawPoint::position_rad)
     }
 
-    /// Returns the set values at `time_ms` after point 0, with velocities and accelerations for full speed. Returns `None` without points.
+    /// Returns the set values at `time_ms` after point 0, with velocities and accelerations for full speed. Returns `None` if the store
+    /// contains no points.
     pub(crate) fn at(&self, time_ms: f64) -> Option<SetPoint> {
         let mut at = SetPoint::default();
         self.put(time_ms, &mut at).then_some(at)
     }
 
-    /// Like [`Self::at`], but writes the set values to `at`. Returns `false` without points.
+    /// Like [`Self::at`], but writes the set values to `at`. Returns `false` if the store contains no points.
     #[inline]
     pub(crate) fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
         let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
         let step_ms = f64::from(self.step.ms);
-        // The product may be rounded to a value just below a point that the time has reached. `as` saturates, so a negative or NaN time
-        // results in point 0.
+        // The product of time and `per_ms` may be rounded to a value just below the index of a point that the time has reached. The
+        // conversion with `as` saturates, so a negative time or a time of NaN results in point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
-        // The interpolation is also computed exactly at a point and at the last point, without any effect, so that every tick does the same
-        // work.
+        // The interpolation is also computed at a point and at the last point, although it has no effect there, because every tick must do
+        // the same work.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),

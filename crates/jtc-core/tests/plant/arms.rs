@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use super::{LuGre, Random, highest, loaded, shares_of};
 use crate::rig::{Rig, floats, model_body};
 
-/// Arm with the data that its controller gets.
+/// Arm with the data that its controller receives.
 #[derive(Clone)]
 pub(crate) struct ArmFile {
     pub name: &'static str,
@@ -37,7 +37,7 @@ impl ArmFile {
         Self::parse("z1", Z1)
     }
 
-    /// Returns the UR5 with friction in its joints and in its file.
+    /// Returns the UR5 with friction in its joints, both in the simulation and in its arm file.
     pub(crate) fn rough_ur5() -> Self {
         let friction = [(8.0, 20.0), (8.0, 20.0), (6.0, 15.0), (2.0, 5.0), (2.0, 5.0), (2.0, 5.0)];
         Self {
@@ -47,7 +47,7 @@ impl ArmFile {
         }
     }
 
-    /// Returns the arm without friction, both in the simulation and in its file.
+    /// Returns the arm without friction, both in the simulation and in its arm file.
     pub(crate) fn slick(self) -> Self {
         Self { polynomial: [[0.0; 6]; 6], ..self }
     }
@@ -57,8 +57,8 @@ impl ArmFile {
         shares_of(torque, &self.config)
     }
 
-    /// Returns a pose inside the position ranges, rad, and the torque that holds this pose. With a payload at the flange (kg), this torque
-    /// is less than the share `most` of each limit.
+    /// Returns a random pose inside the position ranges, rad, and the torque that holds this pose. With a payload at the flange (kg), this
+    /// torque is less than the share `most` of each limit.
     pub(crate) fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
         let dynamics = Dynamics::new(&loaded(self.model, mass), self.config.gravity);
         loop {
@@ -73,7 +73,8 @@ impl ArmFile {
         }
     }
 
-    /// Returns the friction of the joints at the temperature of the rig, times `factor`. Stiction is 20 % higher than Coulomb friction.
+    /// Returns the friction of the joints at the temperature of the rig, multiplied by `factor`. Stiction is 20 % higher than Coulomb
+    /// friction.
     pub(crate) fn friction(&self, factor: f64) -> [LuGre; 6] {
         self.polynomial.map(|c| {
             if c[0] == 0.0 && c[1] == 0.0 {

@@ -10,14 +10,14 @@ pub(crate) mod arms;
 
 pub(crate) use arms::ArmFile;
 
-/// Step of the drives' 16-bit encoder, rad.
+/// Resolution of the drives' 16-bit encoder, rad.
 pub(crate) const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
-/// Step of the motor's encoder at the output side of the gear, rad. The drives measure the speed with this encoder.
+/// Resolution of the motor's encoder at the output side of the gear, rad. The drives measure the speed with this encoder.
 const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
-/// Number of integration steps per millisecond. The bristles are stiff, so many steps are needed.
+/// Number of integration steps per millisecond. The bristles of the friction model are stiff and therefore need many steps.
 const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
-/// Inertia of the output side of an elastic gear, kg·m². The output side turns with the link.
+/// Inertia of the output side of an elastic gear, kg·m². The output side of the gear turns with the link.
 const GEAR_OUTPUT: f64 = 0.01;
 /// Damping of an elastic gear divided by its stiffness, s (N·m·s/rad for each N·m/rad).
 const GEAR_DAMPING: f64 = 5e-4;
@@ -25,11 +25,11 @@ const GEAR_DAMPING: f64 = 5e-4;
 /// LuGre friction of a joint (Canudas de Wit et al. 1995), with bristles that stick first and then slip along Stribeck's curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuGre {
-    /// Friction torque while sliding slowly, N·m.
+    /// Friction torque of a slowly sliding joint, N·m.
     pub coulomb: f64,
     /// Torque at which the joint breaks away, N·m.
     pub stiction: f64,
-    /// Speed above which stiction has mostly disappeared, rad/s.
+    /// Speed above which stiction has nearly disappeared, rad/s.
     pub stribeck: f64,
     /// Stiffness of the bristles, N·m/rad.
     pub stiffness: f64,
@@ -43,7 +43,8 @@ impl LuGre {
     pub(crate) const NONE: Self =
         Self { coulomb: 0.0, stiction: 0.0, stribeck: 1.0, stiffness: 0.0, damping: 0.0, viscous: 0.0 };
 
-    /// Returns the friction of joint `j` of the default arm at the temperature of the rig, with this ratio of stiction to Coulomb friction.
+    /// Returns the friction of joint `j` of the default arm at the temperature of the rig. `stiction` is the ratio of stiction to Coulomb
+    /// friction.
     pub(crate) fn avena(j: usize, stiction: f64) -> Self {
         let jtc_core::Friction::Polynomial(polynomial) = Parameters::avena().friction else { panic!() };
         let c = polynomial[j];
@@ -59,7 +60,7 @@ impl LuGre {
         }
     }
 
-    /// Returns the default arm's friction times `factor`. Stiction is 20 % higher than Coulomb friction.
+    /// Returns the default arm's friction multiplied by `factor`. Stiction is 20 % higher than Coulomb friction.
     pub(crate) fn of_avena_times(factor: f64) -> [Self; 6] {
         core::array::from_fn(|j| {
             let f = Self::avena(j, 1.2);
@@ -68,7 +69,7 @@ impl LuGre {
         })
     }
 
-    /// Returns the torque against the motion at speed `v`, and moves the bristles `z` by `dt`.
+    /// Returns the friction torque against the motion at speed `v`, and moves the bristles `z` by `dt`.
     fn step(&self, z: &mut f64, v: f64, dt: f64) -> f64 {
         if self.stiffness == 0.0 {
             return self.viscous * v;
@@ -76,7 +77,7 @@ impl LuGre {
         let x = v / self.stribeck;
         let level = self.coulomb + (self.stiction - self.coulomb) * (-x * x).exp();
         let rate = self.stiffness * v.abs() / level;
-        // The step is implicit in z, which is stiff at high speed.
+        // The integration step is implicit in z, because the equation is stiff at high speed.
         let next = (*z + v * dt) / (1.0 + rate * dt);
         let slope = (next - *z) / dt;
         *z = next;
@@ -84,10 +85,10 @@ impl LuGre {
     }
 }
 
-/// Elastic gears. Each gear is a spring and a damper between its motor and its link. The motors' angles and speeds are converted to the
-/// output side.
+/// State of elastic gears. Each gear is a spring and a damper between its motor and its link. The angles and speeds of the motors are
+/// converted to the output side.
 struct Gears {
-    /// Stiffness, N·m/rad.
+    /// Stiffness of each gear, N·m/rad.
     stiffness: f64,
     /// Angles of the motors, rad.
     q: [f64; 6],
@@ -102,17 +103,17 @@ impl Gears {
     }
 }
 
-/// Reproducible pseudo-random numbers.
+/// Generator of reproducible pseudo-random numbers.
 pub(crate) struct Random(pub u64);
 
 impl Random {
-    /// Returns a number that is evenly distributed from 0 to 1.
+    /// Returns a random number that is evenly distributed from 0 to 1.
     pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Returns a number that is evenly distributed from `low` to `high`.
+    /// Returns a random number that is evenly distributed from `low` to `high`.
     pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
     }
@@ -131,22 +132,22 @@ pub(crate) fn shares(torque: &[f64; 6]) -> [f64; 6] {
     shares_of(torque, &Config::avena())
 }
 
-/// Returns the torques as shares of the torque limits of the arm of `config`.
+/// Returns the torques as shares of the torque limits in `config`.
 pub(crate) fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
     core::array::from_fn(|j| torque[j].abs() / config.joints[j].torque_max)
 }
 
-/// Returns the highest share of all joints.
+/// Returns the highest of the shares of all joints.
 pub(crate) fn highest(shares: &[f64; 6]) -> f64 {
     shares.iter().fold(0.0, |most, share| share.max(most))
 }
 
-/// Returns a pose like [`ArmFile::pose`], for the default arm.
+/// Returns a random pose like [`ArmFile::pose`], for the default arm.
 pub(crate) fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
     ArmFile::avena().pose(random, mass, most)
 }
 
-/// Returns the torque that `model` needs to hold `q`, N·m.
+/// Returns the torques that hold an arm with this `model` at `q`, N·m.
 pub(crate) fn standing(model: &ArmModel, q: &[f64; 6]) -> [f64; 6] {
     Dynamics::new(model, Config::avena().gravity).gravity_torque(q)
 }
@@ -157,22 +158,22 @@ pub(crate) struct Plant {
     pub rotor: [f64; 6],
     pub friction: [LuGre; 6],
     bristles: [f64; 6],
-    /// Elastic gears. `None` for rigid gears.
+    /// Elastic gears of the arm. `None` for rigid gears.
     gears: Option<Gears>,
     pub q: [f64; 6],
     pub v: [f64; 6],
-    /// External torque of a hand or a collision, N·m.
+    /// External torque on each joint from a hand or a collision, N·m.
     pub push: [f64; 6],
     /// Speeds of the motors in the last 10 ms, rad/s.
     pub speeds: [[f64; 10]; 6],
-    /// Joints that a brake holds while their drive is not enabled.
+    /// `true` if a brake holds each joint while its drive is not enabled.
     pub brakes: bool,
     /// Factor between the true speed and the reported speed.
     pub speed_scale: f64,
     ticks: usize,
 }
 
-/// Returns `model` with `mass` kg at the flange.
+/// Returns `model` with an additional mass of `mass` kg at the flange.
 pub(crate) fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
     let flange = model.joints[6].xyz;
     let link = &mut model.links[6];
@@ -184,7 +185,7 @@ pub(crate) fn loaded(mut model: ArmModel, mass: f64) -> ArmModel {
     model
 }
 
-/// Returns `model` with every mass times `factor`.
+/// Returns `model` with every mass multiplied by `factor`.
 pub(crate) fn heavier(mut model: ArmModel, factor: f64) -> ArmModel {
     for link in &mut model.links {
         link.mass *= factor;
@@ -230,7 +231,7 @@ impl Plant {
         self
     }
 
-    /// Returns a rig that holds another arm.
+    /// Returns a rig whose controller holds another arm.
     pub(crate) fn holding_arm(&mut self, arm: &ArmFile) -> Rig {
         let mut rig = Rig::with_speeds(arm.config.clone());
         rig.follow = false;
@@ -241,8 +242,8 @@ impl Plant {
         rig
     }
 
-    /// Advances the arm and the rig by one millisecond. The controller measures the state of the previous tick, which does not depend on
-    /// the torque of this tick.
+    /// Advances the simulated arm and the rig by one millisecond. The controller measures the state of the previous tick, because this
+    /// state does not depend on the torque of the present tick.
     pub(crate) fn tick(&mut self, rig: &mut Rig) {
         rig.tick();
         self.step(rig);
@@ -265,7 +266,7 @@ impl Plant {
         }
     }
 
-    /// Returns a rig that holds this arm.
+    /// Returns a rig whose controller holds this arm.
     pub(crate) fn holding(&mut self, config: Config) -> Rig {
         let mut rig = Rig::with_speeds(config);
         rig.follow = false;
@@ -311,8 +312,8 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// Returns the torque of joint `j` on its link, N·m, if its drive has the torque `drive`. The result is the drive torque minus
-    /// friction, or the torque of an elastic gear. Also advances the motor of an elastic gear by one step.
+    /// Returns the torque on the link of joint `j`, N·m, if its drive has the torque `drive`. The torque on the link is the drive torque
+    /// minus friction, or the torque of an elastic gear. Also advances the motor of an elastic gear by one step.
     fn joint_torque(&mut self, j: usize, drive: f64, braked: bool) -> f64 {
         let speed = *self.motor_speed(j);
         let friction = self.friction[j].step(&mut self.bristles[j], speed, DT);
@@ -345,7 +346,7 @@ impl Plant {
     }
 }
 
-/// Returns the reading of the encoder at `q`, rad.
+/// Returns the reading of an encoder at the position `q`, rad.
 fn read(q: f64) -> f64 {
     (q / ENCODER_STEP).floor() * ENCODER_STEP
 }

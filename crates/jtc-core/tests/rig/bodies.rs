@@ -1,8 +1,8 @@
-//! Frames of a host, and the bodies of these frames.
+//! Frames of a host, and the bodies of such frames.
 use jtc_dynamics::ArmModel;
 use jtc_wire::{FrameType, RawPoint, crc16};
 
-/// Returns a frame with length and CRC.
+/// Returns a frame with its length and CRC.
 pub(crate) fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let n = body.len() + 6;
     let mut bytes = vec![0x9B, frame_type as u8, (n >> 8) as u8, n as u8];
@@ -15,7 +15,7 @@ pub(crate) fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_be_bytes).collect()
 }
 
-/// A Trajectory body.
+/// Returns the body of a Trajectory frame.
 pub(crate) fn segment_body(
     number: u16,
     segment: u16,
@@ -32,7 +32,7 @@ pub(crate) fn segment_body(
     body
 }
 
-/// An ArmModel body.
+/// Returns the body of an ArmModel frame.
 pub(crate) fn model_body(model: &ArmModel) -> Vec<u8> {
     let joints = model.joints.iter().flat_map(|j| j.xyz.into_iter().chain(j.rpy));
     let links = model.links.iter().flat_map(|l| {

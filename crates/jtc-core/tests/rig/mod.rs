@@ -1,4 +1,4 @@
-//! Rig without physics. The nodes answer at once, and the joints are at the positions that the test sets.
+//! Test rig without physics. The nodes answer at once, and the joints are at the positions that the test sets.
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::recorder::{Block, Recorder};
@@ -27,13 +27,13 @@ pub(crate) struct Rig {
     pub pump: bool,
     pub torque: [f64; 6],
     pub safety_input: bool,
-    /// Number of missed ticks before the next one.
+    /// Number of ticks that are missed before the next tick.
     pub missed_ticks: u16,
     pub acknowledged: bool,
     pub bus_off: bool,
-    /// The joints follow the commanded positions.
+    /// `true` if the joints follow the commanded positions.
     pub follow: bool,
-    /// Joints that do not follow the commanded positions.
+    /// `true` for each joint that does not follow the commanded positions.
     pub apart: [bool; 6],
     /// Frames that the controller has sent, one per tick.
     pub sent: Vec<Request>,
@@ -42,14 +42,14 @@ pub(crate) struct Rig {
     /// Frames that the controller receives in the next tick instead of the frames of the nodes.
     pub inject: Vec<Frame>,
     answers: Vec<Frame>,
-    /// The serial line can take a status.
+    /// `true` if the serial line can accept a status.
     pub status_free: bool,
-    /// Stop and Pause that arrive before the next tick.
+    /// Stop and Pause commands that arrive before the next tick.
     urgent: [UrgentCommands; HOST_LINES],
     host: std::collections::VecDeque<Sent>,
     /// The flight recorder, if the test has one.
     pub recorder: Option<Recorder<Vec<Block>, 2>>,
-    /// The next frames of hosts come on plain lines (J-51).
+    /// `true` if the next frames of hosts come on plain lines (J-51).
     pub plain: bool,
 }
 
@@ -79,7 +79,8 @@ impl Sent {
 }
 
 impl Rig {
-    /// Creates a rig whose joints have no speed unless a test sets one. Speeds are not compared with positions (J-35).
+    /// Creates a rig whose joints report a speed of zero unless a test sets a speed. The controller does not compare these speeds with
+    /// positions (J-35).
     pub(crate) fn new(config: Config) -> Self {
         Self::with_speeds(Config { drive_speed_window_ms: 0, ..config })
     }
@@ -119,7 +120,7 @@ impl Rig {
         }
     }
 
-    /// Returns a rig in HoldPos with every joint enabled and the default parameters.
+    /// Returns a rig in HoldPos, with every joint enabled and with the default parameters.
     pub(crate) fn holding() -> Self {
         Self::holding_with(Config::avena())
     }
@@ -128,7 +129,7 @@ impl Rig {
         Self::held_at(config, [0.0; 6])
     }
 
-    /// Returns a rig that is held in this pose, rad.
+    /// Returns a rig whose controller holds the arm in this pose, rad.
     pub(crate) fn held_at(config: Config, pose: [f64; 6]) -> Self {
         let mut rig = Self::new(config);
         rig.follow = false;
@@ -136,7 +137,7 @@ impl Rig {
             node.report.position = position;
         }
         rig.defaults();
-        // Runs until the load of the arm is known, because Teaching waits until then.
+        // The rig runs until the controller knows the load of the arm, because Teaching waits until then.
         rig.run(700);
         assert_eq!(rig.state(), ControllerState::HoldPos, "{:?}", rig.controller.telemetry());
         assert!(rig.nodes[..6].iter().all(|n| n.report.state == NodeState::ENABLED));
@@ -144,7 +145,7 @@ impl Rig {
         rig
     }
 
-    /// Returns a rig in HoldPos whose joint 3 is not enabled yet, because its drive takes long to enable.
+    /// Returns a rig in HoldPos whose joint 3 is not enabled yet, because its drive needs a long time to enable.
     pub(crate) fn with_a_slow_drive(config: Config) -> Self {
         let mut rig = Self::new(config);
         rig.nodes[2].slow_enable = true;
@@ -214,17 +215,17 @@ impl Rig {
         }
     }
 
-    /// Returns the number of events that are not completed.
+    /// Returns the number of host events that the controller has not completed.
     pub(crate) fn waiting(&self) -> usize {
         self.host.len()
     }
 
-    /// Returns the records so far, oldest first, without the records of extensions.
+    /// Returns the response records so far, oldest first, without the records of extensions.
     pub(crate) fn records(&self) -> Vec<Response> {
         self.statuses.iter().filter_map(Status::response).filter(|record| record.frame_type < 0x40).collect()
     }
 
-    /// Sends a frame, runs until it is done, and returns the data status of its record.
+    /// Sends a frame, executes ticks until the controller has completed it, and returns the data status of its response record.
     pub(crate) fn ask(&mut self, frame_type: FrameType, body: &[u8]) -> DataStatus {
         self.send(frame_type, body);
         for _ in 0..1000 {
@@ -287,7 +288,7 @@ impl Rig {
         }
     }
 
-    /// Runs until `done`, at most `ticks`. Returns the number of ticks.
+    /// Executes ticks until `done` returns `true`, at most `ticks`. Returns the number of executed ticks.
     pub(crate) fn until(&mut self, ticks: usize, mut done: impl FnMut(&Self) -> bool) -> usize {
         for t in 0..ticks {
             if done(self) {

@@ -1,21 +1,21 @@
 //! Simulated node without physics.
 use jtc_bus::{JointReport, NodeState};
 
-/// Node with the state machine that is visible on the bus.
+/// Simulated node with the state machine that is visible on the bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Node {
     pub report: JointReport,
-    /// The node does not answer.
+    /// `true` if the node does not answer.
     pub silent: bool,
     /// Error of the reported position, rad.
     pub glitch: f64,
-    /// The node accepts its configuration only in Init.
+    /// `true` if the node accepts its configuration only in Init.
     pub refuses_when_ready: bool,
-    /// The node does not leave ReadyToOperate.
+    /// `true` if the node does not leave ReadyToOperate.
     pub stays_ready: bool,
-    /// The node does not leave OperationEnable.
+    /// `true` if the node does not leave OperationEnable.
     pub stays_enabled: bool,
-    /// The node does not become enabled, because it stays in the transition.
+    /// `true` if the node does not become enabled, because it stays in the transition.
     pub slow_enable: bool,
     pub configured: bool,
     pub resets: u32,

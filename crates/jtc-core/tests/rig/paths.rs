@@ -1,11 +1,11 @@
-//! Trajectories, and motions to a point on them.
+//! Trajectories, and motions to a point of a trajectory.
 use jtc_core::TrajectoryState;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 
 use super::{Rig, segment_body};
 
-/// Returns a motion of a joint (0..5) that consists of pieces with constant acceleration. Each piece has an acceleration (rad/s²) and a
-/// number of points 10 ms apart.
+/// Returns the points of a motion of a joint (0..5) that consists of pieces with constant acceleration. Each piece has an acceleration
+/// (rad/s²) and a number of points 10 ms apart.
 pub(crate) fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
     let (mut p, mut v) = (0.0f64, 0.0f64);
     let mut points = vec![RawPoint::default()];
@@ -34,7 +34,7 @@ pub(crate) fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
     point.acceleration[joint] = raw(a, 12.566370);
 }
 
-/// Returns a value as an integer in the wire format. `scale` is the value of the largest integer.
+/// Returns a value as an integer in the wire format. `scale` is the value of the largest integer in the wire format.
 pub(crate) fn raw(value: f64, scale: f64) -> i16 {
     (value / scale * 32767.0).round() as i16
 }
@@ -44,13 +44,13 @@ pub(crate) fn rest(raw: i16) -> RawPoint {
     RawPoint { position: [raw; 6], ..RawPoint::default() }
 }
 
-/// Returns the angle of a raw position, rad.
+/// Returns the angle of a position in the wire format, rad.
 pub(crate) fn rad(raw: i16) -> f64 {
     f64::from(raw) * (3.141592 / 32767.0)
 }
 
 impl Rig {
-    /// Uploads in segments of at most 100 points.
+    /// Uploads a trajectory in segments of at most 100 points.
     pub(crate) fn upload(&mut self, points: &[RawPoint], step: u16) {
         let chunks: Vec<_> = points.chunks(100).collect();
         for (i, chunk) in chunks.iter().enumerate() {
@@ -60,13 +60,13 @@ impl Rig {
         assert_eq!(self.trajectory(), TrajectoryState::Stop);
     }
 
-    /// Uploads points 10 ms apart and executes them.
+    /// Uploads points that are 10 ms apart and executes them.
     pub(crate) fn execute(&mut self, points: &[RawPoint]) {
         self.upload(points, 10);
         assert_eq!(self.exec(ExecCommand::Execute), DataStatus::NoError);
     }
 
-    /// Uploads points 10 ms apart, executes them, and runs until path time is at `point` ms.
+    /// Uploads points that are 10 ms apart, executes them, and executes ticks until path time is at `point` ms.
     pub(crate) fn move_along(&mut self, points: &[RawPoint], point: u32) {
         self.execute(points);
         self.until(4_000, |rig| rig.controller.telemetry().point >= point);

@@ -1,4 +1,4 @@
-//! Tests of the bounds of parameters (J-06). A value at a bound is accepted, and a value beyond the bound is refused.
+//! Tests of the bounds of parameters (J-06). The check accepts a value at a bound, and refuses a value beyond the bound.
 use jtc_dynamics::Link;
 
 use super::*;
@@ -32,7 +32,7 @@ fn j06_a_bound_of_the_gains_is_allowed_and_nothing_beyond() {
     assert!(check(PidGains { int_min: 0.2, int_max: 0.1, ..none }).is_err());
 }
 
-/// Bounds of the integral that exclude zero cause a torque on a joint at rest, which is Ki times the bound that is nearer to zero.
+/// If the bounds of the integral exclude zero, the integral causes a torque on a joint at rest: Ki times the bound that is nearer to zero.
 #[test]
 fn j06_an_integral_forces_a_quarter_of_the_torque_limit_at_most() {
     for (int_min, int_max, ki) in [(2.0, 9.0, 12.5), (-9.0, -2.0, 12.5), (-1.0, 9.0, 50_000.0)] {
@@ -43,7 +43,7 @@ fn j06_an_integral_forces_a_quarter_of_the_torque_limit_at_most() {
     }
 }
 
-/// Checks a table in which only one friction torque is not 0.
+/// Checks a friction table in which only one torque is not 0.
 fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
     let mut table = TableOf {
         velocity: core::array::from_fn(|i| (i as f32 - 10.0) * 0.125),
@@ -58,8 +58,8 @@ fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
 
 #[test]
 fn j06_friction_is_bounded_by_where_it_is() {
-    // The three ranges are standstill, up to half of the velocity limit, and above. A torque against the motion is positive in both
-    // directions.
+    // The check has three ranges of speeds: standstill, up to half of the velocity limit, and above half of this limit. A friction torque
+    // against the motion is positive in both directions.
     for (speed, low, high) in
         [(0.0, -25.0, 25.0), (0.125, -5.0, 100.0), (0.75, -5.0, 100.0), (0.875, -150.0, 150.0)]
     {
@@ -106,8 +106,8 @@ fn j06_a_polynomial_is_bounded_up_to_the_velocity_limit() {
             let c3 = most * 100.0 / (fastest * fastest * fastest);
             BOUNDS.check_polynomial(&[0.0, 0.0, 0.0, sign * c3, 0.0, 0.0], &joint()).map_err(|e| e.velocity)
         };
-        // A torque against the motion first reaches the bound for high speeds, at the highest speed. A torque along the motion first
-        // reaches the bound for slow speeds.
+        // A friction torque against the motion first reaches the bound for high speeds, at the highest speed. A friction torque along the
+        // motion first reaches the bound for slow speeds.
         let most = if sign > 0.0 { 1.5 } else { 0.05 * 8.0 };
         assert_eq!(cubic(0.999 * most), Ok(()));
         assert_eq!(cubic(1.001 * most), Err(Some(if sign > 0.0 { fastest } else { 0.5 * fastest })));
@@ -127,7 +127,7 @@ fn j06_masses_and_inertias_reach_their_bounds() {
     assert!(with(|link| link.inertia[4] = -100.0) && !with(|link| link.inertia[4] = -100.1));
 }
 
-/// Friction against the motion is reported as positive. At rest, friction is reported with its actual sign.
+/// Friction against the motion is reported as positive. At standstill, friction is reported with its actual sign.
 #[test]
 fn j06_what_is_refused_is_told_with_its_value() {
     for (velocity, torque, value) in
@@ -137,13 +137,13 @@ fn j06_what_is_refused_is_told_with_its_value() {
     }
 }
 
-/// The check uses equal numbers of speeds below and above a sixteenth of the velocity limit.
+/// The check tests equal numbers of speeds below and above a sixteenth of the velocity limit.
 #[test]
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
     for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
-        // The bound for slow speeds, 100 N·m, is reached after `reached` steps. A sixteenth of the velocity limit is divided into sixteen
-        // steps.
+        // The friction torque reaches the bound for slow speeds, 100 N·m, after `reached` steps. A sixteenth of the velocity limit is
+        // divided into sixteen of these steps.
         let c1 = 100.0 / (sixteenth * reached / 16.0);
         let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
         assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");

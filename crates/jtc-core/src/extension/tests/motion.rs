@@ -31,7 +31,7 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
             assert_eq!(bench.controller.state, next);
         }
     }
-    // During a jog, the arm is not at rest.
+    // During a jog, the arm does not count as at rest.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.force(ControllerState::HoldPos);
@@ -53,7 +53,7 @@ fn j59_hosts_that_are_silent_end_teaching_and_pause_the_path() {
         let leave = ends.then_some(TrajectoryState::Pause);
         assert_eq!(bench.controller.phase, Phase::Running { leave }, "{limit} {silent}");
     }
-    // A valid frame of any host ends the silence. Noise does not end it.
+    // A valid frame of any host ends the silence of the hosts. Noise does not end this silence.
     let frame = FrameRef::new_checked(&fixed::GET_INFO).expect("a good frame");
     let noise = LinkEvent::Noise(Response::bad(0, FrameStatus::IncorrectHeader, 0));
     for (event, left) in [(LinkEvent::Frame(frame), 0), (noise, 78)] {
@@ -81,7 +81,7 @@ fn j61_drives_are_asked_for_the_joint_torque_times_the_gain() {
         let expected = torque[j] * (1.0 + 0.1 * j as f64);
         assert!((asked[j] - expected).abs() < 0.02, "{} {expected}", asked[j]);
     }
-    // The torque that a drive reports is converted to the torque of the joint before it is sent.
+    // The controller converts the torque that a drive reports to the torque of the joint before it sends the torque to the host.
     let status = bench.controller.status(Response::NONE);
     let report = bench.controller.nodes.node(2).report.torque;
     assert!((f64::from(status.joints[2].torque) * 1.2 - report).abs() < 1e-6);
@@ -116,14 +116,14 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         for _ in 0..520 {
             hold(&mut bench.controller);
             position = bench.controller.motion.set.point.position;
-            // The velocity may still increase slightly, because the acceleration must first change its sign.
+            // The joint may still become slightly faster, because its acceleration must first change its sign.
             assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");
         }
         assert!(!bench.controller.motion.set.jogging() && position[2] > 0.0);
     }
 }
 
-/// J-06: a command that changes the torque takes effect only at standstill.
+/// J-06: during a jog, the controller refuses commands that change the torque.
 #[test]
 fn j58_parameters_and_resets_wait_for_the_end_of_a_jog() {
     let mut bench = Bench::new();

@@ -50,7 +50,7 @@ fn j53_settings_change_whole_and_without_torque_only() {
     }
 }
 
-/// In the next tick, the torque of the model uses the new gravity.
+/// In the tick after the change, the torque of the model uses the new gravity.
 #[test]
 fn j53_gravity_that_is_set_is_computed_with() {
     let mut bench = Bench::new();
@@ -62,7 +62,7 @@ fn j53_gravity_that_is_set_is_computed_with() {
     assert!(before.iter().zip(after).all(|(b, a)| (b + a).abs() < 1e-9) && before[1].abs() > 10.0);
 }
 
-/// Settings that arrive after the parameters are refused if the received parameters are not valid with them.
+/// The controller refuses settings if the parameters that it received before are not valid with these settings.
 #[test]
 fn j53_settings_that_the_parameters_contradict_are_refused() {
     for (setting, value) in [(96, 7_000.0), (101, 0.5), (103, 0.001)] {
@@ -72,20 +72,20 @@ fn j53_settings_that_the_parameters_contradict_are_refused() {
         bench.use_defaults();
         assert_eq!(bench.set(setting, 0, value), DataStatus::IncorrectValue, "{setting}");
     }
-    // Parameters that arrive after the settings are also refused if they are not valid with the settings.
+    // The controller also refuses parameters that are not valid with the settings that it received before.
     let mut bench = Bench::new();
     bench.set(96, 0, 7_000.0);
     assert_eq!(bench.send(0, &fixed::PID_PARAM_USE_DEFAULT), DataStatus::IncorrectValue);
 }
 
-/// New settings are checked with the received parameters, even if Disable has withdrawn these parameters.
+/// New settings are checked against the received parameters, even if Disable has withdrawn these parameters.
 #[test]
 fn j53_settings_fit_to_what_disable_has_withdrawn() {
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.controller.parameters.withdraw_all();
     assert_eq!(bench.set(96, 0, 7_000.0), DataStatus::IncorrectValue);
-    // Friction tables are also checked, one table per tick.
+    // Friction tables are also checked against new settings, one table per tick.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.send(0, &fixed::FRICTION_TABLE_USE_DEFAULT);
@@ -95,7 +95,7 @@ fn j53_settings_fit_to_what_disable_has_withdrawn() {
     assert!(bench.controller.telemetry().tick - before >= 6);
 }
 
-/// In motion, only a few values per frame are accepted.
+/// During a motion, the controller accepts only a few values per frame.
 #[test]
 fn j07_j53_settings_in_motion_are_few() {
     let value = SettingValue { setting: settings::SPEED, joint: 0, value: 0.5 };
@@ -109,8 +109,8 @@ fn j07_j53_settings_in_motion_are_few() {
     }
 }
 
-/// A setting of the arm in a frame with a payload is treated like a setting in a separate frame. The speed override may change together
-/// with the payload.
+/// A setting of the arm in a frame with a payload is accepted or refused like a setting in a separate frame. The speed override may change
+/// together with the payload.
 #[test]
 fn j53_j60_a_payload_is_set_wherever_the_arm_stands() {
     for (state, stands, bare) in [

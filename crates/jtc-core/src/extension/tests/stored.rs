@@ -1,4 +1,4 @@
-//! Tests of the stored arm, which is kept without power (J-54).
+//! Tests of the stored arm, which the board keeps without power (J-54).
 use super::*;
 use crate::extension::arm::IMAGE_PER_TICK;
 
@@ -28,8 +28,7 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
     assert_eq!((info.missing, info.arm.as_str(), info.defaults_stored), (7, "other", true));
     assert_eq!(bench.controller.config.gravity[1], 3.0);
     assert_ne!(info.hash, hash, "its parameters are not in use yet");
-    // The friction of the stored arm is a table. The controller uses this table for both kinds of default friction that an existing host
-    // may request.
+    // The friction of the stored arm is a table. The controller uses this table for both kinds of default friction that a host may request.
     bench.use_defaults();
     let info = bench.info(0);
     assert_eq!((info.hash, info.missing), (hash, 0));
@@ -43,7 +42,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     bench.info(0);
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "nobody gave parameters");
     bench.use_defaults();
-    // The parameters may have been withdrawn in the meantime, for example by Disable.
+    // The parameters may have been withdrawn since then, for example by Disable.
     bench.controller.parameters.withdraw_all();
     for state in [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching] {
         bench.controller.state = state;
@@ -71,7 +70,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "it is busy");
 }
 
-/// Every image that is loaded contains an arm that the controller would also accept frame by frame.
+/// The controller loads an image only if it would also accept the arm frame by frame.
 #[test]
 fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     let mut bench = Bench::new();
@@ -86,14 +85,15 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
             let before = bench.info(0);
             if bench.controller.load_arm(&image) {
                 if bench.asks_for_defaults().contains(&DataStatus::IncorrectValue) {
-                    // The joints of this arm are too light for its gains (J-71), so the arm is not held.
+                    // The joints of this arm have too little inertia for its gains (J-71), so the controller does not hold the arm.
                     let (own, config) = (&bench.controller.parameters, &bench.controller.config);
                     assert!(own.gains_were_too_much(config), "byte {at}");
                     assert_ne!(own.missing(), 0, "byte {at}");
                     continue;
                 }
                 let info = bench.info(0);
-                // If the flipped bit duplicates one setting, and the missing setting has its default value, the arm is unchanged.
+                // If the flipped bit makes one setting a duplicate of another, and the missing setting has its default value, the arm is
+                // unchanged.
                 let same = bench.controller.config() == &Config::avena();
                 assert!(info.hash != hash || at >= image.len() - 32 || same, "byte {at}");
                 assert!(bench.controller.config.check().is_ok());
@@ -105,7 +105,7 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     }
 }
 
-/// If the stored arm cannot be used, the built-in arm does not replace it.
+/// If the controller cannot use the stored arm, it does not use the built-in arm instead.
 #[test]
 fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     let (mut image, _) = other_arm();
@@ -115,7 +115,7 @@ fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     assert!(!bench.controller.load_arm(&image));
     let refused = |bench: &mut Bench| bench.send(0, &fixed::PID_PARAM_USE_DEFAULT);
     assert_eq!(refused(&mut bench), DataStatus::NotAllowed);
-    // If the arm could not be written, the next start would use another arm.
+    // If the board could not write the arm, the next start would use another arm.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.info(0);

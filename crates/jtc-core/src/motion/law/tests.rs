@@ -13,7 +13,7 @@ const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];
 const MODES: [ControlMode; 4] =
     [ControlMode::Hold, ControlMode::Follow, ControlMode::Approach, ControlMode::Teach];
 
-/// Arm that is held with its own gains.
+/// Arm that is held with the given gains.
 struct Arm {
     config: Config,
     dynamics: Dynamics,
@@ -24,8 +24,8 @@ struct Arm {
 }
 
 impl Arm {
-    /// Creates a held arm. The measurements are compared with the set values of the same tick, so that one tick shows the result of the
-    /// control law.
+    /// Creates a held arm. The controller compares measurements with the set values of the same tick, so that one tick shows the result of
+    /// the control law.
     fn held(gains: PidGains) -> Self {
         let config = Config { delay_ticks: 0, ..Config::avena() };
         let mut motion = Motion::default();
@@ -36,12 +36,12 @@ impl Arm {
         Self { config, dynamics, pid: [gains; JOINTS], polynomial, table: None, motion }
     }
 
-    /// Runs a tick at the pose, with the measured `velocity` (rad/s) of all joints. Returns the torques and the findings.
+    /// Executes a tick at the pose, with the measured `velocity` (rad/s) of all joints. Returns the torques and the findings.
     fn tick(&mut self, mode: ControlMode, braking: bool, velocity: f64) -> ([f64; JOINTS], [Found; JOINTS]) {
         self.tick_of(mode, braking, &Nodes::enabled_at(POSE, [velocity; JOINTS]))
     }
 
-    /// Runs a tick with these nodes.
+    /// Executes a tick with these nodes.
     fn tick_of(
         &mut self,
         mode: ControlMode,
@@ -82,7 +82,7 @@ fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_onl
     }
 }
 
-/// A path cannot use this friction table, but the arm can be held with it.
+/// A path cannot use this friction table, but the controller can hold the arm with it.
 #[test]
 fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
     for (mode, error) in
@@ -96,7 +96,7 @@ fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
     }
 }
 
-/// Returns an arm in Teaching whose loads (N·m) were found.
+/// Returns an arm in Teaching with these learned loads (N·m).
 fn taught(loads: &[f64; JOINTS]) -> Arm {
     let mut arm = Arm::held(NONE);
     for (load, torque) in arm.motion.law.loads.iter_mut().zip(loads) {
@@ -128,7 +128,7 @@ fn j25_a_load_that_nobody_has_found_is_not_carried() {
     assert_eq!(arm.motion.law.torque.map(|torque| torque.load), [0.0; JOINTS]);
 }
 
-/// While the integral releases torque, no load can be found. Absent joints find no load.
+/// While the integral releases torque, the controller cannot learn a load. The controller does not learn a load for absent joints.
 #[test]
 fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     let mut arm = taught(&[1.0; JOINTS]);
@@ -136,7 +136,8 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     law.torque = Default::default();
     law.torque.iter_mut().for_each(|torque| torque.pid.i = 1.0);
     assert!(law.knows_loads(&[true; JOINTS], config, false));
-    // A person leans on joint 2, or its integral has not settled. The limit is 0.04 times 180 N·m, which is 7.2 N·m.
+    // A person leans on joint 2, or the integral of joint 2 has not settled. The highest permitted feedback torque is 0.04 times 180 N·m,
+    // which is 7.2 N·m.
     for (p, known) in [(7.1, true), (-7.1, true), (7.3, false), (-7.3, false)] {
         law.torque[1].pid.p = p;
         assert_eq!(law.knows_loads(&[true; JOINTS], config, false), known, "{p} N·m");
@@ -150,7 +151,7 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     assert!(!law.knows_loads(&[true, true, true, false, true, true], config, false));
 }
 
-/// Above the tool speed limit, the speed of the flange brakes every joint that moves.
+/// Above the tool speed limit, every moving joint has more damping, up to the highest damping that its inertia tolerates.
 #[test]
 fn j25_above_the_tool_speed_limit_every_joint_is_braked_harder() {
     let brakes = |tool_speed_max: f64| {
@@ -165,7 +166,7 @@ fn j25_above_the_tool_speed_limit_every_joint_is_braked_harder() {
     let (off, below, at, twice) =
         (brakes(0.0), brakes(1.01 * speed), brakes(speed / 1.5), brakes(0.5 * speed));
     assert_eq!(off, below);
-    // Joints 4 to 6 already have the highest damping that these joints tolerate.
+    // Joints 4 to 6 already have the highest damping that their inertia tolerates.
     for j in 0..JOINTS {
         assert!(off[j] < 0.0 && at[j] <= off[j] && twice[j] <= at[j], "joint {}: {off:?} {at:?}", j + 1);
         assert!(j > 2 || twice[j] < off[j], "joint {}: {off:?} {twice:?}", j + 1);
@@ -188,7 +189,7 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     }
 }
 
-/// In each case, gravity exceeds the torque limit of joint 2. The motion of the joint decides whether this overload is an error.
+/// In each of these cases, gravity exceeds the torque limit of joint 2. The motion of the joint decides whether this overload is an error.
 #[test]
 fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
     let along = Arm::held(NONE).dynamics.gravity_torque(&POSE)[1].signum();
@@ -205,7 +206,7 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         (ControlMode::Hold, true, false, false, DRIVEN, false),
         (ControlMode::Hold, true, false, true, 0.06, false),
     ] {
-        // A set position does not sag without a position error.
+        // Without a position error, a set position does not sag.
         let mut arm = Arm::held(NONE);
         arm.config.joints[1].torque_max = 10.0;
         let limits = arm.config.joints[1];
@@ -253,7 +254,8 @@ fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
     assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
 }
 
-/// The result is the requested torque, or the part of that torque that the limit allows. The result never has the opposite sign.
+/// The braking torque is the requested torque, or the part of this torque that the torque limit allows. The braking torque never has the
+/// opposite sign.
 #[test]
 fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     for (wanted, torque, taken) in [
@@ -272,7 +274,7 @@ fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     }
 }
 
-/// A joint that is not enabled yet may have any position and speed. The limits do not apply to it.
+/// A joint that is not enabled yet may have any position and speed. The limits do not apply to such a joint.
 #[test]
 fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
     let off = 3;
@@ -287,7 +289,7 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
         let nodes = Nodes::enabled_at(POSE, [velocity; JOINTS]).with_torque_off(off);
         if mode == ControlMode::Teach {
-            // Before the first braking torque, the control law computes the inertia of the arm and of each joint.
+            // Before the first braking torque, Teaching computes the inertia of the arm and of each joint.
             (0..10).for_each(|_| {
                 arm.tick_of(mode, false, &nodes);
             });

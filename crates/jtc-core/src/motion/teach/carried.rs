@@ -1,8 +1,8 @@
-//! Part of a load that a joint carries in Teaching. HoldPos has found the load.
+//! Load of a joint in Teaching, and the share of this load that acts. HoldPos has learned this load.
 //!
-//! HoldPos cannot distinguish a load from a person who leans on the arm and will let go. If the torque drives its joint, the acting share
-//! of the torque falls with the speed of the joint, so that the joint is driven only slowly. When the joint slows down, the whole torque
-//! acts again. A load is removed permanently only if a motion without a hand cannot be explained otherwise.
+//! HoldPos cannot distinguish a load from a person who leans on the arm and lets go of it later. If the load torque drives its joint, its
+//! acting share falls with the speed of the joint, so the joint moves only slowly. When the joint slows down, the whole load torque acts
+//! again. The controller removes a load permanently only if no other cause explains a motion without a hand.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::limits::JointConfig;
@@ -10,30 +10,32 @@ use crate::interpolation::smooth;
 use crate::motion::load::Load;
 use crate::motion::soft_end::SOFT_END;
 
-/// Speeds along the load (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES` is for a joint with little
-/// damping, which is fast before its speed is measured. `DAMPED` is added if the damping of the joint balances the load.
+/// Speeds of a joint in the direction of its load torque (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES`
+/// applies to a joint with little damping, which is fast before its speed is measured. `DAMPED` is added to `DRIVES` if the damping of the
+/// joint balances the load.
 const DRIVES: (f64, f64) = (0.03, 0.15);
 const DAMPED: (f64, f64) = (0.17, 0.35);
-/// Time constants of the acting share, s. The share falls with the first constant and returns with the second. If the joint falls against
-/// its load, the share returns with the third constant.
+/// Time constants of the acting share, s. The acting share falls with the first time constant and returns with the second. If the joint
+/// moves against its load torque, the acting share returns with the third time constant.
 const FALLS_S: f64 = 0.006;
 const RETURNS_S: f64 = 0.3;
 const CATCHES_S: f64 = 0.05;
-/// Lowest speed of a joint that may be driven by its load, rad/s.
+/// Lowest speed at which the load may drive a joint, rad/s.
 const MOVES: f64 = 0.1;
-/// Range of the torque of damping and friction against a motion, as a share of the acting torque. Within this range, the acting torque
-/// alone explains the motion.
+/// Range of the torque of damping and friction against a motion, as a share of the acting load torque. Within this range, the acting load
+/// torque alone explains the motion.
 const EXPLAINED: (f64, f64) = (0.8, 1.3);
-/// Removed torque, as a share of the highest torque that the joint carries, above which the torque is considered missing if the joint
-/// sinks.
+/// Removed torque above which the controller considers this torque missing if the joint sinks, as a share of the highest load torque of the
+/// joint.
 const MISSED: f64 = 0.1;
 
-/// Load that a joint carries in Teaching.
+/// State of the load of a joint in Teaching.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Carried {
     /// Torque that is not explained by a mass at the flange, N·m.
     pub rest: f32,
-    /// Highest torque that may be carried, N·m. This is the found torque or the highest torque that may be found, whichever is higher.
+    /// Highest load torque that may act in Teaching, N·m. The limit of the load torque is the learned torque or the highest torque that the
+    /// controller may learn, whichever is higher.
     most: f32,
     /// Share of the load that does not act because the joint is fast.
     left_out: f32,
@@ -44,25 +46,25 @@ pub(super) struct Carried {
 bit_codec!(Carried { rest, most, left_out, inside });
 
 impl Carried {
-    /// Begins Teaching of a joint that has found this `load`, N·m.
+    /// Begins Teaching of a joint with this learned `load`, N·m.
     pub(super) fn begin(load: f64, limits: &JointConfig) -> Self {
         let load = if load.is_finite() { load } else { 0.0 };
         let most = load.abs().max(Load::bounded(f64::MAX, limits));
         Self { rest: load as f32, most: most as f32, ..Self::default() }
     }
 
-    /// Attributes this part of the load to a mass, N·m.
+    /// Attributes the part `by_mass` of the load to a mass, N·m.
     pub(super) fn explain(&mut self, by_mass: f64) {
         self.rest -= by_mass as f32;
     }
 
-    /// Returns the whole load, N·m.
+    /// Returns the whole load torque, N·m.
     pub(super) fn whole(&self, by_mass: f64) -> f64 {
         let most = f64::from(self.most);
         (by_mass + f64::from(self.rest)).max(-most).min(most)
     }
 
-    /// Returns the part of the load that acts, N·m.
+    /// Returns the part of the load torque that acts, N·m.
     pub(super) fn torque(&self, by_mass: f64) -> f64 {
         self.whole(by_mass) * (1.0 - f64::from(self.left_out)) * (1.0 - f64::from(self.inside))
     }
@@ -78,14 +80,15 @@ impl Carried {
         let returns = if along < -MOVES { CATCHES_S } else { RETURNS_S };
         let time = if wanted > left_out { FALLS_S } else { returns };
         self.left_out = (left_out + (wanted - left_out) * (DT / time)) as f32;
-        // At its position limit, the load must not push a joint outwards.
+        // If a joint is at its position limit, its load must not push the joint further outwards.
         let outward = if whole * depth > 0.0 { (depth.abs() / SOFT_END).min(1.0) } else { 0.0 };
         let inside = f64::from(self.inside);
         self.inside = (inside + (outward - inside) * (DT / CATCHES_S)) as f32;
         self.torque(by_mass)
     }
 
-    /// Returns `true` if the mass alone drives the joint. `against` is the torque of damping and friction against the motion, N·m.
+    /// Returns `true` if the torque of the mass alone drives the joint. `against` is the torque of damping and friction against the motion,
+    /// N·m.
     pub(super) fn is_driven(&self, by_mass: f64, velocity: f64, against: f64) -> bool {
         let acts = self.torque(by_mass);
         let mostly_mass = by_mass * acts > 0.0 && by_mass.abs() > f64::from(self.rest).abs();
@@ -93,20 +96,19 @@ impl Carried {
         mostly_mass && along && explains(acts, against)
     }
 
-    /// Returns `true` if the joint sinks because a torque is missing. `gone` is the torque of the mass that the joint no longer carries,
-    /// N·m.
+    /// Returns `true` if the joint sinks because a torque is missing. `gone` is the torque of the removed mass on the joint, N·m.
     pub(super) fn sinks(&self, gone: f64, velocity: f64, against: f64) -> bool {
         let missed = gone.abs() > MISSED * f64::from(self.most);
         missed && velocity * gone < -MOVES * gone.abs() && explains(gone, against)
     }
 
-    /// Multiplies the torque that is not explained by a mass by `left`.
+    /// Multiplies the torque that no mass explains by `left`.
     pub(super) fn fade(&mut self, left: f64) {
         self.rest = (f64::from(self.rest) * left) as f32;
     }
 }
 
-/// Returns `true` if a torque alone explains a motion. `against` is the torque of damping and friction against this motion, N·m.
+/// Returns `true` if this load torque alone explains a motion. `against` is the torque of damping and friction against this motion, N·m.
 fn explains(torque: f64, against: f64) -> bool {
     against >= EXPLAINED.0 * torque.abs() && against <= EXPLAINED.1 * torque.abs()
 }

@@ -10,47 +10,50 @@ use crate::motion::yielding::SPRING_RATE;
 /// Speeds of a joint between which the damping increases, rad/s.
 const FAST: (f64, f64) = (0.4, 0.8);
 /// Highest rate at which the damping reduces the speed of a joint while the other joints are free to move, 1/s. Measured speeds are about 8
-/// ms old. Joints whose motions affect each other tolerate less damping.
+/// ms old. Joints whose motions affect each other tolerate less damping than a single joint.
 pub(super) const DAMPING_RATE: f64 = 90.0;
-/// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates that damping.
+/// Speed at which the damping of a joint balances its load, rad/s, if the inertia of the joint tolerates that damping.
 const SINKS: f64 = 0.5;
-/// Value to which the damping increases, divided by the torque limit, s/rad.
+/// Highest damping of a fast joint, divided by the torque limit, s/rad.
 const GROWN: f64 = 1.0;
-/// Speeds between which a braking torque is added to the damping, rad/s, and deceleration of this torque, rad/s². The braking torque is too
-/// weak to reverse a joint before the reversal is measured. Without the braking torque, over-speed would release the arm.
+/// Speeds between which a braking torque is added to the damping, rad/s. The second constant is the deceleration by this torque, rad/s².
+/// The braking torque is too weak to reverse a joint before the controller measures the reversal. Without this braking torque, over-speed
+/// would release the arm.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
-/// Speed above which Teaching ends and the joint is brought to rest, in rad/s and as a share of the over-speed threshold (J-35). The lower
-/// of the two speeds is used.
+/// Speed above which Teaching ends and the controller brings the joint to rest, in rad/s and as a share of the over-speed threshold (J-35).
+/// The lower of these two speeds applies.
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
 /// Time constant of the speed that is computed from positions, s. The speed that drives report is a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
-/// Share of a rotor inertia that the controller relies on, because the value may be an unmeasured proposal. If no inertia is configured,
-/// the proposal is the torque limit divided by `PROPOSED`, rad/s².
+/// Share of a rotor inertia on which the controller relies, because the configured value may be an unmeasured proposal. If no rotor inertia
+/// is configured, the proposal is the torque limit divided by `PROPOSED`, rad/s².
 const ROTOR: f64 = 0.2;
 const PROPOSED: f64 = 200.0;
-/// Share of the modelled friction that every joint has at least.
+/// Share of its modelled friction that every joint has at least, by assumption.
 const CERTAIN_FRICTION: f64 = 0.7;
-/// Highest share of the damping that the friction compensation may cancel, because the friction may not exist.
+/// Highest share of the damping that the friction compensation may cancel, because the joint may have less friction than its model.
 const USED_UP: f64 = 0.5;
-/// Time constant for the dry friction to fade in and out, s.
+/// Time constant of the dry friction when it fades in or out, s.
 const GRIP_S: f64 = 0.1;
-/// Speed below which a joint is always considered at rest, rad/s.
+/// Speed below which a joint is considered at rest in every case, rad/s.
 const STANDING: f64 = 0.01;
 /// Highest speed at which the full dry friction may act, rad/s.
 const SLOW: f64 = 0.3;
-/// Longest extension of the spring that holds a joint at rest, rad.
+/// Longest extension of the dry-friction spring that holds a joint at rest, rad.
 const STRETCH: f64 = 0.005;
-/// Speed around zero in which the sign of the friction compensation is smoothed, rad/s.
+/// Range of speeds around zero in which the sign of the friction compensation is smoothed, rad/s.
 const SIGN_WIDTH: f64 = 0.1;
 /// Speeds between which the friction compensation fades to zero, rad/s.
 const COMPENSATED: (f64, f64) = (0.3, 0.6);
-/// Number of missing answers after which the springs fade, followed by damping and friction compensation, each within [`LETS_GO`] ticks.
+/// Number of missing answers after which the springs of a joint fade, followed by damping and friction compensation, each within
+/// [`LETS_GO`] ticks.
 const MISSING: u8 = 2;
 const LETS_GO: u8 = 5;
 
-/// Returns the speed, computed from positions, above which a joint ends Teaching, rad/s. The position controller can stop a joint before
-/// over-speed releases the arm, even if damping cannot stop the joint.
+/// Returns the speed of a joint above which Teaching ends, rad/s. Teaching compares this limit with the speed that is computed from
+/// positions. At the limit speed, the position controller can stop the joint before over-speed releases the arm, even if damping cannot
+/// stop the joint.
 pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
     TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
 }
@@ -61,26 +64,27 @@ pub(super) fn rotor(limits: &JointConfig) -> f64 {
     ROTOR * if given > 0.0 { given } else { limits.torque_max / PROPOSED }
 }
 
-/// State of a joint in Teaching. Single precision, because the flight recorder stores it.
+/// State of a joint in Teaching. The values have single precision, because the flight recorder stores them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtJoint {
-    /// Anchor of the spring of the dry friction, rad, and the share of the spring that acts.
+    /// Anchor of the spring of the dry friction, rad. The next field is the share of the spring that acts.
     anchor: f32,
     pub(super) grip: f32,
-    /// Depth of the joint inside a soft end at the beginning of Teaching, rad. The spring acts only beyond this depth, so that the spring
-    /// does not move the joint by itself.
+    /// Depth of the joint inside a soft end at the beginning of Teaching, rad. The spring of the soft end acts only beyond this depth,
+    /// because this spring must not move the joint without a hand.
     begun: f32,
-    /// Friction of the joint according to its parameters, N·m. `coulomb` is the Coulomb part, and `rubs` is the whole friction at a recent
-    /// speed.
+    /// Friction of the joint according to its parameters, N·m. `coulomb` is the Coulomb friction, and `rubs` is the whole friction at a
+    /// recent speed.
     coulomb: f32,
     rubs: f32,
-    /// Least inertia that the joint moves, kg·m².
+    /// Lowest inertia that the controller assumes for the joint, kg·m².
     inertia: f32,
-    /// Torque of damping and friction against the last motion, N·m.
+    /// Torque of damping and friction against the motion in the last tick, N·m.
     against: f32,
-    /// Position that follows the joint, rad. The lag of this position increases with the speed of the joint.
+    /// Filtered position of the joint, rad. The filtered position lags the joint, and the lag increases with the speed of the joint.
     behind: f32,
-    /// Number of consecutive missing answers, and progress of the fading springs and damping. The fading is complete at 2 · [`LETS_GO`].
+    /// Number of consecutive missing answers. The next field is the progress of the fading of springs and damping. At a progress of 2 ·
+    /// [`LETS_GO`], springs and damping are zero.
     missing: u8,
     lost: u8,
 }
@@ -89,27 +93,27 @@ bit_codec!(TaughtJoint { anchor, grip, begun, coulomb, rubs, inertia, against, b
 
 /// Inputs of a joint in a tick of Teaching.
 pub(crate) struct LedJoint<'a> {
-    /// Measured position, rad.
+    /// Measured position of the joint, rad.
     pub position: f64,
-    /// Measured velocity, rad/s.
+    /// Measured velocity of the joint, rad/s.
     pub velocity: f64,
     pub limits: &'a JointConfig,
-    /// Lowest and highest position, rad.
+    /// Lowest and highest position of the joint, rad.
     pub range: (f64, f64),
 }
 
 /// Torque that Teaching adds to a joint, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtTorque {
-    /// Torque of the load that is carried.
+    /// Torque of the load that Teaching holds.
     pub load: f64,
     /// Torque of damping, dry friction and soft ends.
     pub brake: f64,
-    /// Torque that compensates friction of the joint.
+    /// Torque that compensates the friction of the joint.
     pub friction: f64,
 }
 
-/// Data about the load that the joint carries.
+/// Data about the joint that the computation of its load needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bears {
     /// Share of the load that the damping balances at [`SINKS`].
@@ -127,19 +131,19 @@ impl TaughtJoint {
         Self { anchor, behind: anchor, grip: 1.0, begun, inertia, ..Self::default() }
     }
 
-    /// Sets the least inertia that the joint moves, kg·m². A value that is not finite is ignored.
+    /// Sets the lowest inertia that the controller assumes for the joint, kg·m². A value that is not finite is ignored.
     pub(super) fn set_inertia(&mut self, inertia: f64) {
         if inertia.is_finite() {
             self.inertia = inertia as f32;
         }
     }
 
-    /// Evaluates the answer of the joint in each tick. `late` is the delay of this tick in ms. `fresh` means that the joint has answered
-    /// with this `position`, rad. Without an answer, the speed of the joint is old, and the springs pull to the old position. Returns the
-    /// speed computed from the joint positions, rad/s.
+    /// Evaluates the answer of the joint in each tick of Teaching. `late` is the delay of this tick in ms. `fresh` is `true` if the joint
+    /// has answered with this `position`, rad. Without an answer, the known speed of the joint is old, and the springs pull to an old
+    /// position. Returns the speed computed from the joint positions, rad/s.
     #[inline(always)]
     pub(super) fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
-        // A late tick has the effect of a missing answer.
+        // A late tick has the same effect as a missing answer.
         let missed = self.missing.saturating_add(late.min(u8::MAX.into()) as u8);
         if !fresh {
             self.missing = missed.saturating_add(1);
@@ -150,7 +154,7 @@ impl TaughtJoint {
         }
         (self.missing, self.lost) = (0, self.lost.saturating_sub(1));
         let way = position as f32 - self.behind;
-        // If no answer is missing, both values are constant.
+        // If no answer is missing, these two values are constant.
         let (time, part) = if missed == 0 {
             (SPEED_S, DT as f32 / SPEED_S)
         } else {
@@ -161,7 +165,7 @@ impl TaughtJoint {
         way / time
     }
 
-    /// Returns the acting shares of the springs, and of damping and friction compensation.
+    /// Returns the acting share of the springs, and the acting share of damping and friction compensation.
     fn heard(&self) -> (f64, f64) {
         if self.lost == 0 {
             return (1.0, 1.0);
@@ -175,7 +179,7 @@ impl TaughtJoint {
         (self.coulomb, self.rubs) = (coulomb as f32, (moving.abs() as f32).max(coulomb as f32));
     }
 
-    /// Returns the torque of damping and friction against the last motion, N·m.
+    /// Returns the torque of damping and friction against the motion in the last tick, N·m.
     pub(super) fn against(&self) -> f64 {
         self.against.into()
     }
@@ -192,8 +196,8 @@ impl TaughtJoint {
         (damping, damping.max(most.min(GROWN * limits.torque_max)))
     }
 
-    /// Runs one tick of a joint that carries this `load`, N·m. `haste` is the excess of the flange speed over the tool speed limit, as a
-    /// value from 0 to 1.
+    /// Executes one tick of Teaching for a joint with this `load`, N·m. `haste` is the excess of the flange speed over the tool speed
+    /// limit, scaled to the range from 0 to 1.
     #[inline(always)]
     pub(super) fn step(
         &mut self,
@@ -230,14 +234,14 @@ impl TaughtJoint {
         (torque, Bears { balanced, compressed })
     }
 
-    /// Returns the highest torque of the dry friction, N·m. This torque is lower if the joint itself has friction.
+    /// Returns the highest torque of the dry friction, N·m. The more friction the joint itself has, the lower is this torque.
     fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Returns the dry friction of a slow joint. The dry friction fades between the speed at which damping balances the friction torque and
-    /// three times that speed. So the joint stops against any lower torque, and the sum of damping and dry friction never decreases with
-    /// the speed.
+    /// Returns the dry friction torque of a slow joint. The dry friction fades out between the speed at which damping balances the dry
+    /// friction and three times that speed. The joint therefore stops against any lower torque, and the sum of damping and dry friction
+    /// never decreases with the speed.
     fn dry_friction(
         &mut self,
         position: f64,
@@ -256,7 +260,7 @@ impl TaughtJoint {
             if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (2.0 * slow)) } else { 1.0 };
         let grip = f64::from(self.grip);
         self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
-        // The spring slips when it is extended by its full torque. If the joint is fast, the anchor of the spring only follows the joint.
+        // The spring slips when it is extended by its full torque. If the joint is fast, the anchor of the spring moves with the joint.
         let stretch = if gripped > 0.0 { self.stretch(breakaway) } else { 0.0 };
         self.anchor = f64::from(self.anchor).max(position - stretch).min(position + stretch) as f32;
         self.dry_spring(position, limits, config)
@@ -267,15 +271,15 @@ impl TaughtJoint {
         STRETCH.max(breakaway / (SPRING_RATE * SPRING_RATE * f64::from(self.inertia)).max(f64::MIN_POSITIVE))
     }
 
-    /// Returns the torque of the spring at `position` (rad), N·m.
+    /// Returns the torque of the dry-friction spring at `position` (rad), N·m.
     pub(super) fn dry_spring(&self, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         let breakaway = self.breakaway(limits, config);
         let way = f64::from(self.anchor) - position;
         f64::from(self.grip) * (breakaway / self.stretch(breakaway) * way).max(-breakaway).min(breakaway)
     }
 
-    /// Returns the friction of the joint that is compensated, N·m. Near standstill, the compensation increases with the speed at most half
-    /// as fast as the damping.
+    /// Returns the torque that compensates the friction of the joint, N·m. Near standstill, this torque increases with the speed at most
+    /// half as fast as the damping.
     fn compensation(&self, velocity: f64, damping: f64, config: &Config) -> f64 {
         let torque = config.teach_friction * f64::from(self.coulomb);
         let slope = (torque / SIGN_WIDTH).min(USED_UP * damping);

@@ -1,4 +1,4 @@
-//! Tests of the loads that HoldPos found and that Teaching carries (J-25).
+//! Tests of the loads that HoldPos has learned and that Teaching uses (J-25).
 use proptest::prelude::*;
 
 use super::*;
@@ -14,7 +14,7 @@ fn begun(loads: [f64; JOINTS], q: &[f64; JOINTS]) -> Taught {
     taught
 }
 
-/// Returns the torques that an arm at rest at `q` (rad) carries, N·m.
+/// Returns the load torques in Teaching of an arm at rest at `q` (rad), N·m.
 fn carried(taught: &mut Taught, q: &[f64; JOINTS]) -> [f64; JOINTS] {
     taught.unit = dynamics().flange_torque(q).map(|u| u as f32);
     core::array::from_fn(|j| taught.carried[j].torque(f64::from(taught.mass * taught.unit[j])))
@@ -33,7 +33,7 @@ fn j25_a_mass_at_the_flange_is_found_and_carried_to_other_poses() {
     }
 }
 
-/// Teaching begins without a step. After a motion of 1 rad, the torque that is not explained by a mass has fallen to a thirtieth.
+/// The load torque has no step when Teaching begins. After a motion of 1 rad, the torque that no mass explains has fallen to a thirtieth.
 #[test]
 fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
     let missing = [7.0, 10.0, -3.0, 1.0, 0.0, 2.0];
@@ -50,7 +50,7 @@ fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
 
 #[test]
 fn j25_friction_never_becomes_a_great_mass() {
-    // If the arm is stretched vertically, a mass at the flange does not load any joint. Near this pose, only an enormous mass could explain
+    // If the arm is stretched vertically, a mass at its flange does not load any joint. Near this pose, only an enormous mass could explain
     // the loads.
     assert!(begun([8.0; JOINTS], &[0.0; JOINTS]).mass.abs() < 0.2);
     for k in 0..200 {
@@ -63,7 +63,7 @@ fn j25_friction_never_becomes_a_great_mass() {
 }
 
 proptest! {
-    /// The mass changes only towards zero, and never beyond zero.
+    /// The estimated mass changes only towards zero, and never beyond zero.
     #[test]
     fn j60_a_mass_that_is_given_goes_from_the_one_that_was_found(found in -3.0..3.0f32, given in prop::collection::vec(-4.0..4.0f64, 1..8)) {
         let mut taught = Taught { found, mass: found, ..Taught::default() };
@@ -76,9 +76,9 @@ proptest! {
         }
     }
 
-    /// The test uses any load that was found at rest, in motion, or while a joint lowered the load. At a position limit, the load does not
-    /// push a joint outwards, and the spring of the soft end is stronger. The carried torque never exceeds the torque that was found or may
-    /// be found.
+    /// The load may have been learned at rest, in motion, or while a joint lowered this load. At a position limit, the load does not push a
+    /// joint outwards, and the spring of the soft end is stronger. The load torque never exceeds the highest torque that was learned or
+    /// that may be learned.
     #[test]
     fn j25_at_a_position_limit_no_load_pushes_outwards(load in -180.0..180.0f64, by_mass in -180.0..180.0f64, velocity in -0.5..0.5f64) {
         let limits = Config::avena().joints[1];
@@ -94,7 +94,8 @@ proptest! {
         }
     }
 
-    /// The acting share of a load falls with the speed along the load. At rest the whole load acts, so the load is not lost.
+    /// The acting share of a load falls with the speed of the joint in the direction of the load torque. At rest, the whole load acts, so
+    /// the load is not lost.
     #[test]
     fn j25_a_load_acts_the_less_the_faster_it_drives(load in 1.0..54.0f64, balanced in 0.0..1.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)]) {
         let limits = Config::avena().joints[1];
@@ -118,7 +119,7 @@ proptest! {
     }
 }
 
-/// An arm carries 2 kg at its flange, and joint 2 moves along this load.
+/// Teaching of an arm with 2 kg at its flange, whose joint 2 moves in the direction of this load.
 struct Driven {
     taught: Taught,
     q: [f64; JOINTS],
@@ -130,8 +131,8 @@ impl Driven {
         Self { taught: begun(dynamics().flange_torque(&q).map(|u| 2.0 * u), &q), q }
     }
 
-    /// Moves joint 2 for `ms` at `velocity` (rad/s, along the load). `against` is the torque of damping and friction against this motion,
-    /// as a share of the acting torque. Returns the share of the mass that remains.
+    /// Moves joint 2 for `ms` at `velocity` (rad/s, in the direction of the load). `against` is the torque of damping and friction against
+    /// this motion, as a share of the acting load torque. Returns the share of the mass that remains.
     fn moves(&mut self, against: f64, velocity: f64, ms: usize) -> f32 {
         let along = velocity * f64::from(self.taught.unit[1]).signum();
         for _ in 0..ms / usize::from(JUDGED_MS) {
@@ -144,7 +145,7 @@ impl Driven {
 }
 
 /// A mass that alone explains the motion is removed within seconds, without a torque step. If a hand moves the arm faster or more slowly
-/// than the mass would, the mass is not removed.
+/// than the mass would, the mass stays.
 #[test]
 fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     let left = |against, velocity, ms| Driven::new().moves(against, velocity, ms);
@@ -157,14 +158,14 @@ fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     }
 }
 
-/// A removed mass is added again if the joint sinks without the mass and no other torque explains this motion.
+/// A removed mass is added again if the joint sinks without this mass and no other torque explains this motion.
 #[test]
 fn j25_a_mass_that_is_missed_comes_back() {
     let mut driven = Driven::new();
     let gone = driven.moves(1.0, 0.3, 4_000);
     assert!(gone < 0.2, "{gone}");
-    // The missing torque drives the joint in the way in which the acting torque drove it before. The missing torque is this multiple of the
-    // remaining torque.
+    // The missing torque now drives the joint, as the acting torque drove the joint before. The missing torque is `sinking` times the
+    // remaining load torque.
     let sinking = f64::from((1.0 - gone) / gone);
     for (against, velocity, ms) in
         [(sinking, -0.05, 1_000), (sinking, -0.2, 90), (sinking, 0.2, 1_000), (0.5 * sinking, -0.2, 1_000)]
@@ -177,12 +178,13 @@ fn j25_a_mass_that_is_missed_comes_back() {
         back = driven.moves(sinking, -0.2, 12);
     }
     assert!((0.8..1.0).contains(&back), "{back}");
-    // Mass that the model has contained since then is not added again.
+    // A mass that the model has contained since the removal is not added again.
     driven.taught.give_way(1.5);
     assert!(driven.taught.mass > 0.0 && driven.taught.found <= 0.51, "{} kg", driven.taught.found);
 }
 
-/// In each round, the inertia and the friction of every joint are computed once. The load is checked six times, and the ramp gets one tick.
+/// In each round, Teaching computes the inertia and the friction of every joint once. Teaching compares the load with the motion six times
+/// in each round, and leaves one tick for the ramp.
 #[test]
 fn j25_each_round_computes_all_that_changes_slowly() {
     let of =

@@ -1,28 +1,28 @@
-//! Detects the swing of a joint with less inertia than in the arm file. The brake is too strong for this joint, because measured speeds are
-//! old.
+//! Detection of a swing of a joint with less inertia than in the arm file. The brake is too strong for such a joint, because measured
+//! speeds are delayed.
 use crate::bit_codec::bit_codec;
 
-/// Longest duration of half a swing, ms, and lowest peak speed of half a swing, rad/s.
+/// Longest duration of half a swing, ms. The second constant is the lowest peak speed of half a swing, rad/s.
 const HALF_MS: u8 = 80;
 const HALF_SPEED: f32 = 0.15;
-/// Lowest speed of the second half of a swing, as a share of the speed of the first half. The two halves have opposite directions. A shove
-/// and the return of the spring also make two halves, but the second half is slow.
+/// Lowest speed of the second half of a swing, as a share of the speed of the first half. The two halves of a swing have opposite
+/// directions. A shove and the return of the spring also look like two halves, but the second half is slow.
 const LASTS: f32 = 0.5;
-/// Factor by which each swing makes the joint softer, and lowest value to which several swings reduce `soft`.
+/// Factor by which each swing multiplies `soft`. The second constant is the lowest value to which several swings reduce `soft`.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
-/// Time without a swing after which the joint becomes stiffer by one step, and time between further steps, ms.
+/// Time without a swing after which `soft` increases by one step, and time between further steps, ms.
 const HARDENS_MS: (u16, u16) = (300, 100);
 
-/// State of the swing of a joint, and the factor that makes the joint softer.
+/// State of the swing of a joint, and the factor that makes its spring, damper and brake softer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
-    /// Highest speed in the present direction, with its sign, rad/s, and time in this direction, ms.
+    /// Highest speed in the present direction, with its sign, rad/s. The next field is the time in this direction, ms.
     peak: f32,
     half_ms: u8,
-    /// Highest speed of the previous half, rad/s. The value is 0 if the previous motion was not half a swing.
+    /// Highest speed of the previous half of a swing, rad/s. The speed is 0 if the previous motion was not half a swing.
     before: f32,
-    /// Factor that makes spring, damper and brake softer, and time since the last change of the factor, ms.
+    /// Factor that makes spring, damper and brake softer. The next field is the time since the last change of this factor, ms.
     soft: f32,
     soft_ms: u16,
 }
@@ -32,7 +32,7 @@ bit_codec!(Swing { peak, half_ms, before, soft, soft_ms });
 impl Swing {
     pub(super) const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
 
-    /// Runs one tick at this velocity, rad/s. Returns the factor that makes spring, damper and brake softer.
+    /// Executes one tick at this `velocity` of the joint, rad/s. Returns the factor that makes spring, damper and brake softer.
     pub(super) fn step(&mut self, velocity: f64) -> f64 {
         let velocity = velocity as f32;
         if velocity * self.peak < 0.0 {
@@ -61,8 +61,8 @@ impl Swing {
 mod tests {
     use super::*;
 
-    /// A joint that returns fast, again and again, becomes softer each time. The joint becomes stiffer again when the swing ends. A joint
-    /// that a push has moved and the spring returns does not become softer.
+    /// A joint that swings back fast several times becomes softer each time. The joint becomes stiffer again when the swing ends. A joint
+    /// that a push has moved and that the spring moves back does not become softer.
     #[test]
     fn j68_what_swings_becomes_softer_for_a_while() {
         let swing = |half_ms: usize, speeds: [f64; 2]| {

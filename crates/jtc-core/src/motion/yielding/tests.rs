@@ -26,7 +26,7 @@ fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
     }
 }
 
-/// Inputs of a joint in the middle of a wide range.
+/// Returns the inputs of a joint in the middle of a wide range.
 fn at<'a>(limits: &'a JointConfig, position: f64, velocity: f64, model: f64) -> Joint<'a> {
     Joint {
         position,
@@ -41,14 +41,14 @@ fn at<'a>(limits: &'a JointConfig, position: f64, velocity: f64, model: f64) -> 
     }
 }
 
-/// Drags the spring along, and runs one tick.
+/// Drags the spring along with the joint, and executes one tick.
 fn tick(yields: &mut Yield, joint: &Joint<'_>) -> PidTorque {
     yields.drag(joint.position);
     yields.step(joint)
 }
 
 proptest! {
-    /// For any motion of the joint, the torque of the spring never exceeds the share. The sum of spring and damper exceeds the share only
+    /// The torque of the spring never exceeds the share, for any motion of the joint. The sum of spring and damper exceeds the share only
     /// if the damper alone exceeds it. The damper only dissipates energy.
     #[test]
     fn j68_a_slow_push_has_the_share_against_it_and_a_shove_the_limit(
@@ -62,7 +62,7 @@ proptest! {
         let limits = limits();
         let most = SHARE * limits.torque_max;
         let mut yields = Yield::begin(false, false, set, inertia, load);
-        // After 100 ticks the damper has settled.
+        // After 100 ticks, the damping has reached its final value.
         let joint = at(&limits, set + way, velocity, model);
         (0..100).for_each(|_| {
             tick(&mut yields, &joint);
@@ -72,14 +72,14 @@ proptest! {
         prop_assert!((torque.p + torque.d).abs() <= most.max(torque.d.abs()) + 1e-9);
         prop_assert!(torque.d * velocity <= 0.0 && (velocity != 0.0 || torque.d == 0.0));
         prop_assert_eq!(torque.i, load);
-        // At half of the velocity limit, the whole torque is needed, unless the joint is too light.
+        // At half of the velocity limit, the damper torque is the torque limit minus the share, unless the inertia of the joint is too low.
         let expected = (limits.torque_max - most) * velocity.abs() / (0.5 * limits.velocity_max);
         let light = DAMPING_RATE * inertia * velocity.abs();
         prop_assert!((torque.d.abs() - expected.min(light).min(limits.torque_max)).abs() < 1e-3);
     }
 
-    /// A lowered load has no spring. The torque of a lowered load never exceeds the limit, and never falls below its value at the
-    /// beginning.
+    /// A joint that lowers its load has no spring. The sum of model torque and load never exceeds the torque limit. The load never falls
+    /// below its torque at the beginning.
     #[test]
     fn j70_a_load_that_is_lowered_is_damped_and_learned_within_the_limit(
         model in prop_oneof![-170.0..-20.0f64, 20.0..170.0f64],
@@ -102,7 +102,7 @@ proptest! {
     }
 }
 
-/// A hand lifts a joint that lowers its load, and lets go. The torque that carried the joint still acts.
+/// A hand lifts a joint that lowers its load, and lets go of the joint. The torque that holds the joint still acts afterwards.
 #[test]
 fn j70_a_joint_that_is_lifted_keeps_what_carries_it() {
     let limits = limits();
@@ -122,7 +122,7 @@ fn j68_the_spring_is_dragged_along() {
         assert!((yields.drag(position) - set).abs() < 1e-12, "{position}");
         let torque = yields.step(&at(&limits, position, 0.0, 0.0));
         assert!((torque.p - SHARE * limits.torque_max * (set - position) / STRETCH).abs() < 1e-9);
-        // A light joint has a softer spring.
+        // A joint with little inertia has a softer spring.
         let light = Yield { inertia: 0.1, ..yields }.step(&at(&limits, position, 0.0, 0.0));
         assert!((light.p - 90.0 * (set - position)).abs() < 1e-9);
     }
@@ -159,7 +159,7 @@ fn j68_at_the_end_of_its_range_a_joint_is_pushed_back() {
     }
 }
 
-/// Returns the number of ticks at this speed (rad/s) until the joint is held again.
+/// Returns the number of ticks at this speed (rad/s) until the yield of the joint is over.
 fn over_after(velocity: f64) -> Option<usize> {
     let limits = limits();
     let mut yields = Yield::begin(false, false, 0.0, INERTIA, 0.0);
@@ -195,9 +195,9 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
             yields.lowers()
         })
     };
-    // A torque of 20 N·m holds the joint up, so gravity pulls it down.
+    // A torque of 20 N·m holds the joint up, so gravity pulls the joint down.
     assert_eq!(lowers_after(-0.3, 20.0), Some(1_667), "0.5 rad");
-    // If a hand leads a joint down and up again, the joint has not sunk.
+    // If a hand moves a joint down and up again, the joint has not sunk.
     let mut led = Yield::begin(false, false, 0.0, INERTIA, 0.0);
     for k in 0..10_000 {
         let velocity = if k % 1_000 < 500 { -0.3 } else { 0.3 };
@@ -210,8 +210,8 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     }
 }
 
-/// A lowered load comes to rest if the limit can hold it. The load is then held if a small part of the limit remains for the position
-/// controller.
+/// A lowered load comes to rest if this load is within the torque limit. The controller then holds this load, if a small part of the torque
+/// limit remains for the position controller.
 #[test]
 fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
     let limits = limits();
@@ -222,7 +222,7 @@ fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
             yields.is_over()
         });
         assert_eq!(over, held, "{load} N·m");
-        // The host may request to hold the joint nevertheless, because it is at rest.
+        // The host may nevertheless request that the controller holds the joint, because the joint is at rest.
         assert!(yields.is_calm());
         yields.clear();
         assert!(yields.is_over());
@@ -247,21 +247,21 @@ fn j68_the_third_time_within_ten_seconds_each_is_too_often() {
     assert!(!yielded.count(2));
 }
 
-/// Moves the joint for `ms` at `velocity`, rad/s. Returns its load afterwards, N·m.
+/// Moves the yielding joint for `ms` at `velocity`, rad/s. Returns the load of the joint after this motion, N·m.
 fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
     let limits = limits();
     let mut position = yields.set;
     for _ in 0..ms {
         position += velocity * DT;
-        // The torque of the model opposes the load, so gravity does not pull in the direction in which the joint sinks.
+        // The torque of the model opposes the load, so the joint does not sink in the direction of gravity.
         tick(yields, &at(&limits, position, velocity, -40.0));
     }
     yields.load()
 }
 
-/// Spring and damper have 40 N·m against a joint without a push. The joint is driven by its own load, so the load is interpreted as a
-/// person who leaned on the arm. The load fades within a second, and returns if the joint sinks. If a hand leads the joint faster, or
-/// against its load, the load does not change.
+/// Spring and damper act with 40 N·m against a joint without a push. The load drives this joint, so the controller assumes that a person
+/// leaned on the arm while the load was learned. The load fades within a second, and returns if the joint sinks. If a hand moves the joint
+/// faster, or against its load, the load does not change.
 #[test]
 fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     let begun = || Yield::begin(false, false, 0.0, INERTIA, 40.0);
@@ -277,8 +277,8 @@ fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     assert!((0.9 * 40.0..=40.0).contains(&back), "{back} N·m");
 }
 
-/// The position controller takes over the part of the load that the spring has not opposed. This part is never larger than the load, and
-/// never has the opposite sign.
+/// After a yield, the position controller continues the part of the load that the spring has not opposed. The part of the load that
+/// continues is never larger than the load, and never has the opposite sign.
 #[test]
 fn j68_the_position_controller_takes_over_what_the_spring_leaves() {
     for (load, spring, left) in [

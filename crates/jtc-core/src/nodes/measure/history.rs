@@ -1,32 +1,32 @@
-//! Stores the last usable answers of a joint and computes the rate of the positions.
+//! Memory for the last usable answers of a joint, and computation of the rate of its positions.
 use crate::DT;
 use crate::bit_codec::bit_codec;
 
-/// Number of answers over which a rate is computed, and shortest time over which a rate is computed, ms.
+/// Number of answers over which the rate is computed. The constant `WINDOW_MS` is the shortest time over which the rate is computed, ms.
 const WINDOW: usize = 5;
-/// Number of slots in the ring. A power of two is used, so that an index needs no comparison.
+/// Number of slots in the ring buffer. The number of slots is a power of two, so that an index needs no comparison.
 const SLOTS: usize = 16;
 const WINDOW_MS: u32 = 5;
 /// Inverse of the time over which the rate is computed while no answer is lost, 1/s.
 const PER_WINDOW: f64 = 1.0 / (WINDOW_MS as f64 * DT);
 
-/// A usable answer.
+/// A usable answer of the joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answered {
-    /// Position, rad.
+    /// Position in the answer, rad.
     pub position: f64,
     /// Time to which the answer belongs, ms.
     pub at_ms: u32,
 }
 
 impl Answered {
-    /// Returns the distance to a younger answer, rad. The distance of an answer to itself is zero.
+    /// Returns the distance from this answer to the more recent answer `now`, rad. The distance of an answer to itself is zero.
     fn way_to(&self, now: &Self) -> f64 {
-        // The difference of such close numbers is exact.
+        // The difference of two such close numbers is exact.
         f64::from(now.position as f32 - self.position as f32)
     }
 
-    /// Returns the time since another answer, ms.
+    /// Returns the time from `other` to this answer, ms.
     fn since(&self, other: &Self) -> u32 {
         self.at_ms.wrapping_sub(other.at_ms)
     }
@@ -35,31 +35,31 @@ impl Answered {
 /// Rate of the positions of a joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rate {
-    /// The rate, rad/s.
+    /// Rate of the positions, rad/s.
     pub rad_s: f64,
-    /// Every answer of the rate, except the first answer, was close to its prediction.
+    /// `true` if every answer from which the rate is computed, except the first, was close to its prediction.
     pub as_predicted: bool,
 }
 
-/// Stored form of an answer. Single precision resolves 1/400 of the step of a 16-bit encoder.
+/// Stored form of an answer. The single precision of this form resolves 1/400 of the step of a 16-bit encoder.
 #[derive(Clone, Copy, Debug, Default)]
 struct Kept {
-    /// Position, rad.
+    /// Position in the answer, rad.
     position: f32,
     /// Time to which the answer belongs, ms.
     at_ms: u32,
 }
 
-/// Ring of the last answers.
+/// Ring buffer of the last answers of a joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct History {
     answers: [Kept; SLOTS],
-    /// Number of the slot for the next answer. The number wraps around.
+    /// Number of the slot for the next answer. The number is counted modulo 256.
     next: u8,
-    /// Number of answers that came before the newest answer without a gap, one per millisecond. This number may exceed the number of stored
-    /// answers.
+    /// Number of answers before the newest answer that arrived without a gap, one per millisecond. The number of answers without a gap may
+    /// exceed the number of stored answers.
     in_turn: u8,
-    /// Mask of the answers that were close to their predictions. Bit 0 is the newest answer.
+    /// Mask of the answers that were close to their predictions. Bit 0 of this mask stands for the newest answer.
     as_predicted: u8,
 }
 
@@ -67,19 +67,19 @@ bit_codec!(Kept { position, at_ms });
 bit_codec!(History { answers, next, in_turn, as_predicted });
 
 impl History {
-    /// Creates a history that has only this answer.
+    /// Creates a history that contains only this answer.
     pub(super) fn of(answer: &Answered) -> Self {
         let kept = Kept { position: answer.position as f32, at_ms: answer.at_ms };
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Stores an answer. Returns the rate between the youngest stored answer that is old enough, and this answer. Returns `None` if no
-    /// stored answer is old enough.
+    /// Stores an answer in the history. Returns the rate between the newest stored answer that is old enough, and this answer. Returns
+    /// `None` if no stored answer is old enough.
     #[inline(always)]
     pub(super) fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
-        // Nearly always an answer comes in each millisecond, so that only the oldest of five answers is old enough.
+        // An answer arrives in nearly every millisecond. The oldest of five answers is then the only answer that is old enough.
         let rate = if self.in_turn >= WINDOW as u8 {
             let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
             Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })
@@ -93,7 +93,7 @@ impl History {
         rate
     }
 
-    /// Returns the rate if answers have been lost.
+    /// Returns the rate of the positions if answers have been lost.
     #[cold]
     fn rate_over_gaps(&self, now: &Answered) -> Option<Rate> {
         let n = (0..WINDOW).find(|&n| now.since(&self.nth(n)) >= WINDOW_MS)?;
@@ -108,8 +108,8 @@ impl History {
         self.as_predicted & younger == younger
     }
 
-    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since that time. Only the answer
-    /// of the last millisecond may be missing.
+    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer arrived in each millisecond since then. Only the answer of
+    /// the last millisecond may be missing.
     pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         let n = u32::from(ms).checked_sub(since_newest)?;
@@ -127,7 +127,7 @@ impl History {
         (0..SLOTS).map(|n| self.nth(n)).find(|answer| answer.at_ms == at_ms).map(|answer| answer.position)
     }
 
-    /// Returns the answer after which `n` younger answers came.
+    /// Returns the answer after which `n` more recent answers arrived.
     #[inline(always)]
     fn nth(&self, n: usize) -> Answered {
         let Kept { position, at_ms } = self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS];
@@ -147,8 +147,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
 
-        /// The rate equals the rate from a list of all answers. Each entry of the list contains the milliseconds since the previous answer
-        /// (mostly 1), the position, and `true` if the answer was close to its prediction.
+        /// The rate from the history is equal to the rate from a list of all answers. Each entry of this list contains the milliseconds
+        /// since the previous answer (usually 1), the position, and `true` if the answer was close to its prediction.
         #[test]
         fn j63_the_rate_is_from_the_youngest_kept_answer_that_is_old_enough(
             answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),

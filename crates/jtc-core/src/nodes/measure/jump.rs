@@ -1,9 +1,9 @@
-//! Detects encoders that jump (J-35).
+//! Detection of encoder jumps (J-35).
 //!
-//! A drive has two encoders. The position comes from the encoder of the joint, and the speed comes from the encoder of the motor. The speed
-//! is the mean over a window, so the expected change of the position within this window can be computed. If the position changes by more
-//! than expected between two answers and stays at its new value, the encoder has jumped and the joint has not moved. The jump is subtracted
-//! from all further answers, so that the arm does not move.
+//! A drive has two encoders. The position that the drive reports comes from the encoder of the joint, and the speed comes from the encoder
+//! of the motor. The speed is the mean over a window, so the controller can compute the expected change of the position within this window.
+//! If a larger change occurs between two answers and lasts, the encoder has jumped and the joint has not moved. The controller subtracts
+//! this jump from all further answers, so the arm does not move.
 use jtc_wire::StopKind;
 
 use super::Reading;
@@ -12,35 +12,36 @@ use crate::DT;
 use crate::bit_codec::bit_codec;
 use crate::config::Config;
 
-/// Number of answers in which a difference must be constant before the difference counts as a jump.
+/// Number of answers in which a difference between the encoders must be constant before the difference counts as a jump.
 const CONSTANT: u8 = 5;
 /// Highest number of consecutive answers that may be treated as a possible jump, even if the size of the jump changes.
 const LOOKS: u8 = 15;
-/// Highest number of changes of a jump's size. If the size changes more often, the difference is attributed to a twisted gear.
+/// Highest number of changes of the size of a possible jump. If the size changes more often, the controller attributes the difference to a
+/// twisted gear.
 const CHANGES: u8 = 2;
-/// Longest time between two consecutive answers for which a jump between them can be found, ms.
+/// Longest time between two consecutive answers between which the controller can detect a jump, ms.
 const WITHIN_MS: u32 = 3;
-/// Number of encoder steps that are tolerated.
+/// Difference between the encoders that is tolerated, in encoder steps.
 const STEPS: f64 = 3.0;
-/// Difference that is always tolerated, rad, even if [`STEPS`] configured encoder steps are smaller.
+/// Difference between the encoders that is always tolerated, rad, even if [`STEPS`] configured encoder steps are smaller.
 const LEAST: f64 = 2e-5;
-/// Share of the distance that is tolerated.
+/// Difference between the encoders that is tolerated in addition, as a share of the distance.
 const SHARE: f64 = 0.1;
-/// Multiple of the tolerance that a jump must exceed. If the clock of a drive drifts against the clock of the controller, some answers
-/// contain a reading that is one drive tick older. Two of these slips do not count as a jump.
+/// Size that a jump must exceed, as a multiple of the tolerated difference. If the clock of a drive drifts against the clock of the
+/// controller, some answers contain an encoder reading that is one tick of the drive older. Two such answers do not count as a jump.
 const SLIPS: f64 = 2.0;
-/// Share of the full scale above which a reported speed is not usable.
+/// Share of the full scale above which the controller does not use a reported speed.
 const SATURATED: f64 = 0.98;
 
-/// State of the jumps of an encoder.
+/// State of the detection of jumps of an encoder.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Jumps {
     /// Jump that is subtracted from each answer, rad.
     taken_off: f64,
     /// Difference of the two encoders before the possible jump, rad.
     before: f32,
-    /// Size of the possible jump, rad. After a fault was found, this is the size of the jump, or the ratio of the position rate to the
-    /// reported speed.
+    /// Size of the possible jump, rad. After a fault was found, this field contains the size of the jump, or the ratio of the position rate
+    /// to the reported speed.
     value: f32,
     /// Number of answers with the possible jump.
     answers: u8,
@@ -59,13 +60,14 @@ bit_codec!(Jumps { taken_off, before, value, answers, looks, changes, found });
 pub(super) enum Seen {
     /// The answer shows a motion, or cannot be classified.
     Motion,
-    /// The answer possibly shows a jump by this distance, rad. Until this is decided, the answer is treated as a jump.
+    /// The answer possibly shows a jump by this distance, rad. Until the controller has decided whether this is a jump, it treats the
+    /// answer as a jump.
     Perhaps(f64),
     /// The answer shows a jump by this distance, rad.
     Jump(f64),
 }
 
-/// Two distances of a joint within the window of its drive's speed: the measured distance, and the distance computed from the speed.
+/// Two distances of a joint within the window of its reported speed: the measured distance, and the distance computed from the speed.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nodes) struct Ways {
     /// Distance between the answered positions, rad.
@@ -102,7 +104,8 @@ impl Jumps {
         self.taken_off
     }
 
-    /// Returns the fault that was found since the drive was configured. The value is the size of a jump (rad) or the factor of a speed.
+    /// Returns the fault that was found since the drive was configured. The second element is the size of a jump (rad) or the factor of a
+    /// speed.
     pub(super) fn found(&self) -> Option<(StopKind, f64)> {
         self.found.map(|kind| (kind, self.value.into()))
     }
@@ -113,7 +116,7 @@ impl Jumps {
         self.answers > 0
     }
 
-    /// Records that an answer came as expected.
+    /// Records that an answer was close to its prediction.
     #[inline(always)]
     pub(super) fn as_expected(&mut self) {
         self.answers = 0;
@@ -125,15 +128,15 @@ impl Jumps {
         self.found = Some(StopKind::EncoderJump);
     }
 
-    /// Stores that positions change `factor` times as fast as the reported speed.
+    /// Records that the positions of the joint change `factor` times as fast as the reported speed.
     pub(super) fn find_factor(&mut self, factor: f32) {
         (self.value, self.answers) = (factor, 0);
         self.found = Some(StopKind::SpeedScale);
     }
 
-    /// Evaluates an unexpected answer at `at_ms`. `velocity` is the velocity in the previous answer, rad/s. `twist` is the largest twist of
-    /// the gear, rad. If an object strikes a joint, the joint can move away from its motor within some answers and stay there, but by less
-    /// than this twist.
+    /// Evaluates an unexpected answer that was due at `at_ms`. `velocity` is the velocity in the previous answer, rad/s. `twist` is the
+    /// largest possible twist of the gear, rad. If an object strikes a joint, the joint can move away from its motor within a few answers
+    /// and stay there. The distance of the joint from its motor is less than `twist`.
     pub(super) fn look(
         &mut self,
         answer: &Reading,
@@ -171,7 +174,7 @@ impl Jumps {
         }
         let size = now.unexplained() - f64::from(self.before);
         if watched == 0 || (size - f64::from(self.value)).abs() > tolerance {
-            // The possible jump has begun with this answer, or the size of the jump has changed.
+            // A possible jump has begun with this answer, or the size of the possible jump has changed.
             (self.value, same) = (size as f32, 0);
             self.changes += u8::from(watched > 0);
             let twisted = self.changes > CHANGES || (self.changes > 0 && size.abs() <= twist);

@@ -1,47 +1,48 @@
-//! Determines the lateness of the answers of a joint (J-63).
+//! Detection of the lateness of a joint's answers (J-63).
 //!
-//! An answer does not identify its Move, but the answers of a node keep their order. So the lateness of the newest answer is the number of
-//! Moves that were sent after the Move of this answer. These later Moves are called *outstanding*. A missing answer may be late or lost. A
-//! late answer cannot be distinguished from a lost answer until two answers come in one tick, because the first of the two answers was
-//! late. For a second after this *evidence*, unanswered Moves are counted as outstanding. The number of outstanding Moves is at most the
-//! highest number of late answers in one tick. Without evidence, unanswered Moves are counted as lost. Evidence may be wrong, because a
-//! frame that the bus repeats comes twice. A lost answer is detected later, because the count does not return to zero. The lowest count of
-//! a window is therefore subtracted.
+//! An answer does not identify its Move, but the answers of a node keep their order. The lateness of the newest answer is therefore the
+//! number of Moves that were sent after the Move of this answer. Moves that were sent after the Move of the newest answer are called
+//! *outstanding*. A missing answer may be late or lost. The controller cannot distinguish a late answer from a lost answer until two
+//! answers arrive in one tick, because the first of these answers was late. For a second after this *evidence*, the controller counts
+//! unanswered Moves as outstanding. The number of outstanding Moves is at most the highest number of late answers in one tick. Without
+//! evidence, the controller counts unanswered Moves as lost. Evidence may be wrong, because a frame that the bus repeats arrives twice. The
+//! controller detects a lost answer later, because the number of outstanding Moves then does not return to zero. Therefore the lowest
+//! number of outstanding Moves in a window is subtracted.
 use crate::bit_codec::bit_codec;
 
 /// Time for which evidence is valid, ms.
 const LASTS_MS: u16 = 1_000;
-/// Number of ticks in which the count must return to zero at least once.
+/// Number of ticks in which the number of outstanding Moves must return to zero at least once.
 const WINDOW: u8 = 64;
-/// Highest lateness of an answer, ticks.
+/// Highest lateness of an answer that is counted, ticks.
 const MOST: u8 = 7;
 
-/// Unanswered Moves of a node.
+/// State of the count of unanswered Moves of a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lateness {
     /// Remaining time for which the last evidence is valid, ms.
     left_ms: u16,
-    /// Number of Moves whose answers may still come.
+    /// Number of Moves whose answers may still arrive.
     outstanding: u8,
-    /// Upper bound of `outstanding`. While evidence is valid, this is the highest number of answers in one tick, minus one.
+    /// Upper bound of `outstanding`. While evidence is valid, this bound is the highest number of answers in one tick, minus one.
     most: u8,
-    /// Lowest value of `outstanding` in this window, and number of ticks in the window so far.
+    /// Lowest value of `outstanding` in this window. The next field is the number of ticks of the window so far.
     fewest: u8,
     window: u8,
-    /// Mask of the recent ticks in which a Move was sent. Bit 0 is the newest tick.
+    /// Mask of the recent ticks in which a Move was sent. Bit 0 stands for the newest tick.
     moves: u8,
 }
 
 bit_codec!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
-    /// Returns `true` if no answer is considered late and the tick has at most one answer, so that `answers` is not evidence. In this case
-    /// [`Self::count`] does not need to be called for the tick.
+    /// Returns `true` if no answer is considered late and the tick has at most one answer, so that the tick contains no evidence. If the
+    /// function returns `true`, the caller does not need to call [`Self::count`] for the tick.
     pub(super) fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
 
-    /// Counts one tick, `elapsed_ms` after the last tick, with this number of `answers`. `asked` means that a Move for this tick was sent
+    /// Counts one tick, `elapsed_ms` after the last tick, with this number of `answers`. `asked` is `true` if a Move for this tick was sent
     /// and acknowledged. Returns the lateness of the newest answer, ticks.
     pub(super) fn count(&mut self, asked: bool, answers: u8, elapsed_ms: u32) -> u8 {
         if self.left_ms == 0 {
@@ -52,10 +53,10 @@ impl Lateness {
             self.most = self.most.max(answers - 1).min(MOST);
         }
         self.left_ms = self.left_ms.saturating_sub(elapsed_ms.min(LASTS_MS.into()) as u16);
-        // The Move was sent in the previous tick, which may have been any time ago.
+        // The Move for this tick was sent in the previous tick, which may have been any time ago.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
-        // If more answers come than Moves are outstanding, some of these answers were counted as lost before.
+        // If more answers arrive than Moves are outstanding, the controller has counted some of these answers as lost.
         let outstanding = (self.outstanding + u8::from(asked)).saturating_sub(answers);
         self.outstanding = outstanding.min(self.most);
         self.fewest = self.fewest.min(self.outstanding);
@@ -67,14 +68,15 @@ impl Lateness {
         self.age()
     }
 
-    /// Corrects the count if the newest answer was only `late` ticks late, because some of the outstanding answers were lost.
+    /// Corrects the number of outstanding Moves if the newest answer was only `late` ticks late, because some of the outstanding answers
+    /// were lost.
     pub(super) fn lost(&mut self, late: u8) {
         let behind = self.moves & !u8::MAX.checked_shl(late.into()).unwrap_or(0);
         self.outstanding = self.outstanding.min(behind.count_ones() as u8);
         self.fewest = self.fewest.min(self.outstanding);
     }
 
-    /// Returns the age in ticks of the newest answered Move. All outstanding Moves were sent after this Move.
+    /// Returns the age of the newest answered Move, ticks. All outstanding Moves were sent after this Move.
     fn age(&self) -> u8 {
         let (mut behind, mut age) = (self.outstanding, 0);
         while age < MOST && (behind > 0 || self.moves >> age & 1 == 0) {
@@ -97,7 +99,7 @@ mod tests {
     /// Data of one tick: `true` if a Move was sent, `true` if its answer is lost, and the lateness of the answer.
     type Sent = (bool, bool, u8);
 
-    /// Returns two values for each tick: the counted lateness, and the real lateness of the newest answer, if an answer came.
+    /// Returns two values for each tick: the counted lateness, and the real lateness of the newest answer, if an answer arrived.
     fn counted(sent: &[Sent]) -> Vec<(u8, Option<u8>)> {
         let mut lateness = Lateness::default();
         let (mut due, mut last) = (Vec::new(), 0);
@@ -117,8 +119,8 @@ mod tests {
         all
     }
 
-    /// Returns a sequence that begins with a burst, which shows the highest lateness. After that, any lateness may occur. In every 24th
-    /// tick, no answer is outstanding. Some Moves are not sent, and `lost` of 100 answers are lost in these `ticks`.
+    /// Returns a sequence of ticks that begins with a burst of answers, which shows the highest lateness. After the burst, any lateness may
+    /// occur. In every 24th tick, no answer is outstanding. Some Moves are not sent, and `lost` of 100 answers are lost in these `ticks`.
     fn sent(most: u8, lost: u32, ticks: usize) -> impl Strategy<Value = Vec<Sent>> {
         let any = (prop::bool::weighted(0.9), 0..100u32, 0..=most);
         prop::collection::vec(any, ticks).prop_map(move |any| {
@@ -142,11 +144,11 @@ mod tests {
             }
         }
 
-        /// If some answers were lost, every count is correct again after the windows of the loss.
+        /// After some answers were lost, every count is correct again when the windows with these losses are over.
         #[test]
         fn j63_what_was_lost_is_taken_off(
-            // If the highest number of answers is outstanding, a lost answer makes no difference. Therefore fewer answers are outstanding
-            // in the second part.
+            // If the highest possible number of answers is outstanding, the count cannot show a lost answer. Therefore fewer answers are
+            // outstanding in the second part of the test.
             some in (1..=MOST).prop_flat_map(|most| (sent(most, 20, 240), sent(most - 1, 0, 480))),
         ) {
             let (with, without) = some;
@@ -157,7 +159,7 @@ mod tests {
             }
         }
 
-        /// Without two answers in a tick, every missing answer is counted as lost.
+        /// Without two answers in the same tick, the controller counts every missing answer as lost.
         #[test]
         fn j63_without_evidence_nothing_is_late(lost in prop::collection::vec(any::<bool>(), 300)) {
             let sent: Vec<Sent> = lost.into_iter().map(|lost| (true, lost, 0)).collect();
@@ -174,7 +176,7 @@ mod tests {
             assert_eq!(lateness.count(true, 1, 1), 0);
             lateness.count(true, 0, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8);
-            // This tick also gets the answer to the Move of the previous tick.
+            // In this tick, the answer to the Move of the previous tick also arrives.
             lateness.count(true, 2, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8 - 1);
         }

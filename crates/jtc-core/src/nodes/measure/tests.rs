@@ -24,7 +24,7 @@ fn tick(answer: Option<f64>, velocity: f64) -> Tick {
     }
 }
 
-/// Runs a step with an unchanged commanded velocity.
+/// Executes a step with an unchanged commanded velocity.
 fn step(joint: &mut Measurement, tick: &Tick) -> bool {
     let past = |ticks: u8| Late {
         ms: ticks.into(),
@@ -53,7 +53,7 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
             assert_eq!(joint.used().velocity, velocity);
         }
     }
-    // The prediction follows a change of the commanded velocity.
+    // The predicted rate follows a change of the commanded velocity.
     let mut joint = moving(0.4);
     let slower = Tick { commanded: 0.1, ..tick(None, 0.4) };
     step(&mut joint, &slower);
@@ -61,7 +61,7 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-12);
 }
 
-/// The prediction of a joint that was thrown is slower than the throw.
+/// The prediction of a joint that was thrown is slower than this joint.
 #[test]
 fn j63_no_more_is_carried_on_than_a_little_over_the_velocity_limit() {
     for (velocity, carried) in [(1.7, 1.7), (2.5, 1.2 * VELOCITY_MAX), (-2.5, -1.2 * VELOCITY_MAX)] {
@@ -140,8 +140,8 @@ fn j63_a_long_tick_is_predicted_for_its_length() {
     assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < ROUNDED);
 }
 
-/// Simulates a joint that moves at `rate` but reports another velocity. Then an answer differs from its position by `off`, `since` more
-/// answers follow from that position, and the next answer is missing. Returns the rate of the prediction.
+/// Simulates a joint whose positions change at `rate` but that reports another velocity. Then an answer differs from the expected position
+/// by `off`, `since` more answers follow from the new position, and the next answer is missing. Returns the rate of the prediction.
 fn carried_after(rate: f64, reported: f64, off: f64, since: u8) -> f64 {
     let mut joint = Measurement::default();
     let answer = |k: f64, off: f64| Tick {
@@ -165,11 +165,11 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     for (rate, reported, off, since, carried) in [
         (0.4, 0.5, 0.0, 0, 0.4),
         (0.4, 0.3, 0.0, 0, 0.4),
-        // The distance in 5 ms is now longer by a tenth of the implausible distance of one millisecond.
+        // The distance in 5 ms is now longer by a tenth of the implausible distance in one millisecond.
         (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
         (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
         (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
-        // The reported velocity is used until the rate contains only answers after the jump.
+        // The prediction uses the reported velocity until only answers after the jump determine the rate.
         (0.4, 0.5, 2.0 * unexpected, 0, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 4, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 5, 0.4),
@@ -180,7 +180,8 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     }
 }
 
-/// The predicted velocity follows the commands. The difference between prediction and answer fades.
+/// During a loss of answers, the predicted velocity follows the commands. After the loss, the difference between prediction and answer
+/// fades.
 #[test]
 fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     let mut joint = moving(0.4);
@@ -216,7 +217,7 @@ fn j16_the_speed_is_seen_where_the_reported_velocity_is_wrong() {
     assert!((joint.speed() - 0.3).abs() < ROUNDED);
 }
 
-/// The offset decays like the double pole, for any length of the ticks and from any state.
+/// The offset decays like a filter with a double pole, from any state and for any length of the ticks.
 #[test]
 fn j63_an_offset_fades_like_a_critically_damped_filter() {
     let config = Config::avena();
@@ -232,7 +233,7 @@ fn j63_an_offset_fades_like_a_critically_damped_filter() {
             assert!((fading.slope - exact.1).abs() < 1e-4 * 1e-3, "{ms} ms: {fading:?} {exact:?}");
         }
     }
-    // A small remainder is also not dropped at once.
+    // A small remainder of an offset is not dropped at once either.
     let mut little = Fading { left: 1e-6, slope: 0.0 };
     little.step(1, &config);
     assert!(little.left > 0.9e-6, "{little:?}");

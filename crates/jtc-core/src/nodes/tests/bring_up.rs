@@ -1,4 +1,4 @@
-//! Tests of the requests to a drive, and of the diagram of these requests in docs/protocol-jtc.md.
+//! Tests of the requests to a drive, and of their diagram in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
 use std::string::String;
@@ -7,8 +7,8 @@ use std::vec::Vec;
 use super::*;
 use crate::docs_check::is_in_the_protocol;
 
-/// States of a drive, each with the request that leads to the state and the name of the state. States that the drive leaves by itself after
-/// some time are not included.
+/// States of a drive, each with the request that leads to the state and the name of the state. The list does not include states that the
+/// drive leaves after some time without a request.
 const STATES: [(NodeState, Target, &str); 5] = [
     (NodeState::START, Target::NoChange, "Start"),
     (NodeState::INIT, Target::Init, "Init"),
@@ -18,7 +18,7 @@ const STATES: [(NodeState, Target, &str); 5] = [
 ];
 const GOALS: [(Goal, &str); 3] =
     [(Goal::Ready, "in Init"), (Goal::Enabled, "with torque"), (Goal::Down, "in Error")];
-/// Knowledge of the controller about the configuration of a node.
+/// Cases of the configuration of a node: flags for accepted and refused, and the name of the case.
 const KNOWN: [(bool, bool, &str); 3] =
     [(false, false, "unknown"), (false, true, "refused"), (true, false, "accepted")];
 
@@ -56,7 +56,7 @@ fn j16_j20_the_diagram_is_what_is_requested() {
     is_in_the_protocol("bring-up", &diagram());
 }
 
-/// Tests all other combinations of the knowledge about a drive.
+/// Tests all other combinations of the information that the controller has about a drive.
 #[test]
 fn j16_only_a_drive_that_is_ready_and_wanted_enabled_is_enabled() {
     for (goal, known) in GOALS.iter().flat_map(|(goal, _)| KNOWN.map(|known| (*goal, known))) {

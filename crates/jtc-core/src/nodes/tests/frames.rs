@@ -33,7 +33,7 @@ fn j16_j20_what_a_node_is_asked_for() {
         let mut node = Node { seen: true, clear: true, ..Node::default() };
         node.report.state = state;
         for goal in [Goal::Ready, Goal::Enabled, Goal::Down] {
-            // A drive ignores Init while it is enabled.
+            // A drive ignores a request for Init while it is enabled.
             assert_eq!(node.request(goal), if state == NodeState::ENABLED { Ready } else { Init });
             assert_eq!(Node { seen: false, ..node }.request(goal), NoChange);
         }
@@ -73,7 +73,8 @@ enum Sent {
     ResetAll,
 }
 
-/// Sends one frame to ready nodes that `change` has modified. `moves` is the number of Moves since the last frame of another kind.
+/// Returns the kind of the frame that ready nodes get after `change` has modified them. `moves` is the number of Moves since the last frame
+/// of another kind.
 fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     let (config, mut nodes) = (Config::avena(), ready());
     nodes.moves = moves;
@@ -88,7 +89,7 @@ fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     }
 }
 
-/// Puts node `n` into Init, so that it waits for its configuration.
+/// Puts node `n` into Init without a configuration.
 fn waits(nodes: &mut Nodes, n: usize) {
     (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.state) =
         (false, false, NodeState::INIT);
@@ -105,7 +106,7 @@ fn j12_at_most_one_tick_of_four_sends_another_frame_than_move() {
     assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x7F)), Sent::ResetAll);
 }
 
-/// Without a gripper the joints are the only nodes.
+/// Without a gripper, the joints are the only nodes.
 #[test]
 fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     for (gripper, mask, frame) in [
@@ -153,22 +154,22 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
         nodes.nodes[GRIPPER].silent = 5;
     };
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A joint that must be enabled does not wait for twenty ticks.
+    // A frame that enables a joint does not wait for twenty ticks.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
     assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
 }
 
-/// Configurations and changes of state alternate, but a node that is enabled refuses a configuration.
+/// Configuration frames and changes of state alternate, but an enabled node refuses a configuration.
 #[test]
 fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     for (state, seen, configured_last, frame) in [
         (NodeState::ENABLED, true, false, Sent::ControllerState),
         (NodeState::ENABLED, true, true, Sent::ControllerState),
-        // The change of the node from Init to Ready can wait.
+        // The change of this node from Init to Ready can wait.
         (NodeState::INIT, true, false, Sent::Mode),
         (NodeState::INIT, true, true, Sent::ControllerState),
-        // After a restart, earlier reports of the node are not valid.
+        // After the restart of a node, its earlier reports are not valid.
         (NodeState::ENABLED, false, false, Sent::Mode),
         (NodeState::ENABLED, false, true, Sent::Mode),
     ] {
@@ -182,7 +183,7 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
 }
 
 /// If no other frame must be sent, one configuration frame may follow another. A node that must stay enabled does not delay a configuration
-/// frame.
+/// frame for another node.
 #[test]
 fn j20_configurations_and_changes_of_state_take_turns() {
     let enabling = |nodes: &mut Nodes| {
@@ -207,8 +208,8 @@ fn j20_configurations_and_changes_of_state_take_turns() {
     }
 }
 
-/// Returns the request to a gripper in this state while the joints are in the state of the goal. A frame without a change of state contains
-/// no request to the gripper.
+/// Returns the request to a gripper in this state, while the joints are in the state of the goal. A frame without a change of state
+/// contains no request to the gripper.
 fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool, clear: bool) -> Target {
     let mut nodes = ready();
     if goal == Goal::Enabled {
@@ -223,7 +224,7 @@ fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool
     }
 }
 
-/// A gripper that keeps holding its part does not change its state while the arm has no torque, except if the gripper itself is cleared.
+/// A gripper that keeps its workpiece does not change its state while the arm has no torque, except if the gripper itself is cleared.
 #[test]
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};
@@ -233,13 +234,13 @@ fn j23_what_a_gripper_is_asked_for() {
         (Goal::Ready, NodeState::ENABLED, true, false, Ready, NoChange),
         (Goal::Down, NodeState::ENABLED, true, true, Ready, Ready),
         (Goal::Ready, NodeState::ENABLED, true, true, Ready, Ready),
-        // The gripper is enabled but has lost its configuration. The gripper accepts a new configuration only in Ready.
+        // The gripper is enabled, but it has lost its configuration. The gripper accepts a new configuration only in Ready.
         (Goal::Enabled, NodeState::ENABLED, false, false, Ready, Ready),
         (Goal::Enabled, NodeState::READY, true, false, Enable, Enable),
         (Goal::Enabled, NodeState::READY, false, false, NoChange, NoChange),
         (Goal::Enabled, NodeState::START, false, false, Init, Init),
         (Goal::Enabled, NodeState::INIT, true, false, Ready, Ready),
-        // In Error, the controller does not bring up any node.
+        // In Error, the controller does not bring any node up.
         (Goal::Ready, NodeState::START, false, false, Init, Init),
         (Goal::Down, NodeState::START, false, false, NoChange, NoChange),
     ] {

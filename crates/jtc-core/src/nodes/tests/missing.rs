@@ -6,7 +6,7 @@ use super::*;
 #[test]
 fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     let lost = BusState { acknowledged: false, bus_off: false };
-    // During bus-off, answers are not possible, even if an earlier frame was acknowledged.
+    // During bus-off, nodes cannot answer, even if an earlier frame was acknowledged.
     let off = BusState { acknowledged: true, bus_off: true };
     for (state, sent_move, unacknowledged, silent) in [
         (GOOD, true, 0, 1),
@@ -18,14 +18,14 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     ] {
         let mut nodes = ready();
         nodes.sent_move = sent_move;
-        // The answers of a node that is starting are not missing yet.
+        // While a node is starting, its answers do not count as missing.
         nodes.nodes[4].boot_left = 100;
         tick(&mut nodes, &[], state);
         assert_eq!(nodes.unacknowledged, unacknowledged, "{state:?} {sent_move}");
         for (n, node) in nodes.nodes.iter().enumerate() {
             assert_eq!(node.silent, if n == 4 { 0 } else { silent }, "{state:?} {sent_move}, node {n}");
         }
-        // If a node answers, the node has started.
+        // A node that answers has completed its start.
         nodes.sent_move = true;
         tick(&mut nodes, &all(NodeState::READY), GOOD);
         assert_eq!((nodes.unacknowledged, nodes.nodes[4].boot_left), (0, 0));
@@ -37,15 +37,15 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     assert_eq!(booting.unacknowledged, 0, "nobody is there to acknowledge");
 }
 
-/// Until the transmit timeout, a joint is predicted if answers are not possible. Each of these ticks counts as a missing answer of the
-/// joint.
+/// If answers are not possible, the controller predicts the motion of a joint until the transmit timeout. Each of these ticks counts as a
+/// missing answer of the joint.
 #[test]
 fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known() {
     let lost = BusState { acknowledged: false, bus_off: false };
     for (unacknowledged, sent_move, valid, before, missed) in [
         (0, true, true, 0, 1),
         (3, true, true, 0, 1),
-        // In this tick, the transmit timeout is raised and applies to all joints.
+        // In this tick, the controller raises the transmit timeout, which applies to all joints.
         (4, true, true, 0, 0),
         (4, true, true, 3, 0),
         (2, false, true, 3, 3),
@@ -58,16 +58,15 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
         let node = nodes.node(1);
         assert_eq!((node.missed, node.silent), (missed, 0), "{unacknowledged} {sent_move} {valid} {before}");
     }
-    // A gripper has no position that could be wrong, so only missing frames are counted.
+    // A gripper has no position that could be wrong, so only its missing frames are counted.
     let mut nodes = ready();
     (nodes.unacknowledged, nodes.nodes[GRIPPER].missed) = (1, 4);
     tick(&mut nodes, &[], lost);
     assert!(!nodes.node(GRIPPER).misbehaved);
 }
 
-/// If two answers come in a tick, the first answer was late, so the distance between the two answers does not show a motion within this
-/// tick. In the next tick, a single answer may again be the first answer in time. The difference of this answer from the prediction is also
-/// bridged.
+/// If two answers arrive in a tick, the first answer was late, so the distance between both answers is not a motion within this tick. In
+/// the next tick, a single answer may again be on time. The difference between this answer and the prediction is also bridged.
 #[test]
 fn j63_the_second_answer_of_a_tick_makes_no_step() {
     let mut nodes = ready();
@@ -92,7 +91,7 @@ fn j63_the_second_answer_of_a_tick_makes_no_step() {
     tick(&mut nodes, &bus, GOOD);
     let step = nodes.positions()[2] - before;
     assert!(step.abs() < 0.1e-3, "{step} rad");
-    // Both differences fade.
+    // The offsets of both differences fade.
     for _ in 0..250 {
         tick(&mut nodes, &bus, GOOD);
     }
@@ -111,7 +110,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
         assert_eq!(nodes.node(2).misbehaved, ms == 5, "after {ms}");
         assert!(!nodes.node(2).fresh() && nodes.node(1).fresh() && nodes.node(2).silent == 0);
     }
-    // An answer without a previous Move is also checked.
+    // An answer is also checked if no Move has requested it.
     let mut nodes_without = ready();
     tick(&mut nodes_without, &all(NodeState::READY), GOOD);
     nodes_without.sent_move = false;
@@ -119,7 +118,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes_without, &bus, GOOD);
     assert_eq!((nodes_without.node(2).missed, nodes_without.node(1).missed), (1, 0));
-    // After the five unusable answers, an answer is used without a correction.
+    // After five unusable answers, the controller uses the next answer without a correction.
     let mut bus = all(NodeState::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes, &bus, GOOD);
@@ -146,7 +145,8 @@ fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
     assert_eq!(absent.gripper_flags(&config), 0, "none is expected");
 }
 
-/// Any node may have lost its supply while it did not answer, but the state of an enabled gripper shows this.
+/// Any node may have lost its supply while it did not answer. Only the state of an enabled gripper shows later whether the node has lost
+/// its supply.
 #[test]
 fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled_gripper() {
     for (n, state, kept) in [

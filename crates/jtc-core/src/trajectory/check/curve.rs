@@ -1,29 +1,30 @@
-//! Polynomials in Bernstein form. A curve over 0..1 lies within the hull of its control points (Farin 2002).
+//! Polynomials in Bernstein form. A curve over 0..1 lies within the convex hull of its control points (Farin 2002).
 
-/// Highest number of successive halvings of one curve. Each halving brings the hull about four times closer to the curve.
+/// Highest number of successive halvings of one curve. Each halving reduces the distance between hull and curve to about a quarter.
 const DEPTH: usize = 6;
 
-/// Position at which a curve leaves its bounds.
+/// Position in an interval at which a curve leaves its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Leaves {
     /// Position in the interval, 0..1.
     pub at: f64,
-    /// Value of the curve at this position. If the number of halvings was too small, the value is that of a control point, which the curve
-    /// may not reach.
+    /// Value of the curve at the position `at`. If the number of halvings was too small, this is the value of a control point, which the
+    /// curve may not reach.
     pub value: f64,
-    /// The bound.
+    /// Bound that the curve leaves.
     pub bound: f64,
 }
 
-/// Returns the first position that was found at which the curve leaves `low..=high`. The position is exact at the ends of the curve and at
-/// its halving points. If all `halvings` are used, the hull is checked instead, so that a curve that leaves the bounds never passes.
+/// Returns the first position that the function finds at which the curve leaves `low..=high`. The position is exact at the ends of the
+/// curve and at its halving points. If all `halvings` are used, the function checks the hull instead, so a curve that leaves the bounds
+/// never passes.
 pub(super) fn leaves<const N: usize>(
     curve: [f64; N],
     low: f64,
     high: f64,
     halvings: &mut u8,
 ) -> Option<Leaves> {
-    // The stack contains the parts of the curve that are not checked yet, from the end of the interval to its start.
+    // The stack contains the pieces of the curve that are not checked yet, from the end of the interval to its start.
     let mut stack = [(curve, 0.0, 1.0); DEPTH + 1];
     let mut waiting = 1;
     while waiting > 0 {
@@ -39,7 +40,7 @@ pub(super) fn leaves<const N: usize>(
         if on_the_curve.is_some() {
             return on_the_curve;
         }
-        // A part at the full depth does not fit on the stack.
+        // The stack has no space for the halves of a piece at the full depth.
         let (Some(left), true) = (halvings.checked_sub(1), waiting + 1 < stack.len()) else {
             return Some(Leaves { at: start + 0.5 * width, value, bound });
         };
@@ -111,14 +112,15 @@ mod tests {
         }
     }
 
-    /// At the full depth, the hull decides. Otherwise a part of the curve would be skipped, and a violation in this part would be missed.
+    /// At the full depth, the check compares the hull with the bounds. Without this comparison, the check would skip a piece of the curve,
+    /// and would miss a violation in this piece.
     #[test]
     fn j36_at_the_full_depth_the_hull_decides() {
-        // The curve is above 1 from 0 to 0.006, which is less than half of the smallest part.
+        // The curve is above 1 from 0 to 0.006, which is less than half of the smallest piece.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 255).expect("it leaves its bounds");
         assert_eq!((found.at, found.bound), (1.0 / 128.0, 1.0));
         assert!(found.value > 1.0 && found.value < 1.0001, "{found:?}");
-        // The shared number of halvings is used up before the full depth.
+        // All shared halvings are used before the curve is halved to the full depth.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 2).expect("it may leave them");
         assert_eq!((found.at, found.bound), (1.0 / 8.0, 1.0));
     }
@@ -128,7 +130,7 @@ mod tests {
         for (curve, named) in [
             ([0.0, 3.0, -2.0, 0.0], (3.0, 1.0)),
             ([0.0, 2.0, -3.0, 0.0], (-3.0, -1.0)),
-            // If both bounds are exceeded by equal distances, the upper bound is reported.
+            // If a curve exceeds both bounds by equal distances, the function reports the upper bound.
             ([0.0, 2.0, -2.0, 0.0], (2.0, 1.0)),
         ] {
             let found = leaves(curve, -1.0, 1.0, &mut 0);

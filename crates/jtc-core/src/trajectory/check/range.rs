@@ -1,13 +1,14 @@
 //! Positions of a joint that a path may have (J-36).
 //!
-//! Two allowances are added to the position limits. The first allowance is the tolerance. Rounding to the wire format can move a path that
-//! ends exactly on a limit slightly beyond the limit, which is not an error of the path. The second allowance is for a joint outside a
-//! limit. A path may start outside the limit if the joint is there. Until the joint is inside again, it must not move further out.
+//! The check adds two allowances to the position limits. The first allowance of the check is a tolerance for rounding. Rounding to the wire
+//! format can move a path that ends exactly on a position limit slightly beyond this limit, which is not an error of the path. The second
+//! allowance of the check is for a joint that is outside a position limit when the path begins. If the joint is outside a position limit,
+//! the path may also start outside this limit. Until the joint is inside its limits again, the path must not move the joint further out.
 use super::{POSITION_STEP, VELOCITY_STEP};
 use crate::config::{Config, WORKING_AREA};
 
-/// Change of the quintic (rad) in the middle between two points 1 s apart, for a velocity change of +1 rad/s at the first point and −1
-/// rad/s at the second point. The exact value is 5/16.
+/// Change of the quintic (rad) in the middle between two points that are 1 s apart. The velocity changes by +1 rad/s at the first point and
+/// by −1 rad/s at the second point. The exact change is 5/16.
 const WAY_OF_VELOCITY: f64 = 0.3125;
 
 /// Range of positions that a path may have in one joint (J-36), rad.
@@ -19,9 +20,9 @@ pub struct PathRange {
     tolerated: (f64, f64),
     /// Largest increase of a position between two points due to rounding to the wire format.
     tolerance: f64,
-    /// Half of the working area; infinite if the drives do not keep to this area.
+    /// Half of the working area. This value is infinite if the drives do not keep to their working area.
     area: f64,
-    /// Largest distance by which the first point may be outside the limits.
+    /// Largest distance of the first point from the position limits, if this point is outside.
     start: f64,
 }
 
@@ -41,18 +42,18 @@ impl PathRange {
         }
     }
 
-    /// Returns the nearest position inside the limits.
+    /// Returns the position inside the limits that is nearest to `position`.
     pub fn nearest_inside(&self, position: f64) -> f64 {
         let (low, high) = self.limits;
         position.max(low).min(high)
     }
 
-    /// Returns the limits with their tolerance, which are the range of a joint that is inside.
+    /// Returns the position limits with their tolerance. A joint that is inside its limits may have any position within this tolerance.
     pub fn tolerated(&self) -> (f64, f64) {
         self.tolerated
     }
 
-    /// Returns `true` if `position` is inside the limits with their tolerance; `false` for NaN.
+    /// Returns `true` if `position` is inside the limits with their tolerance. Returns `false` for NaN.
     pub fn contains(&self, position: f64) -> bool {
         let (low, high) = self.tolerated;
         position >= low && position <= high
@@ -64,26 +65,26 @@ impl PathRange {
         position >= low && position <= high
     }
 
-    /// Returns the range of the first point. The point may be outside the limits by the start tolerance, but must be inside the working
-    /// area.
+    /// Returns the range of positions for the first point of a path. The first point may be outside the limits by the start tolerance, but
+    /// must be inside the working area.
     pub fn of_first(&self) -> (f64, f64) {
         ((self.tolerated.0 - self.start).max(-self.area), (self.tolerated.1 + self.start).min(self.area))
     }
 
-    /// Returns the range of a whole path whose first point is at `first`. If a path cannot begin at this point, returns the range of a path
-    /// that begins inside the limits.
+    /// Returns the range of positions for a whole path whose first point is at `first`. If a path cannot begin at this point, returns the
+    /// range of a path that begins inside the limits.
     pub fn of_path(&self, first: f64) -> (f64, f64) {
         let (low, high) = self.of_first();
         let comes_in = !self.limits_contain(first) && first >= low && first <= high;
         if comes_in { self.between(first) } else { self.tolerated }
     }
 
-    /// Returns the range of the point after a point at `before`, for a joint that is moving back into its limits.
+    /// Returns the range of positions for the point after a point at `before`, for a joint that is moving back into its limits.
     pub(super) fn of_next(&self, before: f64) -> (f64, f64) {
         (self.tolerated.0.min(before), self.tolerated.1.max(before))
     }
 
-    /// Returns the range of the interval between a point at `before` and the next point, for a joint that is moving back into its limits.
+    /// Returns the range of positions between a point at `before` and the next point, for a joint that is moving back into its limits.
     pub(super) fn between(&self, before: f64) -> (f64, f64) {
         let ((low, high), area) = (self.tolerated, self.area.max(before.abs()));
         if self.is_below(before) {
@@ -93,8 +94,8 @@ impl PathRange {
         }
     }
 
-    /// Returns the range of the derivative of the position after a point at `before`, rad/s. The motion must be inwards, with `slack` for
-    /// rounding to the wire format.
+    /// Returns the range of the derivative of the position after a point at `before`, rad/s. The joint must move inwards, with an allowance
+    /// of `slack` for rounding to the wire format.
     pub(super) fn inward(&self, before: f64, slack: f64) -> (f64, f64) {
         if self.is_below(before) { (-slack, f64::INFINITY) } else { (f64::NEG_INFINITY, slack) }
     }

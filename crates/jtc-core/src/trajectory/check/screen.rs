@@ -1,9 +1,9 @@
-//! Quick part of the check, which computes bounds of the control points around a point, in single precision and in steps of the wire
-//! format.
+//! Quick part of the trajectory check. The quick part computes bounds of the control points around a point, in single precision and in
+//! steps of the wire format.
 //!
-//! Each control point of an interval (J-32), except the control point in the middle of the derivative of the quintic, depends on the
-//! velocity and acceleration at one end only. Each of the six joints therefore needs only a few dozen operations, and nearly every interval
-//! of a real path passes this part. If an interval does not pass the quick part, the exact check decides.
+//! Nearly every control point of an interval (J-32) depends on the velocity and acceleration at one end of the interval only. The exception
+//! is the control point in the middle of the derivative of the quintic. The quick part therefore needs only a few dozen operations per
+//! joint, and nearly every interval of a real path passes it. For an interval that does not pass the quick part, the exact check decides.
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RawPoint, VELOCITY_SCALE};
 
 use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
@@ -13,10 +13,10 @@ use crate::bit_codec::bit_codec;
 /// Margins for rounding in single precision, in position steps and as a share of the speed limit.
 const SLACK: f64 = 0.1;
 const SLACK_SHARE: f64 = 2e-6;
-/// Largest difference between the quartic and the cubic, relative to the distance that the velocities do not explain.
+/// Largest difference between the quartic and the cubic polynomial, relative to the distance that the velocities do not explain.
 const BUMP: f32 = 1.875;
 
-/// Point of a trajectory as floats, in steps of the wire format.
+/// Point of a trajectory in single precision, in steps of the wire format.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Steps {
     position: [f32; JOINTS],
@@ -34,7 +34,7 @@ impl From<&RawPoint> for Steps {
     }
 }
 
-/// Limits in steps of the wire format.
+/// Limits of the joints in steps of the wire format.
 #[derive(Clone, Debug)]
 pub(super) struct Screen {
     position_low: [f32; JOINTS],
@@ -68,20 +68,21 @@ impl Screen {
         }
     }
 
-    /// Returns `true` if point `b` and the interval from `a` to `b` are certainly within every bound.
+    /// Returns `true` if point `b` and the interval from `a` to `b` are within every bound. Returns `false` if only the exact check can
+    /// decide this.
     pub(super) fn passes(&self, a: &Steps, b: &Steps) -> bool {
         let (kv, ka) = (self.per_velocity, self.per_acceleration);
         let mut good = true;
         for j in 0..JOINTS {
             let (speed_a, speed_b) = (a.velocity[j].abs() * kv, b.velocity[j].abs() * kv);
             let (bend_a, bend_b) = (a.acceleration[j].abs() * ka, b.acceleration[j].abs() * ka);
-            // `around` is the largest distance of the control points of the position from their trajectory point.
+            // `around` is the largest distance between the position of a trajectory point and the position of its control points.
             let around = (0.4 * speed_a + 0.05 * bend_a).max(0.4 * speed_b + 0.05 * bend_b);
             let low = a.position[j].min(b.position[j]) - around;
             let high = a.position[j].max(b.position[j]) + around;
-            // The next value is the largest magnitude of the control points of the velocity.
+            // `speed` is the largest magnitude of the control points of the velocity.
             let speed = (speed_a + bend_a * (1.0 / 3.0)).max(speed_b + bend_b * (1.0 / 3.0));
-            // The next value is the distance that the velocities do not explain, less one step.
+            // The distance that the velocities do not explain is the difference between `way` and `explained`, reduced by one step.
             let way = b.position[j] - a.position[j];
             let explained = 0.5 * kv * (a.velocity[j] + b.velocity[j])
                 + (1.0 / 12.0) * ka * (a.acceleration[j] - b.acceleration[j]);
@@ -113,7 +114,7 @@ pub(crate) struct SpeedRange {
 bit_codec!(SpeedRange { low, high });
 
 impl SpeedRange {
-    /// Adds the velocities (in steps) around a point.
+    /// Adds the velocities (in steps) around a point to the range.
     pub(super) fn add(&mut self, (low, high): (f32, f32), point: u32) {
         if low < self.low.0 {
             self.low = (low, point);
@@ -123,7 +124,8 @@ impl SpeedRange {
         }
     }
 
-    /// Returns the lowest and the highest velocity, rad/s, each with the index of its point. The range always includes standstill.
+    /// Returns the lowest and the highest velocity, rad/s, each with the index of its point. The range of velocities always includes
+    /// standstill.
     pub(super) fn ends(&self) -> [(f64, u32); 2] {
         [self.low, self.high].map(|(steps, point)| (f64::from(steps) * VELOCITY_STEP, point))
     }
@@ -135,7 +137,7 @@ mod tests {
     use crate::config::Config;
     use crate::trajectory::check::PathRange;
 
-    /// Without this margin, an interval that the exact check refuses could pass the quick part because of rounding.
+    /// Without this margin, rounding could let an interval pass the quick part although the exact check refuses it.
     #[test]
     fn j36_the_screen_keeps_a_distance_to_each_limit_that_is_more_than_its_rounding() {
         let mut config = Config::avena();
@@ -148,14 +150,14 @@ mod tests {
                 let bounds = JointBounds { position, speed, acceleration: 8.0, friction };
                 let screen = Screen::new(&[bounds; JOINTS], step);
                 let slowest = if speed > 1.5 { 0.7 } else { speed };
-                // The margin covers eight roundings, and a tenth of a step for their effect on positions.
+                // The margin covers eight rounding errors, and a tenth of a step for their effect on positions.
                 let share = 1.0 - 8.0 * f64::from(f32::EPSILON);
                 let [low, high] = [screen.position_low[0], screen.position_high[0]].map(f64::from);
                 // The limits include the tolerance of one step.
                 assert!(low >= -2.5 / POSITION_STEP - 0.91 && high <= 2.0 / POSITION_STEP + 0.91);
                 let way = f64::from(screen.speed[5]) * POSITION_STEP;
                 assert!(way <= slowest * step * share - 0.09 * POSITION_STEP, "{speed} {friction:?} {step}");
-                // The margin does not reduce the limit significantly.
+                // The rounding margin does not reduce the limit significantly.
                 assert!(
                     way >= slowest * step * 0.999_99 - 0.2 * POSITION_STEP,
                     "{speed} {friction:?} {step}"

@@ -1,4 +1,4 @@
-//! Compares the check with dense samples of the values that the controller computes between points.
+//! Comparison of the check with dense samples of the values that the controller computes between points.
 extern crate std;
 use std::vec::Vec;
 
@@ -18,7 +18,7 @@ fn config() -> Config {
     config
 }
 
-/// Returns a point with these values (rad, rad/s, rad/s²) in joint `j`.
+/// Returns a point with these values (rad, rad/s, rad/s²) in joint `j`, and zeros in the other joints.
 fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     let mut point = RawPoint::default();
     point.position[j] = (q / POSITION_STEP).round() as i16;
@@ -27,8 +27,8 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
-/// Returns the effect of rounding on a position, which is one position step, plus the effect of one velocity step at both points in the
-/// middle of the quintic.
+/// Returns the largest effect of rounding on a position. The effect of rounding is one position step, plus the effect of one velocity step
+/// at both points in the middle of the quintic.
 fn tolerance(step_ms: u16) -> f64 {
     let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
     let (a, b) = (moving(1.0), moving(-1.0));
@@ -41,8 +41,8 @@ fn between(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> Result<
     check.behind(1, *a, Passed::default()).take(b)
 }
 
-/// Samples joint `j` between two points. Returns the extremes of the position, the velocity, and the derivative of the position. The
-/// distance for the derivative is reduced by one step.
+/// Samples the motion of joint `j` between two points. Returns the extremes of the position, the velocity, and the derivative of the
+/// position. The distance for this derivative is reduced by one position step.
 fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64, f64) {
     let (a, b, h) = (SetPoint::from(a), SetPoint::from(b), f64::from(step_ms) / 1000.0);
     let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
@@ -61,8 +61,9 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
 }
 
 /// Returns the margins to the limits of joint 0 around two points, for any signs of the velocities and accelerations. The first two margins
-/// are those of the hull of the positions (rad, below and above). The third margin is that of the hull of the velocities (rad/s), with the
-/// bump for the unexplained distance less one step. The last margin is that of the acceleration of `b` (rad/s²).
+/// belong to the hull of the positions (rad, below and above). The third margin belongs to the hull of the velocities (rad/s). The hull of
+/// the velocities includes the bump for the unexplained distance, reduced by one step. The last margin belongs to the acceleration of `b`
+/// (rad/s²).
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));
     let [a, b] = [a, b].map(|point| {
@@ -72,7 +73,7 @@ fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let around = [a, b].map(|(_, v, a)| 2.0 / 5.0 * v.abs() * h + a.abs() * h * h / 20.0);
     let fastest = [a, b].map(|(_, v, a)| v.abs() + a.abs() * h / 3.0);
     let explained = h * (a.1 + b.1) / 2.0 + h * h * (a.2 - b.2) / 12.0;
-    // The factor 30/16 is the maximum of 30·u²·(1 − u)², which is in the middle.
+    // The factor 30/16 is the maximum of 30·u²·(1 − u)², which is at u = 1/2.
     let bump = 30.0 / 16.0 * ((b.0 - a.0 - explained).abs() - POSITION_STEP).max(0.0) / h;
     let (around, fastest) = (around[0].max(around[1]), fastest[0].max(fastest[1]));
     [
@@ -83,7 +84,7 @@ fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     ]
 }
 
-/// Returns pairs of points near the limits, with 1 ms to 1 s between the points.
+/// Returns a time between points from 1 ms to 1 s, and two points near the limits.
 fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
     let step = prop::sample::select(&[1u16, 2, 5, 10, 20, 50, 100, 250, 1000][..]);
     (
@@ -127,18 +128,18 @@ proptest! {
         }
     }
 
-    /// Each interval that passes the quick part also passes the exact part.
+    /// Each interval that passes the quick part of the check also passes the exact part.
     #[test]
     fn j36_the_screen_passes_nothing_that_the_judge_refuses((step, a, b) in pair()) {
         let mut check = TrajectoryCheck::new(&config(), step, None);
         check = check.behind(1, a, Passed::default());
         let passed = check.screen.passes(&Steps::from(&a), &Steps::from(&b));
-        // The quick part also uses the first point. The exact part checks only the interval after this point.
+        // The quick part of the check also uses the first point. The exact part checks only the second point and the interval before it.
         prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
     }
 
-    /// An interval passes the quick part if and only if its whole hull is within the limits. In half of the cases the hull ends within one
-    /// step of a position limit.
+    /// An interval passes the quick part of the check if and only if its whole hull is within the limits. In half of the cases, the hull
+    /// ends within one step of a position limit.
     #[test]
     fn j36_the_screen_passes_what_has_its_hull_within_the_limits((step, a, b) in pair(), side in 0..4u8) {
         let (config, mut a, mut b) = (config(), a, b);
@@ -149,7 +150,7 @@ proptest! {
         }
         let passed = TrajectoryCheck::new(&config, step, None).screen.passes(&Steps::from(&a), &Steps::from(&b));
         let room = room(&config, step, &a, &b);
-        // In the last tenth of a step, the exact part decides.
+        // If the hull ends in the last tenth of a step before a limit, the exact part decides.
         let tenth = 0.11 * POSITION_STEP;
         let left = [tenth, tenth, tenth / (f64::from(step) / 1000.0) + 1e-5, 1e-4];
         prop_assert!(!passed || room.iter().all(|&r| r >= -1e-6), "{room:?} passed");
@@ -175,15 +176,15 @@ fn j36_each_limit_is_found_and_named() {
     };
     let at = |q, v, a| point(4, q, v, a);
     use Quantity::*;
-    // The lower and the upper position limit have different magnitudes.
+    // The lower and the upper position limit of a joint have different magnitudes.
     assert_eq!(check(at(-0.69, 0.0, 0.0), at(-0.71, 0.0, 0.0), 100), (1, Position, -0.7, 0.0));
     assert!(between(&config, 100, &at(0.69, 0.0, 0.0), &at(0.71, 0.0, 0.0)).is_ok());
     assert_eq!(check(at(1.29, 0.0, 0.0), at(1.31, 0.0, 0.0), 100), (1, Position, 1.3, 0.0));
     assert_eq!(check(at(0.0, 1.49, 0.0), at(0.015, 1.51, 0.0), 10), (1, Velocity, 1.5, 0.0));
     assert_eq!(check(at(0.0, -1.49, 0.0), at(-0.015, -1.51, 0.0), 10), (1, Velocity, -1.5, 0.0));
     assert_eq!(check(at(0.0, 0.0, 0.0), at(0.0, 0.0, -8.1), 10), (1, Acceleration, -8.0, 0.0));
-    // The next violations are between the points. The violations concern the upper position limit, the velocity limit in the velocity
-    // curve, and the velocity limit in the derivative of the position.
+    // The next violations lie between the points. The violations concern the upper position limit, and the velocity limit in the velocity
+    // curve and in the derivative of the position.
     let (point, quantity, limit, fraction) = check(at(1.25, 1.0, 0.0), at(1.25, -1.0, 0.0), 400);
     assert_eq!((point, quantity, limit), (0, Position, 1.3));
     assert!((0.2..0.8).contains(&fraction), "{fraction}");
@@ -229,7 +230,8 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     assert_eq!(inside_tables(&inside.speeds, &tables), Ok(()));
     let refused = with(high + 0.001).map_err(|v: Violation| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(refused, Err((2, 3, Quantity::FrictionVelocity, high)));
-    // The trajectory is loaded without a table. The later check against a table has the same result.
+    // The trajectory is loaded while the controller uses no friction table. The later check of the trajectory against a table has the same
+    // result.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, -0.4, low - 0.001, low - 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -237,7 +239,7 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     let later =
         inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
-    // The first of several equally fast points is reported, in both directions.
+    // The check reports the first of several equally fast points, in both directions.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, 0.4, high + 0.001, high + 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -247,20 +249,20 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, high)));
 }
 
-/// An accelerating path can be faster between its points than at its points. The check therefore uses the hull of the velocities.
+/// An accelerating joint can be faster between two points than at the points. The check therefore uses the hull of the velocity curve.
 #[test]
 fn j36_a_table_that_is_loaded_later_has_to_hold_what_lies_between_the_points() {
     let crate::Friction::Table(tables) = crate::Parameters::avena_friction_table() else {
         panic!("no table")
     };
     let (low, high) = friction::velocities(&tables[3]);
-    // At a control point, the acceleration adds a third of its effect within the step to the velocity.
+    // At a control point, the acceleration adds a third of the velocity change that it causes within the step.
     for (step, a) in [(100, 0.6), (300, 0.2)] {
         for (v, a) in [(high - 0.01, a), (high - 0.01, -a), (low + 0.01, -a), (low + 0.01, a)] {
             let later = |a: f64| {
                 let mut check = TrajectoryCheck::new(&config(), step, None);
                 for p in [point(3, 0.0, 0.0, 0.0), point(3, 0.0, v, a)] {
-                    // The motion may violate other limits, which this test ignores.
+                    // The motion may violate other limits, which do not matter in this test.
                     let _ = check.take(&p);
                 }
                 inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.limit))
@@ -298,8 +300,8 @@ fn j36_a_table_that_leaves_standstill_out_is_no_table_for_a_path() {
     assert_eq!((v.joint, v.quantity, v.value), (5, Quantity::FrictionVelocity, 0.0));
 }
 
-/// The friction model may change between two segments. When the path is executed, points that were loaded before are checked again,
-/// including standstill.
+/// The host may change the friction model between two segments. When the path is executed, the controller checks points that were loaded
+/// before again, including standstill.
 #[test]
 fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     let crate::Friction::Table(mut tables) = crate::Parameters::avena_friction_table() else {
@@ -308,7 +310,7 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     tables[5].velocity = core::array::from_fn(|i| 0.01 + 0.1 * i as f32);
     let moving = |q: f64| point(5, q, 0.2, 0.0);
     let check = TrajectoryCheck::new(&config(), 10, Some(&tables));
-    // The quick part uses velocities of both signs and does not accept this interval, so the exact part decides.
+    // The quick part of the check uses velocities of both signs and does not accept this interval, so the exact part decides.
     let mut check = check.behind(1, moving(0.0), Passed::default());
     assert_eq!(check.take(&moving(0.002)), Ok(()));
     let later = inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.joint, v.value));
@@ -317,7 +319,7 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
 
 #[test]
 fn j36_where_the_halvings_are_used_up_the_hull_decides() {
-    // The curve is a parabola with the maximum 0.5, whose hull reaches 1.
+    // The curve is a parabola with the maximum 0.5, but its hull reaches 1.
     let curve = [0.0, 1.0, 0.0];
     let mut many = HALVINGS;
     assert_eq!(leaves(curve, -1.0, 0.501, &mut many), None);
@@ -341,7 +343,7 @@ fn verdict(config: &Config, step_ms: u16, points: &[RawPoint]) -> Result<(), Vio
     check.end()
 }
 
-/// Returns a quintic of joint `j` from rest to rest, in `steps` steps.
+/// Returns a quintic motion of joint `j` from rest to rest, in `steps` steps.
 fn quintic(j: usize, from: f64, to: f64, step_ms: u16, steps: u32) -> Vec<RawPoint> {
     let seconds = f64::from(steps) * f64::from(step_ms) / 1000.0;
     (0..=steps)
@@ -355,7 +357,7 @@ fn quintic(j: usize, from: f64, to: f64, step_ms: u16, steps: u32) -> Vec<RawPoi
         .collect()
 }
 
-/// Returns times between points and numbers of steps that are sufficient for a distance of up to 0.5 rad within the limits.
+/// Returns a time between points and a number of steps that are sufficient for a distance of up to 0.5 rad within the limits.
 fn steps() -> impl Strategy<Value = (u16, u32)> {
     let step = prop::sample::select(&[1u16, 2, 7, 10, 40, 100, 300, 1000][..]);
     (step, 1.0..4.0f64).prop_map(|(step, seconds)| (step, (seconds * 1000.0 / f64::from(step)).ceil() as u32))
@@ -364,7 +366,8 @@ fn steps() -> impl Strategy<Value = (u16, u32)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
-    /// A path passes if it is within its limits before it is rounded to the wire format. The path may stay on a limit or end on a limit.
+    /// A path passes if it is within its limits before it is rounded to the wire format. A path that passes may stay on a limit or end on a
+    /// limit.
     #[test]
     fn j36_a_path_that_ends_on_a_limit_passes(
         (step, count) in steps(), limit in -2.0..2.0f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -383,7 +386,7 @@ proptest! {
         prop_assert_eq!(verdict(&config, step, &points), Ok(()));
     }
 
-    /// A joint outside its position limits may move back inside at any speed within the velocity limit, or stay at its position.
+    /// A joint outside its position limits may move back inside at any speed within the velocity limit, or may stay at its position.
     #[test]
     fn j36_a_path_that_begins_outside_and_goes_inwards_passes(
         (step, count) in steps(), out in 0.0..0.02f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -394,7 +397,7 @@ proptest! {
         prop_assert_eq!(verdict(&config(), step, &points), Ok(()), "{} to {}, step {} {}", from, to, step, count);
     }
 
-    /// A path that moves further out by more than rounding is refused, in any interval.
+    /// The check refuses a path that moves further out of the limits by more than rounding, in any interval.
     #[test]
     fn j36_a_path_that_begins_outside_comes_no_further_out(
         (step, count) in steps(), out in 0.002..0.02f64, more in 0.0003..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -402,7 +405,7 @@ proptest! {
     ) {
         let from = if up { 1.3 + out } else { -0.7 - out };
         let away = |way: f64| if up { from + way } else { from - way };
-        // The path moves inwards by a part of the distance, and then out again.
+        // The path moves inwards by a part of the distance to the limit, and then out again.
         let inner = -first * out;
         let mut points = quintic(joint, from, away(inner), step, count);
         points.extend(quintic(joint, away(inner), away(inner + more), step, count).into_iter().skip(1));
@@ -426,7 +429,7 @@ fn j36_the_tolerance_of_a_position_ends_with_its_step() {
                     .collect();
                 verdict(&config(), step, &[points[0], points[1], points[2]])
             };
-            // If all points of a path are at this position, they are outside by less than the start tolerance.
+            // A path whose points are all at this position is outside by less than the start tolerance.
             assert_eq!(at(last), Ok(()), "{step} ms");
             let from_inside = |raw: f64| {
                 between(&config(), step, &point(2, limit, 0.0, 0.0), &point(2, raw * POSITION_STEP, 0.0, 0.0))
@@ -436,7 +439,7 @@ fn j36_the_tolerance_of_a_position_ends_with_its_step() {
             assert_eq!(refused, Err((1, 2, Quantity::Position, limit)), "{step} ms");
         }
     }
-    // The tolerance is one position step (96 µrad). At 1 s between points, the effect of a velocity step adds 60 µrad.
+    // The tolerance is one position step (96 µrad). At 1 s between points, the effect of one velocity step adds 60 µrad.
     assert!((tolerance(1) - 96e-6).abs() < 1e-6 && (tolerance(1000) - 156e-6).abs() < 1e-6);
 }
 
@@ -446,7 +449,7 @@ fn j36_the_tolerance_ends_with_the_working_area_of_the_drives() {
     for joint in &mut config.joints {
         (joint.position_min, joint.position_max) = (-2.9905, 2.9905);
     }
-    // In the wire format, 2.99048 is the last position inside the limits, and 2.99058 is outside by less than one step.
+    // In the wire format, 2.99048 rad is the last position inside the limits, and 2.99058 rad is outside by less than one step.
     for (raw, inside) in [(31_191, true), (31_192, false)] {
         for sign in [1, -1] {
             for keeps in [true, false] {
@@ -479,7 +482,7 @@ fn j36_a_path_begins_outside_by_the_start_tolerance_at_most() {
 #[test]
 fn j36_a_path_that_has_come_inside_stays_there() {
     let config = config();
-    // The path moves from 10 mrad outside the limit to 10 mrad inside, and then back to its start position.
+    // The path moves from 10 mrad outside the limit to 10 mrad inside, and then back to its first position.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.31, 10, 150).into_iter().skip(1));
     let violation = verdict(&config, 10, &points).unwrap_err();
@@ -489,37 +492,39 @@ fn j36_a_path_that_has_come_inside_stays_there() {
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.extend(quintic(4, 1.29, 1.3, 10, 150).into_iter().skip(1));
     assert_eq!(verdict(&config, 10, &points), Ok(()));
-    // The allowance does not apply to a joint that was never outside.
+    // The allowance for a start outside the limits does not apply to a joint that was never outside.
     let mut points = quintic(4, 1.31, 1.29, 10, 150);
     points.last_mut().unwrap().position[3] = (1.301 / POSITION_STEP) as i16;
     let violation = verdict(&config, 10, &points).unwrap_err();
     assert_eq!((violation.joint, violation.quantity), (3, Quantity::Position));
 }
 
-/// The two points are outside the limits, but the second point is closer to the limit. The interval between the two points is also checked.
+/// The two points are outside the limits, and the second point is closer to the limit. The check also covers the interval between the two
+/// points.
 #[test]
 fn j36_between_two_points_a_path_comes_no_further_out_either() {
     let after = |step, a: RawPoint, b: RawPoint| {
         let mut check = TrajectoryCheck::new(&config(), step, None);
-        // The first point is not at rest, which this test ignores.
+        // The first point is not at rest, which does not matter in this test.
         let _ = check.take(&a);
         check.take(&b)
     };
     for (v0, v1) in [(0.4, -0.4), (-0.4, 0.4)] {
-        // In half a second the path moves out by 62 mrad in the middle of the interval.
+        // In half a second, the joint moves out by 62 mrad in the middle of the interval.
         let (a, b) = (point(1, 1.315, v0, 0.0), point(1, 1.31, v1, 0.0));
         let violation = after(500, a, b).unwrap_err();
         assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, 1.3));
         assert!(violation.value > 1.3 && violation.fraction > 0.0, "{violation:?}");
     }
-    // The two points are outside and the middle is inside the limits, so the path moves out again.
+    // The two points are outside and the middle of the interval is inside the limits, so the joint moves out again.
     let (a, b) = (point(1, 1.302, -0.05, 0.0), point(1, 1.301, 0.05, 0.0));
     assert!(after(400, a, b).is_err());
     let (a, b) = (point(1, 1.302, -0.005, 0.0), point(1, 1.301, 0.0, 0.0));
     assert_eq!(after(400, a, b), Ok(()));
 }
 
-/// Segments are checked one after another. The state after the first segment follows from the last point of this segment.
+/// The check of a path continues from segment to segment. After the first segment, the last point of this segment shows whether the joint
+/// is outside.
 #[test]
 fn j36_a_path_from_outside_goes_on_in_the_next_segment() {
     let config = config();

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 const FREE: Bounds = (f64::NEG_INFINITY, f64::INFINITY);
 
-/// Runs one tick with bounds ±`easy` and ±`full`.
+/// Executes one tick with the bounds ±`easy` and ±`full`.
 fn tick(clock: &mut PathClock, easy: f64, full: f64) {
     clock.advance(1e9);
     if clock.halting() {
@@ -15,7 +15,7 @@ fn tick(clock: &mut PathClock, easy: f64, full: f64) {
     }
 }
 
-/// Returns the ticks from full speed to standstill. `bounds` returns the bounds of each tick.
+/// Returns the number of ticks from full speed to standstill. `bounds` returns the bounds of each tick.
 fn stop(mut bounds: impl FnMut(u32, &PathClock) -> SlopeBounds) -> u32 {
     let mut clock = PathClock::start(1.0);
     clock.halt();
@@ -55,17 +55,17 @@ fn j33_a_ramp_takes_its_length() {
 
 #[test]
 fn j33_margins_give_way_before_a_stop_comes_late() {
-    // The margins allow no slope or only a small slope, but the torque limits allow a sufficient slope.
+    // The bounds with margins allow no slope or only a small slope, but the torque limits allow a sufficient slope.
     for easy in [(0.0, 0.0), (1.0, -1.0), (0.5, 1.0), (-0.3, FREE.1)] {
         for most in [2.6, 4.0, 10.0, f64::INFINITY] {
             let ticks = stop(|_, _| SlopeBounds { easy, full: (-most, most) });
             assert!(ticks <= 480, "{ticks} ms with {easy:?} and {most}");
         }
     }
-    // A stop is also in time if the bounds shrink after half of the ramp.
+    // A stop also ends before its time limit if the bounds shrink after half of the ramp.
     let ticks = stop(|ms, _| SlopeBounds { easy: if ms < 100 { FREE } else { (0.0, 0.0) }, full: FREE });
     assert!(ticks <= 350, "{ticks}");
-    // A stop within its margins is not hurried.
+    // A stop along a ramp within the bounds is not hurried.
     let ticks = stop(|_, clock| {
         assert!(!clock.hurried);
         SlopeBounds { easy: (-4.5, 4.5), full: FREE }
@@ -95,7 +95,7 @@ fn j33_a_stop_uses_all_the_torque_but_no_more() {
 fn j33_time_for_a_stop_runs_from_the_first_one() {
     let mut clock = PathClock::start(1.0);
     for ms in 0..480 {
-        // The stop is requested again and again.
+        // The stop is requested in each tick.
         clock.halt();
         tick(&mut clock, 0.0, 2.8);
         if clock.standing() {
@@ -113,17 +113,18 @@ fn j33_each_tick_of_a_stop() {
     let on_time = 0.001 * (PUNCTUAL * 500.0);
     for (rate, slope, easy, full, expected) in [
         (1.0, 0.0, FREE, FREE, -rounded),
-        // Bounds with margins that allow only one slope, which is larger than needed, or contradict each other, or allow no slope.
+        // The bounds with margins allow only one slope, which is larger than needed. In other cases, the bounds contradict each other or
+        // allow no slope.
         (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
         (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
         (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
-        // The stop is within its margins and just in time, so the stop is not hurried.
+        // A stop within its bounds that just keeps its time limit is not hurried.
         (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
-        // At full speed, path time does not become faster for any motion of the arm.
+        // At full speed, path time does not become faster, for any motion of the arm.
         (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
         // In the last step, path time is at rest and does not slow down any further.
         (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
-        // The remaining rate is considered zero, although the limits do not allow any slope.
+        // The remaining rate counts as zero, although the bounds do not allow any slope.
         (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
     ] {
         let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
@@ -137,20 +138,20 @@ fn j33_each_tick_of_a_stop() {
     }
 }
 
-/// If a stop must end earlier than a ramp would, the ramp is shortened.
+/// If a stop must end earlier than the ramp, its ramp is shortened.
 #[test]
 fn j33_a_stop_sooner_than_the_ramp_shortens_the_ramp() {
     let mut clock = PathClock::start(1.0);
     clock.halt();
     let free = SlopeBounds { easy: FREE, full: FREE };
     clock.slow_down(1_000.0, 500.0, &free);
-    // The S-shaped ramp takes 400 ms.
+    // The S-shaped ramp is shortened to 400 ms.
     assert!((clock.slope + 4.5 / 0.16 * DT).abs() < 1e-12, "{clock:?}");
 }
 
 proptest! {
-    /// The path is paused at any time, also during a resume. The rate stays within 0..1, does not move in the wrong direction for long, and
-    /// has no step. The slope is the derivative of the rate. Each pause ends in time.
+    /// The test pauses the path at any time, also during a resume. The rate stays within 0..1, does not move in the wrong direction for
+    /// long, and has no step. The slope is the derivative of the rate. Each pause ends before its time limit.
     #[test]
     fn j33_the_ramp_is_smooth(
         pauses in prop::collection::vec(1..400u32, 1..8),
@@ -192,7 +193,7 @@ fn j33_each_tick_of_a_resume() {
     for (rate, slope, bounds, expected) in [
         (0.0, 0.0, FREE, rounded),
         (0.5, -1.0, FREE, -1.0 + 8.0 * rounded),
-        // The bounds allow only one slope, contradict each other, or allow only the opposite direction.
+        // The bounds allow only one slope. In other cases, the bounds contradict each other or allow only the opposite direction.
         (0.5, 5.0, (2.0, 2.0), 2.0),
         (0.5, 5.0, (2.0, 1.0), 0.0),
         (0.5, 5.0, (-2.0, -1.0), 0.0),
@@ -210,7 +211,7 @@ fn j33_each_tick_of_a_resume() {
 /// When a tick covers the remaining change of the rate, path time is at full speed and its slope is zero.
 #[test]
 fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
-    // A remaining change that is not affected by rounding, and the slope that is just sufficient for this change.
+    // `rest` is a remaining change without a rounding error, and `enough` is the slope that is just sufficient for it.
     let rest = 1.0 / 16_384.0;
     let enough = rest / DT;
     assert_eq!(enough * DT, rest);
@@ -218,7 +219,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
         (rest, enough, true),
         (rest, 0.99 * enough, false),
         (rest, FREE.1, true),
-        // The remaining change is so small that the bounds do not hold it back.
+        // The remaining change of the rate is so small that the bounds do not apply.
         (0.9e-9, 0.0, true),
         (1.1e-9, 0.0, false),
     ] {
@@ -232,7 +233,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
 fn j33_the_rest_of_the_way_flattens_the_slope_out() {
     let ramp = Ramp::of(200.0);
     for ticks in [1.0, 2.0, 7.0, 40.0] {
-        // Sum of a slope that falls from `ticks` times the change per tick to one time the change per tick.
+        // `way` is the sum of a slope that falls from `ticks` times the change per tick to one time this change.
         let way = ramp.round * DT * ticks * (ticks + 1.0) / 2.0;
         assert!((ramp.flatten(way) - ticks * ramp.round).abs() < 1e-9, "{ticks}");
     }
@@ -261,15 +262,15 @@ fn j33_a_rate_below_a_billionth_is_standstill() {
     for (rate, stands) in [(1.01e-9, false), (1e-9, false), (0.99e-9, true)] {
         let mut clock = PathClock { rate, target: 1.0, ..PathClock::default() };
         clock.halt();
-        // The limits do not allow any slope for the remaining rate.
+        // The bounds do not allow any slope for the remaining rate.
         clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (0.0, 0.0), full: (0.0, 0.0) });
         assert_eq!(clock.standing(), stands, "{clock:?}");
     }
 }
 
 proptest! {
-    /// For any speeds at any times, path time reaches the requested speed by itself. The rate stays within the target rates so far, and the
-    /// slope never steps.
+    /// Path time reaches each requested speed, for any sequence of speeds. The rate stays within the range of the targets so far, and the
+    /// slope never has a step.
     #[test]
     fn j57_path_time_gets_to_every_speed_along_the_ramp(
         start in 0.05..1.0f64,
@@ -286,7 +287,7 @@ proptest! {
                 if clock.ramping() {
                     clock.change_pace(200.0, FREE);
                 }
-                // The rate stays within the targets so far, except for the change that removes a slope.
+                // The rate stays within the range of the targets so far, except for the change that removes a slope.
                 let (least, most) = wanted.iter().fold((1.0f64, 0.0f64), |(l, m), w| (l.min(*w), m.max(*w)));
                 prop_assert!(clock.rate >= least - 1e-9 && clock.rate <= most + 1e-9, "{clock:?}");
                 prop_assert!((clock.slope - before.slope).abs() <= REVERSAL * round + 1e-9, "{before:?} {clock:?}");
@@ -298,7 +299,7 @@ proptest! {
     }
 }
 
-/// A pause is not ended by a new speed. From a lower speed, the pause does not take longer.
+/// A new speed does not end a pause. A pause that begins at a lower speed does not take longer than a pause from full speed.
 #[test]
 fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
     let mut clock = PathClock::start(0.5);

@@ -30,7 +30,7 @@ fn tick(joint: &mut TaughtJoint, position: f64, velocity: f64) -> TaughtTorque {
     tick_of(joint, &limits(), position, velocity)
 }
 
-/// Moves a joint at `velocity` (rad/s) around 0 for a second, and returns its last torque.
+/// Moves a joint at `velocity` (rad/s) through 0 for a second, and returns its last torque.
 fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
     let mut joint = begun(-velocity, coulomb);
     let mut torque = TaughtTorque::default();
@@ -41,8 +41,8 @@ fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
 }
 
 proptest! {
-    /// Together with the damping, the friction compensation and the dry friction never drive a joint. The torque against the motion never
-    /// decreases with the speed.
+    /// Together with the damping, the friction compensation and the dry friction never drive a joint. The total torque against the motion
+    /// never decreases with the speed.
     #[test]
     fn j25_the_faster_a_joint_is_the_more_torque_it_has_against_it(
         slow in 0.001..1.4f64, more in 0.001..0.3f64, coulomb in 0.0..10.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)],
@@ -60,7 +60,7 @@ proptest! {
         let limits = JointConfig { teach_damping: damping, rotor_inertia: 0.05, ..limits() };
         let mut joint = begun(0.0, 0.0);
         joint.set_inertia(inertia);
-        // This speed is too high for dry friction, and too low for increased damping.
+        // The test begins without dry friction. At 0.39 rad/s, the damping is not increased yet.
         joint.grip = 0.0;
         let torque = tick_of(&mut joint, &limits, 0.0, 0.39).brake;
         let expected = damping.min(90.0 * inertia) * 0.39;
@@ -75,7 +75,7 @@ fn j25_a_joint_at_rest_is_held_by_dry_friction_up_to_its_breakaway_torque() {
         let mut joint = begun(0.2, coulomb);
         let at_rest = tick(&mut joint, 0.2, 0.0);
         assert!(at_rest.brake.abs() < 1e-3 && at_rest.friction == 0.0, "no step at the begin");
-        // A joint that is pulled slowly slips, and is then held at its new position.
+        // A joint that is pulled slowly slips, and the dry friction then holds it at its new position.
         let slips = tick(&mut joint, 0.25, 0.0).brake;
         assert!((slips + breakaway).abs() < 1e-3, "{slips} N·m, not {breakaway}");
         let back = tick(&mut joint, 0.2, 0.0).brake;
@@ -100,8 +100,8 @@ fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
     assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
 }
 
-/// The compensation is half of the Coulomb friction, smoothed within 0.1 rad/s, and zero above 0.6 rad/s. This share is lower if the
-/// damping does not allow the slope of the compensation.
+/// The friction compensation is half of the Coulomb friction, smoothed within 0.1 rad/s, and zero above 0.6 rad/s. The compensation is
+/// lower if the damping does not allow its slope.
 #[test]
 fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
     for (velocity, share) in
@@ -125,13 +125,14 @@ fn j25_at_a_soft_end_a_joint_is_pushed_back_and_one_that_begins_there_is_not() {
         let torque = tick(&mut joint, position, 0.0).brake;
         assert!((torque + part * share).abs() < 1e-3, "{torque} N·m at {position} rad");
     }
-    // A joint that begins inside the soft end, or beyond the limit, is not moved. If the joint moves further outwards, the spring acts.
+    // If Teaching begins with a joint inside its soft end, or beyond its position limit, the spring does not move the joint. If a joint
+    // that began in its soft end moves further outwards, the spring acts.
     for (found, further) in [(1.45, 1.5), (1.7, 1.75), (-1.45, -1.5)] {
         let mut joint = begun(found, 8.0);
         assert!(tick(&mut joint, found, 0.0).brake.abs() < 1e-3, "{found}");
         let torque = tick(&mut joint, further, 0.0).brake;
         assert!((torque + 0.5 * share * f64::signum(found)).abs() < 1e-3, "{torque} N·m at {further} rad");
-        // After the joint was led inwards and outwards again, the spring acts from the start of the soft end.
+        // After a hand has moved this joint inwards and outwards again, the spring acts from the start of the soft end.
         tick(&mut joint, 0.0, 0.0);
         let torque = tick(&mut joint, 1.45, 0.0).brake;
         assert!((torque + 0.5 * share).abs() < 1e-3, "{torque} N·m");

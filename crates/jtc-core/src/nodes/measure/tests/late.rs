@@ -1,4 +1,4 @@
-//! Tests of late answers, and of lost answers among late answers (J-63).
+//! Tests of late answers, and of lost answers between late answers (J-63).
 use std::vec::Vec;
 
 use proptest::prelude::*;
@@ -8,23 +8,23 @@ use super::*;
 /// Resolution of the encoders, rad.
 const ENCODER: f64 = 96e-6;
 
-/// Joint that moves to and fro.
+/// Joint that moves back and forth.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
-    /// Amplitude, rad.
+    /// Amplitude of the motion, rad.
     amplitude: f64,
-    /// Angular frequency, 1/s.
+    /// Angular frequency of the motion, 1/s.
     rate: f64,
-    /// Commanded share of the motion. The remaining motion is not commanded.
+    /// Share of the motion that is commanded. The remaining motion has an external cause.
     commanded: f64,
 }
 
-/// Difference between the used values and the real position and speed of the joint in one millisecond.
+/// Difference between the values that the control law uses and the real motion of the joint, in one millisecond.
 #[derive(Clone, Copy, Debug)]
 struct Off {
-    /// Position, rad.
+    /// Difference of the position, rad.
     position: f64,
-    /// Velocity, rad/s.
+    /// Difference of the velocity, rad/s.
     velocity: f64,
 }
 
@@ -37,7 +37,7 @@ impl Motion {
         self.amplitude * self.rate * (self.rate * ms * DT).cos()
     }
 
-    /// Returns the highest speed, rad/s.
+    /// Returns the highest speed of the motion, rad/s.
     fn speed(&self) -> f64 {
         self.amplitude * self.rate
     }
@@ -51,7 +51,7 @@ impl Motion {
         }
     }
 
-    /// Runs all milliseconds. `came` contains the numbers of the answers in each millisecond.
+    /// Executes all milliseconds of the test. `came` contains the numbers of the answers that arrive in each millisecond.
     fn off(&self, came: &[Vec<u32>]) -> Vec<Off> {
         self.off_with(came, &Config::avena())
     }
@@ -85,8 +85,8 @@ impl Motion {
     }
 }
 
-/// Returns the numbers of the answers that come in each millisecond. `late` is the lateness of each answer. The answers keep their order.
-/// `lost` marks answers that never come.
+/// Returns the numbers of the answers that arrive in each millisecond. `late` is the lateness of each answer. The order of the answers does
+/// not change. `lost` marks answers that never arrive.
 fn arrivals(late: &[u32], lost: &[u32]) -> Vec<Vec<u32>> {
     let mut came = std::vec![Vec::new(); late.len()];
     let mut last = 0;
@@ -104,8 +104,8 @@ fn most(off: &[Off]) -> f64 {
     off.iter().fold(0.0, |most, off| most.max(off.position.abs()))
 }
 
-/// Returns the lateness of each answer. Twenty answers come in time, then a burst shows the highest lateness, and after that any lateness
-/// may occur. In every 24th tick, no answer is outstanding.
+/// Returns the lateness of each answer. The first twenty answers are on time, then a burst shows the highest lateness, and after the burst
+/// any lateness may occur. In every 24th tick, no answer is outstanding.
 fn lateness(most: u32) -> impl Strategy<Value = Vec<u32>> {
     let burst = (0..=20).map(|_| 0).chain((0..=most).rev());
     let burst: Vec<u32> = burst.collect();
@@ -126,8 +126,8 @@ fn motion() -> impl Strategy<Value = Motion> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// When late answers have been detected, the position from a late answer differs from the real position only by encoder steps and by
-    /// the error of the predicted rate. If the answer were used as if it came in time, the error would be its lateness times the speed, 3
+    /// After the burst, the position from a late answer differs from the real position only by encoder steps and by the error of the
+    /// predicted rate. If the controller used a late answer like an answer on time, the error would be the lateness times the speed, 3
     /// mrad.
     #[test]
     fn j63_late_answers_are_used_as_of_the_time_at_which_they_were_due(
@@ -135,12 +135,12 @@ proptest! {
         late in (1u32..=5).prop_flat_map(lateness),
     ) {
         let off = motion.off(&arrivals(&late, &[]));
-        // The differences during the burst have been bridged, and fade.
+        // The differences during the burst have been bridged, and they fade.
         prop_assert!(most(&off[300..]) <= 4.0 * ENCODER, "{} rad", most(&off[300..]));
     }
 
-    /// The velocity of a joint that follows its command is the velocity in its late answer, plus the change of the commanded velocity
-    /// since.
+    /// If a joint follows its command, the used velocity is the velocity in the late answer plus the later change of the commanded
+    /// velocity.
     #[test]
     fn j63_late_velocities_are_taken_on_by_what_was_commanded(motion in motion(), late in lateness(3)) {
         let motion = Motion { commanded: 1.0, ..motion };
@@ -149,15 +149,16 @@ proptest! {
         }
     }
 
-    /// For any number of lost answers among the late answers, the position error has an upper bound. The bound is the distance in the
-    /// highest lateness, plus the equally large difference that is bridged when the loss is detected. No part of the error remains.
+    /// The position error has an upper bound, however many answers between the late answers are lost. The bound is twice the distance that
+    /// the joint moves in the highest lateness. Half of the bound is the difference that is bridged when the loss is detected. After the
+    /// loss, no part of this error remains.
     #[test]
     fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
         motion in motion(),
         late in lateness(3),
         lost in prop::collection::vec(30u32..300, 0..20),
     ) {
-        // No answer is late at the end, but the lost answers are also detected there.
+        // No answer is late at the end of the test, but the controller detects lost answers also in this part.
         let late: Vec<u32> = late.iter().enumerate().map(|(n, late)| if n < 400 { *late } else { 0 }).collect();
         let off = motion.off(&arrivals(&late, &lost));
         let way = 4.0 * motion.speed() * DT;
@@ -166,8 +167,8 @@ proptest! {
     }
 }
 
-/// The answer of a fast joint after a lost answer is at the predicted position, and does not lag by the distance of a millisecond. So the
-/// lost answer is detected before the window ends.
+/// After a lost answer, the next answer of a fast joint is at the predicted position, and does not lag by the distance of a millisecond.
+/// The controller therefore detects the lost answer before the window ends.
 #[test]
 fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -177,7 +178,7 @@ fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
 }
 
-/// Late answers before the first evidence do not cause a step, because the difference is bridged and fades.
+/// Late answers before the first evidence do not cause a step, because their difference from the prediction is bridged and fades.
 #[test]
 fn j63_the_first_late_answers_make_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -190,7 +191,7 @@ fn j63_the_first_late_answers_make_no_step() {
     }
 }
 
-/// When late answers have been detected, a change of the lateness does not cause a step, even with a coarse configured encoder step.
+/// After the burst, a change of the lateness does not cause a step, even with a coarse configured encoder step.
 #[test]
 fn j63_a_lateness_that_shifts_makes_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -207,8 +208,8 @@ fn j63_a_lateness_that_shifts_makes_no_step() {
     }
 }
 
-/// A constant delay is not detected. The setting `delay_ticks` accounts for a constant delay. If all answers have the same lateness, the
-/// position follows them without a permanent offset.
+/// The controller does not detect a constant delay of all answers. The setting `delay_ticks` accounts for a constant delay. If all answers
+/// have the same lateness, the used position follows these answers without a permanent offset.
 #[test]
 fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -222,7 +223,7 @@ fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     }
 }
 
-/// If answers leave their prediction and return to it in small steps, the bridged differences do not add up.
+/// If answers leave their predictions and return to them in small steps, the bridged differences do not add up.
 #[test]
 fn j63_what_was_bridged_is_taken_back() {
     let mut joint = moving(0.0);
@@ -241,7 +242,7 @@ fn j63_what_was_bridged_is_taken_back() {
     }
 }
 
-/// The remainder changes towards zero, but not beyond zero.
+/// The remaining offset changes towards zero, but not beyond zero.
 #[test]
 fn j63_only_what_is_left_is_taken_back() {
     for (left, by, remains) in [

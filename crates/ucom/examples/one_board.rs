@@ -1,6 +1,7 @@
-//! Runs a board on an in-memory bus: reset, number, start, control loop, and the reaction when the PC stops sending.
+//! Runs a simulated board on an in-memory bus: reset, number, start, control loop, and the reaction of the board when the PC stops sending.
 //!
-//! `cargo run -p ucom --example one_board` prints the frames with their times. `<` marks the PC, `>` marks the board.
+//! `cargo run -p ucom --example one_board` prints the frames with their times. In the output, `<` marks frames of the PC, and `>` marks
+//! frames of the board.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Admin, Frame, Profile, Sequence, ToBoard};
@@ -10,7 +11,7 @@ fn main() {
     let profile = Profile::default();
     let number = Sequence::new(1).expect("1 is at most 31");
 
-    // A board consists of the state machine and four hardware parts. In this example, the hardware parts are simulated in memory.
+    // A board consists of a state machine and four hardware parts. In this example, the hardware parts are simulated in memory.
     let mut flash = MemoryFlash::default();
     flash.install(Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 }, &[0; 8]);
     let pins = WirePins::chain(1).remove(0);
@@ -38,7 +39,7 @@ fn main() {
     println!("status: {}", board.status());
 }
 
-/// Advances the time until `end`, from one action of the board to the next.
+/// Advances the time until `end`, from one action of the board to the next action.
 fn pass(
     board: &mut Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>,
     mut now_us: u64,

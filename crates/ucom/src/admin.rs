@@ -1,30 +1,31 @@
-//! Four flags of MCA_ADMIN_DATA (D-37).
+//! Four flags in the frame MCA_ADMIN_DATA (D-37).
 
 use core::fmt;
 
 use crate::frame::Payload;
 
-/// Flags of the addressed board.
+/// Flags of one board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Admin {
-    /// The control loop runs.
+    /// `true` if the control loop of the board runs.
     pub run: bool,
-    /// Outputs are enabled; never without `run`.
+    /// `true` if the outputs of the board are enabled; never `true` without `run`.
     pub active: bool,
-    /// The module sends its texts.
+    /// `true` if the module sends its texts.
     pub debug: bool,
-    /// All texts of the board are sent.
+    /// `true` if all texts of the board are sent.
     pub global_debug: bool,
 }
 
 impl Admin {
-    /// Returns the four bytes of the frame.
+    /// Returns the four data bytes of MCA_ADMIN_DATA.
     pub const fn payload(self) -> Payload {
         let data = [self.run as u8, self.active as u8, self.debug as u8, self.global_debug as u8, 0, 0, 0, 0];
         Payload::of(data, 4)
     }
 
-    /// Reads the four bytes of the frame. Returns `None` if a byte is not 0 or 1. The receiver ignores a frame with such a byte.
+    /// Reads the four data bytes of MCA_ADMIN_DATA. Returns `None` if a byte is not 0 or 1. The receiver ignores a frame that contains such
+    /// a byte.
     pub const fn from_bytes(bytes: [u8; 4]) -> Option<Self> {
         if bytes[0] > 1 || bytes[1] > 1 || bytes[2] > 1 || bytes[3] > 1 {
             return None;

@@ -1,25 +1,25 @@
-//! Buffers of words (CI, SO, PAR) in packages of three (D-15).
+//! Buffers of words (CI, SO, PAR), which are sent in packages of three words (D-15).
 
 use crate::frame::Payload;
 use crate::profile::Endian;
 
-/// Package of up to three words, beginning at an offset.
+/// Package of up to three words of a buffer, beginning at an offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BufferPackage {
     /// Index of the first word in the buffer.
     pub offset: u16,
-    /// Number of valid `words`, 1..3.
+    /// Number of valid words in `words`, 1..3.
     pub count: u8,
-    /// The words. Only the first `count` words are valid; the other words are 0.
+    /// Words of the package. Only the first `count` words are valid; the other words are 0.
     pub words: [u16; 3],
 }
 
 /// Package that starts at or beyond the end of its buffer (DSP_ERROR 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BeyondBuffer {
-    /// First word of the package.
+    /// Index of the first word of the package.
     pub offset: u16,
-    /// Words in the buffer.
+    /// Number of words in the buffer.
     pub dimension: usize,
 }
 
@@ -31,7 +31,7 @@ impl core::fmt::Display for BeyondBuffer {
 
 impl core::error::Error for BeyondBuffer {}
 
-/// Returns the number of packages of a complete transfer: `ceil(dimension / 3)`.
+/// Returns the number of packages that transfer a complete buffer: `ceil(dimension / 3)`.
 pub const fn package_count(dimension: u16) -> u16 {
     dimension.div_ceil(3)
 }
@@ -47,7 +47,8 @@ impl BufferPackage {
         (package.count > 0).then_some(package)
     }
 
-    /// Returns the payload. Unused words are sent as 0. With `short_last` (key `pd.short_last`) only the valid words are sent.
+    /// Returns the payload of the frame that carries the package. Unused words are sent as 0. With `short_last` (key `pd.short_last`), only
+    /// the valid words are sent.
     pub fn payload(&self, endian: Endian, short_last: bool) -> Payload {
         let mut data = [0; 8];
         let words = self.words.iter().take(usize::from(self.count));
@@ -58,7 +59,7 @@ impl BufferPackage {
         Payload::of(data, len)
     }
 
-    /// Reads a package. Returns `None` unless the payload has 4, 6 or 8 bytes.
+    /// Reads a package from the payload of a frame. Returns `None` unless the payload has 4, 6 or 8 bytes.
     pub fn parse(payload: &Payload, endian: Endian) -> Option<Self> {
         let len = payload.len();
         if !matches!(len, 4 | 6 | 8) {
@@ -69,8 +70,8 @@ impl BufferPackage {
         Some(Self { offset: endian.word([o0, o1]), count: (len - 2) / 2, words })
     }
 
-    /// Copies the words into a buffer and returns how many were copied. Words at or beyond the buffer's end are ignored. A package that
-    /// starts at or beyond the end is refused.
+    /// Copies the words of the package into a buffer and returns the number of copied words. Words at or beyond the end of the buffer are
+    /// ignored. A package that starts at or beyond the end of the buffer is refused.
     pub fn apply(&self, buffer: &mut [u16]) -> Result<usize, BeyondBuffer> {
         let dimension = buffer.len();
         let beyond = BeyondBuffer { offset: self.offset, dimension };
@@ -89,7 +90,7 @@ impl BufferPackage {
     }
 }
 
-/// Packages of a whole buffer, with offsets 0, 3, 6 and so on.
+/// Packages of a complete buffer, with offsets 0, 3, 6 and so on.
 #[derive(Clone, Debug)]
 pub struct Packages<'a> {
     buffer: &'a [u16],
@@ -97,7 +98,7 @@ pub struct Packages<'a> {
 }
 
 impl<'a> Packages<'a> {
-    /// Creates the packages of a buffer. Words after the 65 536th word have no offset and are omitted.
+    /// Creates the packages of a buffer. Words of the buffer after the 65 536th word have no offset and are omitted.
     pub const fn new(buffer: &'a [u16]) -> Self {
         Self { buffer, next: Some(0) }
     }
@@ -120,7 +121,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// C-5: tests dimensions 0 to 7 and the highest offsets.
+    /// C-5: the test covers dimensions 0 to 7 and the highest offsets.
     #[test]
     fn d15_c5_packages_of_a_buffer() {
         for dimension in [0u16, 1, 2, 3, 4, 6, 7, 65535] {
@@ -174,7 +175,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-15: a package is decoded as it was sent, and a word outside the buffer is never changed.
+        /// D-15: a package is decoded with the values that were sent, and a word outside the buffer is never changed.
         #[test]
         fn d15_round_trip(offset: u16, count in 1..=3u8, mut words: [u16; 3], big: bool, size in 0..9usize) {
             words[usize::from(count)..].fill(0);

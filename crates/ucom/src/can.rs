@@ -1,4 +1,5 @@
-//! Conversion of frames of a HAL's CAN driver, for any type that implements the trait of `embedded-can`.
+//! Conversion of CAN frames between this crate and the CAN driver of a HAL. The driver's frame type must implement the trait of
+//! `embedded-can`.
 
 use embedded_can::{Id, StandardId};
 
@@ -6,10 +7,10 @@ use crate::foreign::Foreign;
 use crate::frame::{Format, Frame};
 
 impl Frame {
-    /// Creates a frame from a driver's frame.
+    /// Creates a frame of this protocol from a driver's frame.
     ///
     /// # Errors
-    /// Reason why the frame is not of this protocol (D-02).
+    /// Returns the reason why the frame is not of this protocol (D-02).
     pub fn from_can(frame: &impl embedded_can::Frame) -> Result<Self, Foreign> {
         let (id, extended) = match frame.id() {
             Id::Standard(id) => (u32::from(id.as_raw()), false),
@@ -18,7 +19,7 @@ impl Frame {
         Self::received(id, Format { extended, remote: frame.is_remote_frame(), ..Format::BUS }, frame.data())
     }
 
-    /// Returns the frame for a driver to send; `None` if the driver's type refuses it.
+    /// Returns the frame for a driver to send; returns `None` if the driver's type refuses the frame.
     pub fn to_can<F: embedded_can::Frame>(&self) -> Option<F> {
         F::new(StandardId::new(self.id())?, self.data())
     }

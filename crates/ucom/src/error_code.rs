@@ -1,20 +1,21 @@
-//! Error codes of DSP_ERROR: meaning for the board and reaction of the PC.
+//! Error codes of DSP_ERROR, with the meaning for the board and the reaction of the PC.
 
 use core::fmt;
 
-/// Declares the published codes. Each code has a number, a name, one sentence for its meaning and one sentence for the reaction.
+/// Declares the published error codes. Each error code has a number, a name, one sentence for its meaning and one sentence for the reaction
+/// of the PC.
 macro_rules! error_codes {
     ($($(#[$doc:meta])* $code:ident = $number:literal, $name:literal: $meaning:literal, $reaction:literal;)+) => {
-        /// Code in DSP_ERROR.
+        /// Error code in DSP_ERROR.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ErrorCode {
             $($(#[$doc])* $code,)+
-            /// Code that is not in the published list. The code is shown as a number and never discarded.
+            /// Error code that is not in the published list. Such a code is shown as a number and never discarded.
             Unknown(u8),
         }
 
         impl ErrorCode {
-            /// Codes of the published list.
+            /// Error codes of the published list.
             pub const ALL: [Self; [$($number),+].len()] = [$(Self::$code),+];
 
             /// Returns the error code with this number.
@@ -25,7 +26,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the number on the wire.
+            /// Returns the number of the error code in a frame.
             pub const fn number(self) -> u8 {
                 match self {
                     $(Self::$code => $number,)+
@@ -33,7 +34,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the published name of the code.
+            /// Returns the published name of the error code.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$code => $name,)+
@@ -41,7 +42,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the meaning of the code as one sentence.
+            /// Returns the meaning of the error code as one sentence.
             pub const fn meaning(self) -> &'static str {
                 match self {
                     $(Self::$code => $meaning,)+
@@ -49,7 +50,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the recommended reaction as one sentence.
+            /// Returns the recommended reaction of the PC as one sentence.
             pub const fn reaction(self) -> &'static str {
                 match self {
                     $(Self::$code => $reaction,)+
@@ -71,7 +72,7 @@ error_codes! {
     MemProtected = 2, "DSP_ERROR_MEM_PROTECTED":
         "Programming is not enabled, the image lies outside the application area, or it is for another board.",
         "Check board and image. Sending the image again does not help.";
-    /// 3: erasing, writing or verifying flash failed.
+    /// 3: erasing, writing or verifying the flash failed.
     Flash = 3, "DSP_ERROR_FLASH":
         "The board could not erase, write or verify its flash memory.",
         "Send the image again. After three failed attempts the hardware is faulty.";
@@ -83,7 +84,7 @@ error_codes! {
     Data = 5, "DSP_ERROR_DATA":
         "The header of the image is invalid, or controller inputs or parameters were sent beyond the last one.",
         "In an update, check the image header. Otherwise compare dimensions and endian of the profile.";
-    /// 6: frames could not be sent.
+    /// 6: the board could not send frames.
     CanTransmit = 6, "DSP_ERROR_CAN_TRANSMIT":
         "The board could not send its frames for a while.",
         "Check cable, termination and bus load.";
@@ -91,15 +92,15 @@ error_codes! {
     CanReceive = 7, "DSP_ERROR_CAN_RECEIVE":
         "A message was too short or had a wrong length.",
         "Another profile may fit this board: see `ucom probe`.";
-    /// 8: the receive buffer of the CAN controller overran.
+    /// 8: the receive buffer of the CAN controller overflowed.
     CanOverrun = 8, "DSP_ERROR_CAN_OVERRUN":
         "The receive buffer of the board's CAN controller overran: frames were lost.",
         "Send the image again with a larger prog.frame_gap_us.";
-    /// 9: the previous PC_INIT was not acknowledged yet.
+    /// 9: the board has not acknowledged the previous PC_INIT yet.
     Reinit = 9, "DSP_ERROR_REINIT":
         "The board received a number before it had sent the acknowledgement of the previous number.",
         "Wait 100 ms, send PC_INFO, then continue.";
-    /// 10: a cycle was interrupted, came in the wrong order or differed from the first cycle.
+    /// 10: a programming cycle was interrupted, came in the wrong order or differed from the first cycle.
     ExloadCycle = 10, "DSP_ERROR_EXLOAD_CYCLE":
         "The transfer paused too long, was out of order, or the second cycle differed from the first.",
         "Send the image again. Stop after three attempts.";
@@ -109,7 +110,7 @@ error_codes! {
         "Program the board first: `ucom update`.";
 }
 
-/// Prints number and name, such as `5 DSP_ERROR_DATA` or `42 unknown error`.
+/// Prints number and name of the error code, such as `5 DSP_ERROR_DATA` or `42 unknown error`.
 impl fmt::Display for ErrorCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.number(), self.name())

@@ -1,22 +1,21 @@
-//! Frames that do not belong to the UCoM protocol.
+//! CAN frames that do not belong to the UCoM protocol.
 
 use core::fmt;
 
-/// Reasons why a frame does not belong to the UCoM protocol. A foreign frame is counted and shown, but has no effect
-/// (D-02).
+/// Reasons why a frame does not belong to the UCoM protocol. Receivers count and show a foreign frame, but the frame has no effect (D-02).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
-    /// 29-bit identifier.
+    /// The frame has a 29-bit identifier.
     Extended,
-    /// Remote frame.
+    /// The frame is a remote frame.
     Remote,
-    /// CAN FD frame.
+    /// The frame is a CAN FD frame.
     Fd,
     /// Bit 5 of the identifier is set. Bit 5 is 0 in every identifier of this protocol (D-01).
     Bit5,
-    /// Function number 28 to 31, which the protocol does not define.
+    /// The identifier contains a function number from 28 to 31, which the protocol does not define.
     NoFunction(u8),
-    /// Identifier of more than 11 bits, or more than 8 data bytes.
+    /// The identifier has more than 11 bits, or the frame has more than 8 data bytes.
     Malformed,
 }
 

@@ -6,7 +6,7 @@ use core::str::FromStr;
 use crate::foreign::Foreign;
 use crate::function::{Function, Sequence};
 
-/// Up to 8 data bytes.
+/// Payload of a frame, with up to 8 data bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Payload {
     len: u8,
@@ -17,7 +17,7 @@ impl Payload {
     /// Payload without data; its DLC is 0.
     pub const EMPTY: Self = Self { len: 0, data: [0; 8] };
 
-    /// Creates a payload. Returns `None` if `data` is longer than 8 bytes.
+    /// Creates a payload from data bytes. Returns `None` if `data` is longer than 8 bytes.
     pub const fn new(data: &[u8]) -> Option<Self> {
         if data.len() > 8 {
             return None;
@@ -31,7 +31,7 @@ impl Payload {
         Some(payload)
     }
 
-    /// Returns the first `len` bytes of `data` (`len` ≤ 8). For encoders.
+    /// Returns the first `len` bytes of `data` as a payload (`len` ≤ 8). Encoders of messages use this function.
     pub(crate) const fn of(data: [u8; 8], len: usize) -> Self {
         let len = if len > 8 { 8 } else { len };
         let mut payload = Self { len: len as u8, data: [0; 8] };
@@ -43,12 +43,12 @@ impl Payload {
         payload
     }
 
-    /// Returns the bytes.
+    /// Returns the data bytes of the payload.
     pub fn bytes(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// Returns all 8 bytes. The bytes after the payload are 0 (D-12).
+    /// Returns all 8 bytes of the payload. The bytes after the data bytes are 0 (D-12).
     pub const fn padded(&self) -> [u8; 8] {
         self.data
     }
@@ -58,7 +58,7 @@ impl Payload {
         self.len
     }
 
-    /// Returns `true` if the DLC is 0.
+    /// Returns `true` if the payload has no data bytes (DLC 0).
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -80,22 +80,22 @@ pub struct Frame {
 /// Format of a received frame, for drivers that receive all frames of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
-    /// 29-bit identifier.
+    /// `true` if the identifier has 29 bits.
     pub extended: bool,
-    /// Remote frame.
+    /// `true` if the frame is a remote frame.
     pub remote: bool,
     /// `true` for a CAN FD frame, `false` for a classic frame.
     pub fd: bool,
 }
 
 impl Format {
-    /// The only valid format of the UCoM protocol, a classic data frame with an 11-bit identifier (D-02).
+    /// The only valid frame format of the UCoM protocol: a classic data frame with an 11-bit identifier (D-02).
     pub const BUS: Self = Self { extended: false, remote: false, fd: false };
 }
 
 impl Frame {
-    /// Creates a frame. Returns `None` if `id` has more than 11 bits or `data` more than 8 bytes. The function number in the
-    /// identifier may be undefined; [`Frame::address`] checks it.
+    /// Creates a frame from an identifier and data bytes. Returns `None` if `id` has more than 11 bits or `data` more than 8 bytes. The
+    /// function number in the identifier may be undefined; [`Frame::address`] checks the function number.
     pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
         if id > 0x7FF {
             return None;
@@ -106,12 +106,12 @@ impl Frame {
         }
     }
 
-    /// Creates a frame of the UCoM protocol. The creation cannot fail, because a [`Sequence`] is always valid.
+    /// Creates a frame of the UCoM protocol. This function cannot fail, because a [`Sequence`] is always valid.
     pub const fn of(function: Function, sequence: Sequence, payload: Payload) -> Self {
         Self { id: function.id(sequence), payload }
     }
 
-    /// Creates a frame from a received frame. The bus may also carry frames of other protocols (D-02).
+    /// Creates a frame of the UCoM protocol from a received frame. The bus may also carry frames of other protocols (D-02).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, Foreign> {
         match format {
             Format { extended: true, .. } => return Err(Foreign::Extended),
@@ -124,7 +124,7 @@ impl Frame {
         frame.address().map(|_| frame)
     }
 
-    /// Returns the 11-bit identifier.
+    /// Returns the 11-bit identifier of the frame.
     pub const fn id(&self) -> u16 {
         self.id
     }
@@ -134,23 +134,23 @@ impl Frame {
         Function::split(self.id)
     }
 
-    /// Returns the data bytes.
+    /// Returns the data bytes of the frame.
     pub fn data(&self) -> &[u8] {
         self.payload.bytes()
     }
 
-    /// Returns the data bytes as a [`Payload`].
+    /// Returns the data bytes of the frame as a [`Payload`].
     pub const fn payload(&self) -> Payload {
         self.payload
     }
 
-    /// Returns the data length code (DLC), 0..8.
+    /// Returns the data length code (DLC) of the frame, 0..8.
     pub const fn dlc(&self) -> u8 {
         self.payload.len
     }
 }
 
-/// Prints a frame in candump's form, for example `1C1#0202`.
+/// Prints a frame in the format of candump, for example `1C1#0202`.
 impl fmt::Display for Frame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:03X}#", self.id)?;
@@ -158,7 +158,7 @@ impl fmt::Display for Frame {
     }
 }
 
-/// Error of a text that is not a frame of the form `1C1#0202`.
+/// Error: the text is not a frame in the form `1C1#0202`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotAFrame;
 
@@ -170,7 +170,7 @@ impl fmt::Display for NotAFrame {
 
 impl core::error::Error for NotAFrame {}
 
-/// Parses a frame in the form that candump prints. Blanks and dots between the bytes are allowed.
+/// Parses a frame in the form that candump prints. Blanks and dots between the data bytes are allowed.
 impl FromStr for Frame {
     type Err = NotAFrame;
 

@@ -4,24 +4,24 @@ use core::fmt;
 
 use crate::foreign::Foreign;
 
-/// Node address of a board, which is the board's position in the chain (0..31). The manual calls this address the sequence number; this
-/// project also calls it "number". From the PC, address 0 means broadcast; from a board, address 0 means that the board has no number yet
-/// (D-04).
+/// Node address of a board. The node address is the board's position in the chain (0..31). The manual calls this address the sequence
+/// number; this project also calls it the board's number. From the PC, address 0 means broadcast; from a board, address 0 means that the
+/// board has no number yet (D-04).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 
 impl Sequence {
-    /// Number 0.
+    /// The lowest sequence number, 0.
     pub const ZERO: Self = Self(0);
     /// The highest sequence number, 31.
     pub const MAX: Self = Self(31);
 
-    /// Creates a number. Returns `None` for values above 31 instead of masking the value silently (D-01).
+    /// Creates a sequence number. For values above 31, the function returns `None` instead of masking the value silently (D-01).
     pub const fn new(number: u8) -> Option<Self> {
         if number > 31 { None } else { Some(Self(number)) }
     }
 
-    /// Creates a number from the low 5 bits of a value, for fields that have only 5 bits.
+    /// Creates a sequence number from the low 5 bits of a value, for fields that have only 5 bits.
     pub(crate) const fn low5(number: u8) -> Self {
         Self(number & 0x1F)
     }
@@ -46,12 +46,12 @@ impl fmt::Display for Sequence {
 /// Sender of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sender {
-    /// The PC only.
+    /// Only the PC sends the function.
     Pc,
-    /// The boards only.
+    /// Only boards send the function.
     Board,
-    /// The PC and the boards use the same identifier. D-05 defines how the PC and a board avoid sending it at the
-    /// same time.
+    /// The PC and the boards send the function with the same identifier. D-05 defines how the PC and a board avoid sending this identifier
+    /// at the same time.
     Both,
 }
 
@@ -71,7 +71,7 @@ macro_rules! functions {
                 match self { $(Self::$variant => $name),+ }
             }
 
-            /// Returns the sender.
+            /// Returns the sender of the function.
             pub const fn sender(self) -> Sender {
                 match self { $(Self::$variant => Sender::$sender),+ }
             }
@@ -144,7 +144,7 @@ functions! {
 }
 
 impl Function {
-    /// Returns the function with this number; `None` for numbers above 27.
+    /// Returns the function with this number; returns `None` for numbers above 27.
     pub const fn from_number(number: u8) -> Option<Self> {
         if number < 28 { Some(Self::ALL[number as usize]) } else { None }
     }
@@ -154,17 +154,17 @@ impl Function {
         self as u8
     }
 
-    /// Returns the identifier `(sequence & 0x1F) | ((function & 0x3F) << 6)` (D-01).
+    /// Returns the identifier of the function for a sequence number: `(sequence & 0x1F) | ((function & 0x3F) << 6)` (D-01).
     pub const fn id(self, sequence: Sequence) -> u16 {
         (sequence.0 as u16 & 0x1F) | ((self as u16 & 0x3F) << 6)
     }
 
-    /// Returns the function DSP_REPORT0..3 for an index 0..3; `None` for an index above 3.
+    /// Returns the function DSP_REPORT0..3 for an index 0..3; returns `None` for an index above 3.
     pub const fn report(k: u8) -> Option<Self> {
         if k < 4 { Self::from_number(16 + k) } else { None }
     }
 
-    /// Returns function and sequence number of an identifier.
+    /// Returns the function and the sequence number of an identifier.
     pub const fn split(id: u16) -> Result<(Self, Sequence), Foreign> {
         if id > 0x7FF {
             return Err(Foreign::Malformed);
@@ -209,8 +209,8 @@ impl fmt::Display for Function {
 mod tests {
     use super::*;
 
-    /// C-1: the identifiers of all 28 functions with 32 numbers follow the published formula. Each identifier decodes
-    /// to its function and number.
+    /// C-1: the identifiers of all 28 functions with 32 numbers follow the published formula. Each identifier decodes to its function and
+    /// sequence number.
     #[test]
     fn d01_c1_identifiers_follow_the_formula() {
         for (number, function) in Function::ALL.into_iter().enumerate() {

@@ -10,19 +10,19 @@ pub const BLOCK_LEN: usize = 64;
 const MAGIC: u16 = 0x5543;
 const VERSION: u16 = 1;
 
-/// Memory of the board that an image is written to.
+/// Memory of the board to which an image is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Memory {
-    /// Program flash.
+    /// Program flash of the board.
     Program,
-    /// Data flash.
+    /// Data flash of the board.
     Data,
-    /// RAM, which is used for an exloader.
+    /// RAM of the board, which is used for an exloader.
     Ram,
 }
 
 impl Memory {
-    /// Returns the number in the header.
+    /// Returns the number of the memory in the header.
     pub const fn number(self) -> u16 {
         match self {
             Self::Program => 0,
@@ -31,7 +31,7 @@ impl Memory {
         }
     }
 
-    /// Returns the memory with this number; `None` if the number is not defined.
+    /// Returns the memory with this number; returns `None` if the number is not defined.
     pub const fn from_number(number: u16) -> Option<Self> {
         match number {
             0 => Some(Self::Program),
@@ -45,30 +45,30 @@ impl Memory {
 /// The contents of the header block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Number of the cycle, 1 or 2. Boards refuse headers with another cycle number.
+    /// Number of the cycle, 1 or 2. Boards refuse a header with another cycle number.
     pub cycle: u16,
     /// Number of the target memory, see [`Memory::from_number`].
     pub memory: u16,
-    /// Load address in words.
+    /// Load address of the image in words.
     pub address: u32,
     /// Length of the image in words.
     pub length: u32,
     /// Program ID of the image (D-44).
     pub program_id: u16,
-    /// Flash date (D-45).
+    /// Flash date of the image (D-45).
     pub date: u16,
-    /// Flash number of the board that the image is for; [`Header::ANY_BOARD`] for an image for every board.
+    /// Flash number of the board for which the image is intended; [`Header::ANY_BOARD`] for an image for every board.
     pub target: u16,
 }
 
 /// Reasons why a block is not a valid header (DSP_ERROR 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
-    /// Word 0 of the block is this value instead of 0x5543.
+    /// Word 0 of the block has this value instead of 0x5543.
     Magic(u16),
-    /// Word 1 of the block is this value instead of 1.
+    /// Word 1 of the block has this value instead of 1.
     Version(u16),
-    /// The sum of the 32 words of the header is this value instead of 0.
+    /// The sum of the 32 words of the header has this value instead of 0.
     Sum(u16),
 }
 
@@ -85,10 +85,10 @@ impl fmt::Display for HeaderError {
 impl core::error::Error for HeaderError {}
 
 impl Header {
-    /// Target value of an image that any board accepts.
+    /// Value of the field `target` for an image that any board accepts.
     pub const ANY_BOARD: u16 = 0xFFFF;
 
-    /// Returns the header block; each word has this byte order.
+    /// Returns the header block; `endian` is the byte order of its words.
     pub fn build(&self, endian: Endian) -> [u8; BLOCK_LEN] {
         let mut words = [0xFFFFu16; 32];
         let fields = [
@@ -167,7 +167,7 @@ mod tests {
         block[62..].copy_from_slice(&[0xDC, 0x22]);
         assert_eq!(header.build(Endian::Little), block);
         assert_eq!(Header::parse(&block, Endian::Little), Ok(header));
-        // The header of cycle 2 differs only in the cycle and the sum.
+        // The header of cycle 2 differs from the header of cycle 1 only in the cycle number and the sum.
         header.cycle = 2;
         (block[4], block[62]) = (0x02, 0xDB);
         assert_eq!(header.build(Endian::Little), block);
@@ -178,7 +178,7 @@ mod tests {
     fn d41_another_version_is_refused() {
         let header = Header { cycle: 1, memory: 0, address: 0, length: 1, program_id: 0, date: 0, target: 0 };
         let mut block = header.build(Endian::Little);
-        // The header has version 2 and a correct sum.
+        // The header in this test has version 2 and a correct sum.
         (block[2], block[62]) = (2, block[62].wrapping_sub(1));
         assert_ne!(block[62], 0xFF, "no borrow");
         assert_eq!(Header::parse(&block, Endian::Little), Err(HeaderError::Version(2)));
@@ -203,7 +203,7 @@ mod tests {
             let endian = if big { Endian::Big } else { Endian::Little };
             let mut block = header.build(endian);
             prop_assert_eq!(Header::parse(&block, endian), Ok(header));
-            // A sum of words always detects a change of a single byte.
+            // The sum of the words always detects a change of a single byte.
             block[at] ^= flip;
             prop_assert!(Header::parse(&block, endian).is_err());
         }

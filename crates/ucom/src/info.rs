@@ -1,4 +1,4 @@
-//! The first frames of DSP_INFO and of the IO description, in which a board describes itself.
+//! First frames of DSP_INFO and of the IO description, in which a board describes itself.
 
 use crate::frame::Payload;
 use crate::profile::Endian;
@@ -7,11 +7,11 @@ use crate::status::Status;
 /// First frame of DSP_INFO. The description of the board follows as a string.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BoardInfo {
-    /// Number chosen when the bootloader was flashed; its low byte is the UCoM id (D-07).
+    /// Number chosen when the bootloader was flashed; the low byte of this number is the UCoM id (D-07).
     pub flash_number: u16,
     /// Sequence number that the board reports.
     pub sequence: u8,
-    /// Status byte.
+    /// Status byte of the board.
     pub status: Status,
     /// Checksum of the application (D-44); 0xFFFF if the board has no application.
     pub program_id: u16,
@@ -25,7 +25,7 @@ impl BoardInfo {
         !(self.program_id == 0xFFFF && self.date == 0xFFFF)
     }
 
-    /// Returns the 8 bytes of the frame.
+    /// Returns the 8 data bytes of the first frame of DSP_INFO.
     pub const fn payload(&self, endian: Endian) -> Payload {
         let [f0, f1] = endian.bytes(self.flash_number);
         let [p0, p1] = endian.bytes(self.program_id);
@@ -33,7 +33,7 @@ impl BoardInfo {
         Payload::of([f0, f1, self.sequence, self.status.0, p0, p1, d0, d1], 8)
     }
 
-    /// Reads the frame. Returns `None` if the payload has fewer than 8 bytes.
+    /// Reads the values from the first frame of DSP_INFO. Returns `None` if the payload has fewer than 8 bytes.
     pub fn parse(payload: &Payload, endian: Endian) -> Option<Self> {
         let &[f0, f1, sequence, status, p0, p1, d0, d1] = payload.bytes() else { return None };
         Some(Self {
@@ -49,16 +49,16 @@ impl BoardInfo {
 /// First frame of the IO description, which contains the numbers of inputs, outputs and parameters (D-36).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Dimensions {
-    /// Controller inputs.
+    /// Number of controller inputs.
     pub ci: u16,
-    /// Sensor outputs.
+    /// Number of sensor outputs.
     pub so: u16,
-    /// Parameters.
+    /// Number of parameters.
     pub par: u16,
 }
 
 impl Dimensions {
-    /// Returns the 6 bytes of the frame.
+    /// Returns the 6 data bytes of the first frame of the IO description.
     pub const fn payload(&self, endian: Endian) -> Payload {
         let [c0, c1] = endian.bytes(self.ci);
         let [s0, s1] = endian.bytes(self.so);
@@ -66,7 +66,8 @@ impl Dimensions {
         Payload::of([c0, c1, s0, s1, p0, p1, 0, 0], 6)
     }
 
-    /// Reads the frame. Returns `None` if the payload has fewer than 6 bytes; surplus bytes are ignored (D-12).
+    /// Reads the dimensions from the first frame of the IO description. Returns `None` if the payload has fewer than 6 bytes; surplus bytes
+    /// are ignored (D-12).
     pub fn parse(payload: &Payload, endian: Endian) -> Option<Self> {
         let &[c0, c1, s0, s1, p0, p1, ..] = payload.bytes() else { return None };
         Some(Self { ci: endian.word([c0, c1]), so: endian.word([s0, s1]), par: endian.word([p0, p1]) })

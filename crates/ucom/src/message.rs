@@ -1,6 +1,6 @@
-//! The messages of both directions, and their conversion to and from frames.
+//! Messages of the PC and of the boards, and their conversion to and from frames.
 //!
-//! Both sides send functions 22, 24 and 26 with the same identifier (D-05). The caller must know the sender, and
+//! The PC and the boards send functions 22, 24 and 26 with the same identifier (D-05). The caller must know the sender of the frame, and
 //! chooses [`ToBoard`] or [`FromBoard`] accordingly.
 
 mod from_board;
@@ -27,7 +27,7 @@ pub enum DecodeError {
     TooShort {
         /// Function of the frame.
         function: Function,
-        /// Bytes received.
+        /// Number of bytes in the frame.
         len: u8,
         /// Number of bytes that the message needs.
         need: u8,
@@ -36,7 +36,7 @@ pub enum DecodeError {
     Length {
         /// Function of the frame.
         function: Function,
-        /// Bytes received.
+        /// Number of bytes in the frame.
         len: u8,
     },
     /// A flag of the message is neither 0 nor 1 (D-37).
@@ -44,7 +44,7 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
-    /// Returns `true` if the length is wrong. In this case a board sends DSP_ERROR 7.
+    /// Returns `true` if the length of the message is wrong. In this case, a board sends DSP_ERROR 7.
     pub const fn is_length(&self) -> bool {
         matches!(self, Self::TooShort { .. } | Self::Length { .. })
     }
@@ -66,8 +66,7 @@ impl fmt::Display for DecodeError {
 
 impl core::error::Error for DecodeError {}
 
-/// Returns the payload if it has at least `need` bytes. With `dlc.strict`, the payload must have exactly `need`
-/// bytes.
+/// Returns the payload of the frame if it has at least `need` bytes. With `dlc.strict`, the payload must have exactly `need` bytes.
 fn need(frame: &Frame, function: Function, need: u8, profile: &Profile) -> Result<Payload, DecodeError> {
     let len = frame.dlc();
     if len < need {

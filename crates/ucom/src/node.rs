@@ -1,13 +1,13 @@
-//! The board side of the protocol: a UCoM board as a state machine that uses no clock, heap or I/O. The firmware of a board can
-//! use this state machine unchanged, and every simulated board runs it.
+//! The board side of the protocol: a UCoM board as a state machine that uses no clock, no heap and no I/O. The firmware of a board can use
+//! this state machine without changes, and every simulated board uses it.
 //!
-//! The caller passes received frames ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when the CAN controller
-//! has sent a frame ([`Node::sent`]). Each call passes the time in microseconds. [`Node::next_deadline`] returns the time at which the
-//! node must be called next if no frame arrives. Flash, pins, non-volatile memory and the application are traits ([`Flash`], [`Pins`],
-//! [`Store`], [`Application`]); the crate `ucom-sim` implements all four in memory.
+//! The caller passes received frames to the node ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when the CAN
+//! controller has sent a frame ([`Node::sent`]). In each call, the caller passes the time in microseconds. [`Node::next_deadline`] returns
+//! the time at which the caller must call the node next if no frame arrives. Flash, pins, non-volatile memory and the application are
+//! traits ([`Flash`], [`Pins`], [`Store`], [`Application`]); the crate `ucom-sim` implements all four in memory.
 //!
-//! The node offers one frame at a time. The next frame is offered after [`Node::sent`]. The frames of strings and dumps are created only
-//! when the bus is ready for them, so a node needs no queue for these frames.
+//! The node returns one frame at a time. The node returns the next frame only after [`Node::sent`] or [`Node::not_sent`]. The node creates
+//! the frames of strings and dumps only when the bus is ready for them, so it needs no queue for these frames.
 
 mod answers;
 mod application;
@@ -41,16 +41,16 @@ use crate::message::FromBoard;
 /// Phase of the board, which corresponds to the states S1 to S6 of the protocol page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// Boot phase, between the reset and the time at which the board begins to listen.
+    /// Boot phase: time between the reset and the moment when the board begins to listen.
     Booting,
-    /// S1: no number.
+    /// S1: the board has no number.
     Uninitialised,
     /// S2: the exloader runs, and the board has a number.
     Idle,
     /// S3: the exloader runs and accepts program data.
     Programming,
-    /// S3x: the exloader runs, but an error has occurred while programming. The board discards program data until
-    /// PC_XRESET arrives or PROG changes from 0 to 1.
+    /// S3x: the exloader runs, but an error has occurred during programming. The board discards program data until PC_XRESET arrives or
+    /// PROG changes from 0 to 1.
     Aborted,
     /// S4: the application is starting.
     Starting,
@@ -69,16 +69,16 @@ enum App {
     Running,
 }
 
-/// A board.
+/// A UCoM board as a state machine.
 #[derive(Debug)]
 pub struct Node<F, P, S, A> {
-    /// Flash and exloader RAM.
+    /// Flash of the board, and RAM for an exloader.
     pub flash: F,
-    /// Init pins.
+    /// Init pins of the board.
     pub pins: P,
-    /// Non-volatile memory.
+    /// Non-volatile memory of the board.
     pub store: S,
-    /// The program.
+    /// Application program of the board.
     pub application: A,
     config: NodeConfig,
     counters: Counters,
@@ -87,10 +87,10 @@ pub struct Node<F, P, S, A> {
     /// Time at which the board begins to listen after a reset; `None` while it listens.
     boot_until: Option<u64>,
     number: Option<Sequence>,
-    /// Number that the board accepts with an INITACK that is not sent yet. INIT is set when the INITACK has been sent
+    /// Number that the board accepts with an INITACK that is not sent yet. The status bit INIT is set when the INITACK has been sent
     /// (D-24).
     taking: Option<Sequence>,
-    /// Level of the outgoing init pin.
+    /// Level of the board's outgoing init pin.
     opinit: bool,
     prog: bool,
     app: App,
@@ -99,7 +99,7 @@ pub struct Node<F, P, S, A> {
     debug: bool,
     global_debug: bool,
     autostart_at: Option<u64>,
-    /// Time at which the PC is considered lost; set while the loop runs.
+    /// Time at which the PC is considered lost; set while the control loop runs.
     pc_lost_at: Option<u64>,
     step_at: Option<u64>,
     so_at: Option<u64>,
@@ -122,8 +122,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             application,
             config,
             counters: Counters::default(),
-            // Boards with the same configured seed must generate different random numbers, because boards with
-            // equal back-off times would collide.
+            // Boards with the same configured seed must generate different random numbers. Otherwise, boards with equal back-off times
+            // would collide.
             random: (config.seed ^ u32::from(config.flash_number).wrapping_mul(0x9E37_79B9)).max(1),
             now_us,
             boot_until: None,
@@ -151,13 +151,14 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         node
     }
 
-    /// Reboots the board as after a crash, watchdog reset or brown-out. The board sends one report without a request (D-26).
+    /// Reboots the board, as after a crash, a watchdog reset or a brown-out. The board sends one report without a request (D-26).
     pub fn restart(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, true);
     }
 
-    /// Starts the board after a power loss. Everything except flash and [`Store`] is lost. Sends no report.
+    /// Starts the board after a power loss. Everything except the contents of flash and [`Store`] is lost. The board does not send a
+    /// report.
     pub fn power_up(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, false);
@@ -175,8 +176,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Some(frame)
     }
 
-    /// Confirms that the CAN controller has sent the frame of the last [`Node::poll`]. Calls for other frames are
-    /// ignored.
+    /// Confirms that the CAN controller has sent the frame of the last [`Node::poll`]. The node ignores calls for other frames.
     pub fn sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -187,7 +187,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            // The INITACK of a number that the board has lost in the meantime does not confirm the new number.
+            // If the board has lost the number of this INITACK, the INITACK does not confirm a new number.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }
@@ -196,8 +196,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reports that the CAN controller stopped trying to send the frame of the last [`Node::poll`] (bus-off). The node offers an
-    /// INITACK again; other frames are lost. The board sends DSP_ERROR 6 when the bus works again.
+    /// Reports that the CAN controller stopped trying to send the frame of the last [`Node::poll`] (bus-off). The node returns an INITACK
+    /// again; other frames are lost. The board sends DSP_ERROR 6 when the bus works again.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -221,8 +221,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Returns the time at which [`Node::poll`] must be called if no frame arrives. A time in the past means that the
-    /// call is due now.
+    /// Returns the time at which [`Node::poll`] must be called if no frame arrives. A time in the past means that the call is due
+    /// immediately.
     pub fn next_deadline(&self) -> u64 {
         self.deadline()
     }
@@ -232,17 +232,17 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         &self.config
     }
 
-    /// Returns the counters, which count since [`Node::new`].
+    /// Returns the counters of the board, which count since [`Node::new`].
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Returns the sequence number.
+    /// Returns the sequence number of the board; returns `None` if the board has no number.
     pub const fn number(&self) -> Option<Sequence> {
         self.number
     }
 
-    /// Returns the record of the application in flash.
+    /// Returns the validity record of the application in flash.
     pub const fn record(&self) -> Option<Record> {
         self.record
     }
@@ -261,7 +261,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Returns the flags in MCA_ADMIN_DATA.
+    /// Returns the flags that the board sends in MCA_ADMIN_DATA.
     pub const fn admin(&self) -> Admin {
         Admin {
             run: matches!(self.app, App::Running),

@@ -1,7 +1,7 @@
-//! The compatibility profile: the board's interpretation of points that the published description leaves open.
+//! Compatibility profile: the board's interpretation of points that the published description leaves open.
 //!
-//! Each decision about such a point has a key, so that this crate can also work with a board that interprets the description differently.
-//! [`KEYS`] lists the keys with default, range and meaning; [`Profile`] contains the values.
+//! Each decision about such a point has a profile key, so that this crate can also work with a board that interprets the description
+//! differently. [`KEYS`] lists the profile keys with default, range and meaning; [`Profile`] contains their values.
 
 mod keys;
 mod values;
@@ -15,9 +15,9 @@ use crate::function::Sequence;
 /// Reasons why a value or a complete profile is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProfileError {
-    /// The key does not exist.
+    /// The profile has no key with this name.
     UnknownKey,
-    /// The value is outside the key's range.
+    /// The value of a key is outside the key's range.
     Value(&'static Key),
     /// Two values of the profile contradict each other. The error text contains both keys and the reason.
     Contradiction(&'static str),
@@ -36,14 +36,14 @@ impl core::fmt::Display for ProfileError {
 impl core::error::Error for ProfileError {}
 
 impl Profile {
-    /// Sets one key from text. The text is a number, one of the words of the key, or `yes`/`no`.
+    /// Sets one key of the profile from text. The text is a number, one of the words of the key, or `yes`/`no`.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), ProfileError> {
         let key = KEYS.iter().find(|known| known.name == key).ok_or(ProfileError::UnknownKey)?;
         if (key.set)(self, value) { Ok(()) } else { Err(ProfileError::Value(key)) }
     }
 
-    /// Checks that the values can be used together. Values can contradict each other even if each value is in its
-    /// range.
+    /// Checks that the values of the profile can be used together. Values of two keys can contradict each other even if each value is in
+    /// its range.
     pub const fn check(&self) -> Result<(), ProfileError> {
         let contradiction = if self.addr_first == 0 && matches!(self.addr_broadcast, Broadcast::Zero) {
             "addr.first and addr.broadcast cannot both be 0: the first board would receive all broadcasts"
@@ -66,7 +66,7 @@ impl Profile {
         }
     }
 
-    /// Returns the address that boards without a number use to receive and to send. The address is the broadcast number, or 0 if the
+    /// Returns the address that boards without a number use to receive and to send. This address is the broadcast number, or 0 if the
     /// profile has no broadcast number (D-04, D-06).
     pub const fn unnumbered(&self) -> Sequence {
         match self.broadcast_number() {
@@ -75,7 +75,7 @@ impl Profile {
         }
     }
 
-    /// Returns `true` if this number is valid for a board.
+    /// Returns `true` if a board can have this number.
     pub const fn is_board(&self, number: Sequence) -> bool {
         let broadcast = match self.broadcast_number() {
             Some(broadcast) => broadcast.number() == number.number(),
@@ -95,12 +95,12 @@ impl Profile {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }
 
-    /// Returns `string.max`, limited to 512, which is the upper limit of the key.
+    /// Returns the value of the key `string.max`, limited to 512, which is the upper limit of the key.
     pub const fn string_limit(&self) -> usize {
         if self.string_max > 512 { 512 } else { self.string_max as usize }
     }
 
-    /// Returns `string.gap` in microseconds.
+    /// Returns the value of the key `string.gap` in microseconds.
     pub const fn string_gap_us(&self) -> u64 {
         self.string_gap as u64 * 1000
     }
@@ -113,8 +113,8 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
-    /// The default of every key equals the default in the table and is within the range of the key. Its text can be
-    /// parsed again.
+    /// The default of every key equals the default in the table and is within the range of the key. The text of each default can be parsed
+    /// again.
     #[test]
     fn keys_and_defaults_agree() {
         let mut profile = Profile::default();
@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(profile.check(), Ok(()));
     }
 
-    /// The keys include the published parameters, with their published names.
+    /// The profile keys include the published parameters, with their published names.
     #[test]
     fn d03_the_listed_parameters_are_all_there() {
         let listed = "bitrate 1000000 · endian little · prog.endian little · addr.first 1 · addr.broadcast 0 · \
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(unsigned.process_value(0xFFEC), 65516);
     }
 
-    /// The protocol page mentions every key.
+    /// The protocol page mentions every profile key.
     #[test]
     fn d00_the_protocol_page_names_every_key() {
         let page = include_str!("../../../docs/protocol-ucom.md");

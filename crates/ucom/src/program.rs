@@ -8,13 +8,13 @@ use crate::profile::{Endian, words};
 words! {
     /// Computation of the Program ID of an image (D-44), key `prog.checksum`.
     pub enum Checksum {
-        /// CRC-16/CCITT-FALSE over the bytes in wire order: polynomial 0x1021, start value 0xFFFF.
+        /// CRC-16/CCITT-FALSE over the bytes in the order in which they are sent: polynomial 0x1021, start value 0xFFFF.
         Crc16 = "crc16",
-        /// Sum of the 16-bit words modulo 65 536. The sum does not detect swapped frames.
+        /// Sum of the 16-bit words of the image modulo 65 536. This sum does not detect swapped frames.
         Sum16 = "sum16",
-        /// Exclusive-or of the 16-bit words.
+        /// Exclusive-or of the 16-bit words of the image.
         Xor16 = "xor16",
-        /// No checksum; the Program ID in the header is accepted without a check.
+        /// No checksum; the board accepts the Program ID in the header without a check.
         None = "none",
     }
 }
@@ -22,14 +22,14 @@ words! {
 words! {
     /// Encoding of the flash date in 16 bits (D-45), key `prog.date`.
     pub enum DateForm {
-        /// The date is `(year − 1980) << 9 | month << 5 | day`, for the years 1980 to 2107.
+        /// The encoding is `(year − 1980) << 9 | month << 5 | day`, for the years 1980 to 2107.
         Fat = "fat",
-        /// The date is the number of days since 2000-01-01, up to the year 2179.
+        /// The encoding is the number of days since 2000-01-01, up to the year 2179.
         Days2000 = "days2000",
-        /// The date is four decimal digits YYMM, for the years 2000 to 2099. The day is not stored, so a decoded
-        /// date is the first day of the month.
+        /// The encoding is four decimal digits YYMM, for the years 2000 to 2099. The day is not stored, so a decoded date is the first day
+        /// of the month.
         Bcd = "bcd",
-        /// A raw number that this tool does not interpret as a date.
+        /// The encoding is a raw number that this tool does not interpret as a date.
         Raw = "raw",
     }
 }
@@ -37,7 +37,7 @@ words! {
 const CCITT_FALSE: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 static CCITT_FALSE_TABLE: Crc<u16> = CCITT_FALSE;
 
-/// Computation of a Program ID in progress. The image can be added in pieces of any size.
+/// Computation of a Program ID that is in progress. The caller can add the image in pieces of any size.
 #[derive(Clone)]
 pub struct Digest {
     checksum: Checksum,
@@ -55,12 +55,12 @@ impl core::fmt::Debug for Digest {
 }
 
 impl Digest {
-    /// Creates a digest. `endian` is the order of the bytes in program words (`prog.endian`).
+    /// Creates an empty digest. `endian` is the order of the bytes in program words (`prog.endian`).
     pub fn new(checksum: Checksum, endian: Endian) -> Self {
         Self { checksum, endian, crc: CCITT_FALSE_TABLE.digest(), word: 0, odd: None }
     }
 
-    /// Adds the next bytes of the image, in wire order.
+    /// Adds the next bytes of the image, in the order in which they are sent.
     pub fn update(&mut self, bytes: &[u8]) {
         match self.checksum {
             Checksum::Crc16 => self.crc.update(bytes),
@@ -81,7 +81,7 @@ impl Digest {
         if self.checksum == Checksum::Xor16 { self.word ^ word } else { self.word.wrapping_add(word) }
     }
 
-    /// Returns the Program ID of the data that were added so far; 0 for [`Checksum::None`]. For an odd number of bytes, the sum
+    /// Returns the Program ID of the data that were added so far; returns 0 for [`Checksum::None`]. For an odd number of bytes, the sum
     /// includes 0xFF as the missing byte, like the padding of the last block.
     pub fn finish(&self) -> u16 {
         match self.checksum {
@@ -95,7 +95,7 @@ impl Digest {
     }
 }
 
-/// Returns the Program ID of a whole image (D-44).
+/// Returns the Program ID of a complete image (D-44).
 pub fn checksum(checksum: Checksum, endian: Endian, image: &[u8]) -> u16 {
     let mut digest = Digest::new(checksum, endian);
     digest.update(image);
@@ -107,8 +107,7 @@ pub const fn block_count(len: usize) -> usize {
     len.div_ceil(BLOCK_LEN)
 }
 
-/// Returns the `i`-th data block of an image, or `None` after the last block. The last block is padded with 0xFF
-/// (D-41).
+/// Returns the `i`-th data block of an image; returns `None` after the last block. The last data block is padded with 0xFF (D-41).
 pub fn data_block(image: &[u8], i: usize) -> Option<[u8; BLOCK_LEN]> {
     let rest = image.get(i.checked_mul(BLOCK_LEN)?..)?;
     if rest.is_empty() {
@@ -135,8 +134,8 @@ const fn month_days(year: u16, month: u8) -> u8 {
 }
 
 impl DateForm {
-    /// Returns the 16 bits of a date; `None` if the day does not exist or this form cannot encode it. The form `raw`
-    /// cannot encode a date.
+    /// Returns a date as 16 bits; returns `None` if the day does not exist or if this form cannot encode the date. The form `raw` cannot
+    /// encode a date.
     pub fn encode(self, year: u16, month: u8, day: u8) -> Option<u16> {
         if day == 0 || day > month_days(year, month) {
             return None;
@@ -160,11 +159,11 @@ impl DateForm {
             }
             Self::Raw => return None,
         };
-        // 0xFFFF is the date of a board without an application.
+        // 0xFFFF is the date of a board without an application, so it is not a valid date.
         (date != 0xFFFF).then_some(date)
     }
 
-    /// Returns year, month, day; `None` if the 16 bits are not a date of this form.
+    /// Returns year, month and day; returns `None` if the 16 bits are not a date of this form.
     pub fn decode(self, date: u16) -> Option<(u16, u8, u8)> {
         let (year, month, day) = match self {
             Self::Fat => (1980 + (date >> 9), (date >> 5 & 15) as u8, (date & 31) as u8),
@@ -210,7 +209,7 @@ mod tests {
         assert_eq!(block_count(1000), 16);
     }
 
-    /// A sum does not detect two swapped frames of a block. Therefore crc16 is the default.
+    /// A sum of words does not detect two swapped frames of a block. Therefore `crc16` is the default of `prog.checksum`.
     #[test]
     fn d44_sum_is_blind_to_swapped_frames() {
         let image = image();
@@ -266,7 +265,7 @@ mod tests {
         assert_eq!(DateForm::Days2000.encode(1999, 12, 31), None);
     }
 
-    /// All four digits must be decimal, and the last two digits must be a valid month.
+    /// All four digits of the date must be decimal, and the last two digits must be a valid month.
     #[test]
     fn d45_bcd_takes_decimal_digits_only() {
         for date in 0..=u16::MAX {
@@ -279,8 +278,8 @@ mod tests {
         }
     }
 
-    /// The test compares the dates with a calendar that counts day by day. Each 16-bit value is one day later than the
-    /// previous value; the last value means 2179-06-05.
+    /// The test compares the dates with a calendar that counts day by day. Each 16-bit value is one day later than the previous value; the
+    /// last value means 2179-06-05.
     #[test]
     fn d45_days_in_a_row() {
         let (mut year, mut month, mut day) = (2000, 1, 1);

@@ -3,19 +3,19 @@
 use crate::function::{Function, Sequence};
 use crate::profile::ReportMode;
 
-/// DSP_REPORT frame.
+/// Contents of a DSP_REPORT frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Report {
     /// Index of the DSP_REPORT function, 0..3.
     pub k: u8,
-    /// Sequence field of the identifier.
+    /// Sequence field in the identifier of the report.
     pub id_field: Sequence,
     /// Data byte of the report, which contains the low byte of the flash number and distinguishes boards.
     pub ucom_id: u8,
 }
 
 impl Report {
-    /// Returns the report of a board in mode `flash7`, which uses 128 identifiers, one for each 7-bit flash id.
+    /// Returns the report of a board in mode `flash7`. This mode uses 128 identifiers, one for each 7-bit flash id.
     pub const fn flash7(flash_number: u16) -> Self {
         Self {
             k: (flash_number >> 5 & 3) as u8,
@@ -24,8 +24,7 @@ impl Report {
         }
     }
 
-    /// Returns the `i`-th frame (counted from 0) that a board sends after one request in this mode; `None` after the
-    /// last frame.
+    /// Returns the `i`-th frame (counted from 0) that a board sends after one request in this mode; returns `None` after the last frame.
     ///
     /// `sequence` is the number of the board, or the number that a board without a number uses instead.
     pub const fn nth(mode: ReportMode, i: u8, flash_number: u16, sequence: Sequence) -> Option<Self> {
@@ -38,13 +37,13 @@ impl Report {
         }
     }
 
-    /// Returns `true` if identifier and data contain equal flash ids, as mode `flash7` requires.
+    /// Returns `true` if the identifier and the data contain equal flash ids, as mode `flash7` requires.
     pub const fn agrees(&self) -> bool {
         let by_data = Self::flash7(self.ucom_id as u16);
         by_data.k == self.k && by_data.id_field.number() == self.id_field.number()
     }
 
-    /// Returns the function, DSP_REPORT0..3.
+    /// Returns the function of the report, DSP_REPORT0..3.
     pub const fn function(&self) -> Function {
         match self.k & 3 {
             0 => Function::Report0,
@@ -69,7 +68,7 @@ mod tests {
         };
         let ids: BTreeSet<u16> = (0..128).map(id).collect();
         assert_eq!(ids.len(), 128);
-        // The five boards of the acceptance table.
+        // The flash ids are those of the five boards in the acceptance table.
         let five = [0x21, 0x42, 0x63, 0x04, 0x7F].map(id);
         assert_eq!(five, [0x441, 0x482, 0x4C3, 0x404, 0x4DF]);
         for flash in 0..256 {

@@ -1,30 +1,31 @@
-//! The status byte (D-20).
+//! The status byte of a board (D-20).
 
 use core::fmt;
 use core::ops::{BitAnd, BitOr, Not};
 
-/// Status of a board, one bit each.
+/// Status of a board; each bit has its own meaning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Status(pub u8);
 
 impl Status {
-    /// The application has been started by the exloader.
+    /// MSTART: the exloader has started the application.
     pub const MSTART: Self = Self(0x80);
-    /// Autostart is enabled. The bit survives a power loss.
+    /// ASTART: the automatic start of the application is enabled. The bit ASTART survives a power loss.
     pub const ASTART: Self = Self(0x40);
-    /// The control loop is running. Shows the actual state; cannot be written.
+    /// MCARUN: the control loop is running. The bit MCARUN shows the actual state, and the PC cannot write it.
     pub const MCARUN: Self = Self(0x20);
-    /// The exloader is running. This bit is always the opposite of MSTART. Shows the actual state; cannot be written.
+    /// EXLRUN: the exloader is running. The bit EXLRUN is always the opposite of MSTART. The bit EXLRUN shows the actual state, and the PC
+    /// cannot write it.
     pub const EXLRUN: Self = Self(0x10);
-    /// The board has a sequence number.
+    /// INIT: the board has a sequence number.
     pub const INIT: Self = Self(0x08);
-    /// Program data are accepted.
+    /// PROG: the board accepts program data.
     pub const PROG: Self = Self(0x04);
-    /// Level of the outgoing init pin.
+    /// OPINIT: level of the outgoing init pin.
     pub const OPINIT: Self = Self(0x02);
-    /// Level of the incoming init pin. Shows the actual state; cannot be written.
+    /// IPINIT: level of the incoming init pin. The bit IPINIT shows the actual state, and the PC cannot write it.
     pub const IPINIT: Self = Self(0x01);
-    /// Bits that show the actual state and cannot be written.
+    /// Status bits that show the actual state and that the PC cannot write.
     pub const MIRRORS: Self = Self(0x31);
 
     /// Names of the status bits, beginning with bit 7.
@@ -39,30 +40,30 @@ impl Status {
         ("IPINIT", Self::IPINIT),
     ];
 
-    /// Returns the bit with this name, in upper or lower case.
+    /// Returns the status bit with this name, in upper or lower case.
     pub fn bit(name: &str) -> Option<Self> {
         Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, bit)| *bit)
     }
 
-    /// Returns `true` if all of `bits` are set.
+    /// Returns `true` if all bits in `bits` are set.
     pub const fn has(self, bits: Self) -> bool {
         self.0 & bits.0 == bits.0
     }
 
-    /// Returns the status with `bits` set or cleared.
+    /// Returns the status with the bits in `bits` set or cleared.
     #[must_use]
     pub const fn with(self, bits: Self, on: bool) -> Self {
         if on { Self(self.0 | bits.0) } else { Self(self.0 & !bits.0) }
     }
 
-    /// Applies the published formula of PC_SETSTATUS literally: `(old & ~mask) | value`. The value is not masked
-    /// (D-22).
+    /// Applies the published formula of PC_SETSTATUS literally: `(old & ~mask) | value`. The formula does not mask the value (D-22).
     #[must_use]
     pub const fn set(self, mask: u8, value: u8) -> Self {
         Self((self.0 & !mask) | value)
     }
 
-    /// Returns the contradiction between bits of this status, if any. No board can be in a contradictory state.
+    /// Returns the contradiction between bits of this status; returns `None` if the status has no contradiction. No board can be in a
+    /// contradictory state.
     pub const fn contradiction(self) -> Option<&'static str> {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
             Some("EXLRUN must be the opposite of MSTART")
@@ -99,14 +100,14 @@ impl Not for Status {
     }
 }
 
-/// Prints the names of the bits that are set, `EXLRUN INIT IPINIT`; `-` if no bit is set.
+/// Prints the names of the status bits that are set, such as `EXLRUN INIT IPINIT`; prints `-` if no bit is set.
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         words(f, Self::NAMES.map(|(name, bit)| (self.has(bit), name)))
     }
 }
 
-/// Prints the names that are marked `true`, separated by blanks; `-` if all are `false`.
+/// Prints the names that are marked `true`, separated by blanks; prints `-` if all names are marked `false`.
 pub(crate) fn words<const N: usize>(f: &mut fmt::Formatter<'_>, names: [(bool, &str); N]) -> fmt::Result {
     let mut gap = "";
     for (_, name) in names.iter().filter(|(on, _)| *on) {

@@ -1,4 +1,4 @@
-//! String transmission: a header package with a count, then packages of up to 8 characters (D-13, D-14).
+//! Transmission of strings: a header package with a count, and then packages of up to 8 characters (D-13, D-14).
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ use crate::profile::Profile;
 pub struct Latin1<'a>(pub &'a [u8]);
 
 impl Latin1<'_> {
-    /// Returns the characters.
+    /// Returns the characters of the text.
     pub fn chars(&self) -> impl Iterator<Item = char> + '_ {
         self.0.iter().map(|byte| char::from(*byte))
     }
@@ -23,10 +23,10 @@ impl fmt::Display for Latin1<'_> {
     }
 }
 
-/// Returns the `i`-th package of a string; `None` after the last package. Package 0 is the header, and the other
+/// Returns the `i`-th package of a string; returns `None` after the last package. Package 0 is the header of the string, and the other
 /// packages are data.
 ///
-/// Texts longer than `string.max` are truncated.
+/// A text longer than `string.max` characters is truncated.
 pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload> {
     let text = text.get(..profile.string_limit()).unwrap_or(text);
     let Some(i) = i.checked_sub(1) else {
@@ -38,7 +38,7 @@ pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload>
     Payload::new(rest.get(..8).unwrap_or(rest)).filter(|payload| !payload.is_empty())
 }
 
-/// The packages of a string, beginning with the header.
+/// Packages of a string, beginning with the header.
 #[derive(Clone, Debug)]
 pub struct StringPackages<'a> {
     text: &'a [u8],
@@ -66,24 +66,24 @@ impl Iterator for StringPackages<'_> {
 /// Result of adding a package to the string in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Assembled<'a> {
-    /// More packages follow.
+    /// The string is not complete; more packages follow.
     Partial,
-    /// The string is complete. Trailing NULs are removed.
+    /// The string is complete. Trailing NULs of the string are removed.
     Complete(Latin1<'a>),
-    /// The package is invalid and the string is dropped. A header is invalid if it does not have 2 bytes or announces more packages
-    /// than `string.max` characters need. A data package is invalid if it is empty or exceeds the buffer.
+    /// The package is invalid, so the assembler drops the string. A header is invalid if it does not have 2 bytes or announces more
+    /// packages than `string.max` characters need. A data package is invalid if it is empty or exceeds the buffer.
     Refused,
 }
 
-/// Assembles one string at a time. A receiver needs one assembler for each function of each board (D-14).
+/// Assembles strings from packages, one string at a time. A receiver needs one assembler for each function of each board (D-14).
 ///
-/// The assembler cannot detect a lost package: it continues to wait for packages. [`StringAssembler::expired`] returns `true` if no
-/// package has arrived for 100 ms (`string.gap`). In this case the next package starts a new string.
+/// The assembler cannot detect a lost package: it continues to wait for packages. [`StringAssembler::expired`] returns `true` if no package
+/// has arrived for 100 ms (`string.gap`). After this gap, the next package starts a new string.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],
     len: usize,
-    /// Number of packages that are still missing; `None` until the header has arrived.
+    /// Number of packages of the string that are still missing; `None` until the header has arrived.
     open: Option<u16>,
     last_us: u64,
 }
@@ -95,12 +95,12 @@ impl<const N: usize> Default for StringAssembler<N> {
 }
 
 impl<const N: usize> StringAssembler<N> {
-    /// Creates an assembler that waits for a header.
+    /// Creates an assembler that waits for the header of a string.
     pub const fn new() -> Self {
         Self { text: [0; N], len: 0, open: None, last_us: 0 }
     }
 
-    /// Drops the packages received so far.
+    /// Drops the packages of a string that were received so far.
     pub const fn reset(&mut self) {
         self.open = None;
         self.len = 0;
@@ -124,7 +124,7 @@ impl<const N: usize> StringAssembler<N> {
         }
     }
 
-    /// Handles a package. A string that has [expired](Self::expired) is dropped first.
+    /// Handles a package of a string. The assembler first drops a string that has [expired](Self::expired).
     pub fn push(&mut self, now_us: u64, payload: &Payload, profile: &Profile) -> Assembled<'_> {
         if self.expired(now_us, profile) {
             self.reset();
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// C-4: strings of length 0, 1, 7, 8, 9, 16 and 512, a trailing NUL, and a character that is not ASCII.
+    /// C-4: the test covers strings of length 0, 1, 7, 8, 9, 16 and 512, a trailing NUL, and a character that is not ASCII.
     #[test]
     fn d13_c4_strings_of_all_lengths() {
         for profile in profiles() {
@@ -252,7 +252,7 @@ mod tests {
         assert_eq!(assembler.missing(), 2);
     }
 
-    /// If a data package is empty or exceeds the buffer, the string is dropped.
+    /// If a data package is empty or exceeds the buffer, the assembler drops the string.
     #[test]
     fn d13_data_that_cannot_be_are_refused() {
         let [profile, ..] = profiles();

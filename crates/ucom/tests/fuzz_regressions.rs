@@ -1,4 +1,4 @@
-//! Runs the functions of the fuzz targets with the stored inputs, with some handmade inputs, and with random inputs.
+//! Runs the functions of the fuzz targets with the stored inputs, with some handwritten inputs, and with random inputs.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};
@@ -11,7 +11,7 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// Frames with every identifier and every length, with payloads of extreme byte values such as 0x00, 0x7F and 0xFF.
+/// The test uses frames with every identifier and every length, with payloads of extreme byte values such as 0x00, 0x7F and 0xFF.
 #[test]
 fn every_frame_with_extreme_payloads() {
     for id in 0..0x800_u16 {

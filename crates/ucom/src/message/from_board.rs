@@ -1,4 +1,4 @@
-//! Messages of a board.
+//! Messages that a board sends to the PC.
 
 use super::to_board::{admin, package};
 use super::{DecodeError, need};
@@ -10,40 +10,40 @@ use crate::function::{Function, Sequence};
 use crate::profile::Profile;
 use crate::report::Report;
 
-/// A message from a board.
+/// A message from a board to the PC.
 ///
-/// DSP_INFO, the IO description and debug texts are sent in several frames with the same identifier and without a frame number (G-15).
-/// A receiver must therefore count the frames to know which part a frame carries. The parts of DSP_INFO, the IO description and debug
+/// A board sends DSP_INFO, the IO description and debug texts in several frames with the same identifier and without a frame number (G-15).
+/// A receiver must therefore count these frames to know which part a frame carries. The parts of DSP_INFO, the IO description and debug
 /// texts are returned as payloads, which can be decoded with [`BoardInfo::parse`](crate::BoardInfo::parse),
 /// [`Dimensions::parse`](crate::Dimensions::parse) and [`StringAssembler`](crate::StringAssembler).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FromBoard {
-    /// DSP_ERROR.
+    /// DSP_ERROR with the error code.
     Error(ErrorCode),
     /// DSP_INITACK with the sequence number that the board accepted. The identifier must also contain this
     /// sequence number (D-24).
     InitAck(u8),
-    /// DSP_PROGFINISHED.
+    /// DSP_PROGFINISHED: the image is written and verified.
     ProgFinished,
     /// A part of DSP_INFO. DSP_INFO consists of 8 bytes with the values of [`BoardInfo`](crate::BoardInfo), followed by a string.
     Info(Payload),
-    /// DSP_READY: the board has accepted the block.
+    /// DSP_READY: the board has accepted the block of program data.
     Ready,
-    /// MCA_DSP_SO.
+    /// MCA_DSP_SO: sensor outputs.
     So(BufferPackage),
-    /// DSP_REPORT0..3. In the identifier of a report, the sequence field is part of the flash id (D-07).
+    /// DSP_REPORT0..3: report that the board is present. In the identifier of a report, the sequence field is part of the flash id (D-07).
     Report(Report),
     /// MCA_DSP_READY: the application is ready.
     McaReady,
-    /// A part of MCA_DUMP_IO_DESCRIPTION. The description consists of 6 bytes of dimensions, followed by strings.
+    /// A part of MCA_DUMP_IO_DESCRIPTION. The IO description consists of 6 bytes of dimensions, followed by strings.
     IoDescription(Payload),
-    /// MCA_ADMIN_DATA with the state of the board.
+    /// MCA_ADMIN_DATA with the flags of the board.
     Admin(Admin),
     /// A part of MCA_DEBUG_MSG, which contains a string.
     Debug(Payload),
     /// MCA_ALIVE of the board.
     Alive,
-    /// MCA_DSP_CI: initial inputs.
+    /// MCA_DSP_CI: initial values of the controller inputs.
     Ci(BufferPackage),
 }
 
@@ -85,7 +85,7 @@ impl FromBoard {
         Frame::of(self.function(), sequence, payload)
     }
 
-    /// Decodes a frame. Returns the sequence field of the frame's identifier, and the message.
+    /// Decodes a frame to a message of a board. Returns the sequence field of the frame's identifier, and the message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, from) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -107,7 +107,7 @@ impl FromBoard {
                 Self::Report(Report { k, id_field: from, ucom_id: byte()? })
             }
             Function::McaReady => empty(Self::McaReady)?,
-            // On this identifier, a frame without data is always the PC's request (D-12).
+            // A frame of MCA_DUMP_IO_DESCRIPTION without data is always the PC's request (D-12).
             Function::DumpIo if frame.dlc() > 0 => Self::IoDescription(some()?),
             Function::Admin => Self::Admin(admin(frame, profile)?),
             Function::Debug => Self::Debug(some()?),

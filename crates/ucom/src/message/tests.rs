@@ -20,7 +20,7 @@ fn from(text: &str) -> Result<FromBoard, DecodeError> {
     FromBoard::decode(&frame(text), &Profile::default()).map(|(_, message)| message)
 }
 
-/// C-6: surplus bytes are ignored. A message with missing bytes is refused as too short.
+/// C-6: a receiver ignores surplus bytes of a message. A receiver refuses a message with missing bytes as too short.
 #[test]
 fn d12_c6_lengths() {
     assert_eq!(to("201#0000000000000000"), Ok(ToBoard::Info));
@@ -46,8 +46,8 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: if both sides send a function, the sender distinguishes the two messages. Their lengths also distinguish
-/// them if possible.
+/// D-05: if both sides send a function, the sender distinguishes the two messages. The lengths of the two messages also distinguish them if
+/// possible.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));

@@ -1,4 +1,4 @@
-//! Messages of the PC.
+//! Messages that the PC sends to boards.
 
 use super::{DecodeError, need};
 use crate::admin::Admin;
@@ -10,9 +10,9 @@ use crate::profile::Profile;
 /// A message from the PC to one board, or to all boards by broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToBoard {
-    /// PC_RESET.
+    /// PC_RESET: resets the board and deletes its number.
     Reset,
-    /// PC_XRESET.
+    /// PC_XRESET: special reset before an update.
     XReset,
     /// PC_SETSTATUS: `(old & ~mask) | value` (D-22).
     SetStatus {
@@ -21,29 +21,29 @@ pub enum ToBoard {
         /// Bits of the status byte that are set afterwards, including bits outside the mask.
         value: u8,
     },
-    /// PC_INFO.
+    /// PC_INFO: requests DSP_INFO.
     Info,
-    /// PC_REPORT.
+    /// PC_REPORT: requests a report of one board or of all boards.
     Report,
-    /// PC_INIT: the identifier carries the new number.
+    /// PC_INIT: the identifier contains the new number of the board.
     Init,
     /// PC_PROG: 8 bytes of program data, one eighth of a block.
     Prog([u8; 8]),
-    /// PC_START.
+    /// PC_START: starts the application.
     Start,
-    /// MCA_PC_CI.
+    /// MCA_PC_CI: sets controller inputs.
     Ci(BufferPackage),
-    /// MCA_PC_PAR.
+    /// MCA_PC_PAR: sets parameters.
     Par(BufferPackage),
-    /// MCA_PC_START.
+    /// MCA_PC_START: starts the control loop.
     McaStart,
-    /// MCA_DUMP_IO_DESCRIPTION: the request.
+    /// MCA_DUMP_IO_DESCRIPTION without data: requests the IO description.
     DumpIo,
-    /// MCA_DUMP_CI.
+    /// MCA_DUMP_CI: requests the initial values of the controller inputs.
     DumpCi,
-    /// MCA_ADMIN_DATA: the request.
+    /// MCA_ADMIN_DATA: sets the flags of the board.
     Admin(Admin),
-    /// MCA_ALIVE of the PC.
+    /// MCA_ALIVE: heartbeat of the PC.
     Alive,
 }
 
@@ -81,7 +81,7 @@ impl ToBoard {
         Frame::of(self.function(), to, payload)
     }
 
-    /// Decodes a frame. Returns the destination of the frame and the message.
+    /// Decodes a frame to a message of the PC. Returns the destination of the frame and the message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, to) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -100,7 +100,7 @@ impl ToBoard {
             Function::Ci => Self::Ci(package(frame, function, profile)?),
             Function::Par => Self::Par(package(frame, function, profile)?),
             Function::McaStart => empty(Self::McaStart)?,
-            // On this identifier, a frame with data is always a board's answer (D-12).
+            // A frame of MCA_DUMP_IO_DESCRIPTION with data is always a board's answer (D-12).
             Function::DumpIo if frame.dlc() == 0 => Self::DumpIo,
             Function::DumpCi => empty(Self::DumpCi)?,
             Function::Admin => Self::Admin(admin(frame, profile)?),

@@ -1,5 +1,4 @@
-//! The application level of a board: start, control loop, inputs and parameters (D-30 to D-37), and supervision of
-//! the PC (D-50).
+//! Application level of a board: start, control loop, inputs and parameters (D-30 to D-37), and supervision of the PC (D-50).
 
 use super::{App, Application, Flash, Node, Pins, Store};
 use crate::admin::Admin;
@@ -7,11 +6,11 @@ use crate::buffer::BufferPackage;
 use crate::error_code::ErrorCode;
 use crate::profile::CiLatch;
 
-/// Text that reports the loss of the PC's heartbeat, sent if texts are requested.
+/// Text that reports the loss of the PC's heartbeat; the board sends it if the PC requests texts.
 pub(super) const PC_LOST: &[u8] = b"PC alive lost";
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Stops the application, makes its outputs safe and returns to the exloader.
+    /// Stops the application, makes its outputs safe and returns the board to the exloader.
     pub(super) fn stop_application(&mut self) {
         self.stop_loop();
         if self.app != App::Stopped {
@@ -24,7 +23,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.forget_application();
     }
 
-    /// Called when the application has started: queues MCA_DSP_READY, the first heartbeat and the flags (D-30, D-37).
+    /// Queues MCA_DSP_READY, the first heartbeat and the flags after the application has started (D-30, D-37).
     pub(super) fn application_up(&mut self) {
         self.app = App::Up;
         self.outbox.mca_ready = true;
@@ -32,7 +31,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.send_admin_unasked();
     }
 
-    /// Starts the control loop. While the loop runs, the PC must send heartbeats (D-50).
+    /// Starts the control loop. While the control loop runs, the PC must send heartbeats (D-50).
     pub(super) fn run_loop(&mut self) {
         if self.app != App::Up {
             return;
@@ -44,7 +43,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.so_at = Some(self.after_ms(self.config.profile.so_period));
     }
 
-    /// Ends the control loop. Makes the outputs safe, even if the loop was not running.
+    /// Ends the control loop. The function makes the outputs safe, even if the control loop was not running.
     pub(super) fn stop_loop(&mut self) {
         self.set_active(false);
         if self.app == App::Running {
@@ -70,7 +69,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.own_text = Some(PC_LOST);
     }
 
-    /// Sets the inputs to their initial values.
+    /// Sets the controller inputs to their initial values.
     pub(super) fn initial_ci(&mut self) {
         for index in 0..self.application.dimensions().ci {
             let word = self.application.initial_ci(index);
@@ -81,7 +80,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.application.latch_ci();
     }
 
-    /// Handles MCA_ADMIN_DATA of the PC (D-37).
+    /// Handles MCA_ADMIN_DATA that the PC sent (D-37).
     pub(super) fn set_admin(&mut self, admin: Admin) {
         match (self.app, admin.run) {
             (App::Up, true) => self.run_loop(),
@@ -96,7 +95,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.answer_admin();
     }
 
-    /// Handles controller inputs (D-34).
+    /// Handles controller inputs that the PC sent (D-34).
     pub(super) fn receive_ci(&mut self, package: &BufferPackage) {
         let dimension = usize::from(self.application.dimensions().ci);
         let applied = put(package, self.application.ci(), dimension);
@@ -111,7 +110,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Handles parameters (D-35).
+    /// Handles parameters that the PC sent (D-35).
     pub(super) fn receive_par(&mut self, package: &BufferPackage) {
         let dimension = usize::from(self.application.dimensions().par);
         if !put(package, self.application.par(), dimension) {
@@ -120,7 +119,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Copies the words of a package into the buffer. Returns `true` if the package starts inside the buffer.
+/// Copies the words of a package into a buffer of the application. The function returns `true` if the package starts inside the buffer.
 fn put(package: &BufferPackage, buffer: &mut [u16], dimension: usize) -> bool {
     let len = buffer.len().min(dimension);
     buffer.get_mut(..len).is_some_and(|buffer| package.apply(buffer).is_ok())

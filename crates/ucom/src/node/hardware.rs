@@ -6,9 +6,9 @@ use crate::info::Dimensions;
 /// A range of word addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
-    /// First word.
+    /// First word address of the area.
     pub start: u32,
-    /// Number of words.
+    /// Number of words in the area.
     pub words: u32,
 }
 
@@ -23,11 +23,11 @@ impl Area {
 /// State of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashState {
-    /// The last operation succeeded, or no operation has been started yet.
+    /// The last flash operation succeeded, or no operation has been started yet.
     Ready,
-    /// An operation is in progress.
+    /// A flash operation is in progress.
     Busy,
-    /// The last operation failed. The flash remains in this state until the next operation starts.
+    /// The last flash operation failed. The flash remains in this state until the next operation starts.
     Failed,
 }
 
@@ -40,111 +40,113 @@ pub const RECORD_LEN: usize = 16;
 
 /// Flash of the board, and the RAM into which an exloader can be loaded.
 ///
-/// The methods `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when the operation is complete. The
-/// node does not start an operation while another operation is in progress. Implementations MUST keep the validity record outside the
-/// application area. Erasing the area must not change the record, and erasing the record must not change the area.
+/// The methods `erase…` and `write…` start an operation and return at once; [`Flash::state`] returns [`FlashState::Busy`] until the
+/// operation is complete. The node does not start an operation while another operation is in progress. Implementations MUST keep the
+/// validity record outside the application area. Erasing the application area must not change the record, and erasing the record must not
+/// change the application area.
 pub trait Flash {
     /// Returns the area for applications in a memory; `None` if the board has no such memory.
     fn area(&self, memory: Memory) -> Option<Area>;
 
-    /// Returns the state of the last operation.
+    /// Returns the state of the last flash operation.
     fn state(&mut self, now_us: u64) -> FlashState;
 
-    /// Starts to erase `area`. Implementations may erase whole sectors, but no data outside the application area.
+    /// Starts to erase `area` in the memory. Implementations may erase whole sectors, but no data outside the application area.
     fn erase(&mut self, now_us: u64, memory: Memory, area: Area) -> Result<(), FlashError>;
 
-    /// Starts to write up to 64 bytes in wire order, beginning at a word address. The number of bytes is even.
+    /// Starts to write up to 64 bytes in the order in which they were received, beginning at a word address. The number of bytes to write
+    /// is always even.
     fn write(&mut self, now_us: u64, memory: Memory, address: u32, data: &[u8]) -> Result<(), FlashError>;
 
     /// Reads bytes, beginning at a word address, in the order in which they were written.
     fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError>;
 
-    /// Returns the stored validity record. If no record was written, the bytes are arbitrary.
+    /// Returns the stored validity record. If no validity record was written, the bytes are arbitrary.
     fn record(&self) -> [u8; RECORD_LEN];
 
-    /// Starts to make the record invalid.
+    /// Starts to make the validity record invalid.
     fn erase_record(&mut self, now_us: u64) -> Result<(), FlashError>;
 
-    /// Starts to write the record.
+    /// Starts to write the validity record.
     fn write_record(&mut self, now_us: u64, record: &[u8; RECORD_LEN]) -> Result<(), FlashError>;
 }
 
-/// The init pins of the chain (section 5 of the protocol).
+/// The init pins of a board in the chain (section 5 of the protocol).
 pub trait Pins {
     /// Returns the level of the incoming pin, which is permanently active on the first board.
     fn init_in(&self) -> bool;
 
-    /// Drives the outgoing pin. After power-up, the outgoing pin MUST be inactive without a call of this method.
+    /// Sets the level of the outgoing pin. After power-up, the outgoing pin MUST be inactive without a call of this method.
     fn set_init_out(&mut self, active: bool);
 }
 
 /// Data that survive a power loss, and data that never change.
 pub trait Store {
-    /// Returns the stored ASTART.
+    /// Returns the stored value of the status bit ASTART.
     fn autostart(&self) -> bool;
 
-    /// Stores ASTART. Called only if the value changes.
+    /// Stores the value of the status bit ASTART. The node calls this method only if the value changes.
     fn set_autostart(&mut self, on: bool);
 
-    /// Returns the description of the board for DSP_INFO, Latin-1.
+    /// Returns the description of the board for DSP_INFO, in Latin-1.
     fn description(&self) -> &[u8];
 }
 
-/// A text of the application.
+/// Text of an application in the IO description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Text {
     /// Description of the application, which may differ from the board's description (D-36).
     Application,
-    /// A controller input.
+    /// Description of the controller input with this index.
     Ci(u16),
-    /// A sensor output.
+    /// Description of the sensor output with this index.
     So(u16),
-    /// A parameter.
+    /// Description of the parameter with this index.
     Par(u16),
 }
 
-/// The program in the application area. Its methods are called only between [`Application::start`] and [`Application::stop`].
-/// Only [`Application::outputs`] with `false` may also be called at other times.
+/// Application program in the application area. The node calls the methods of this trait only between [`Application::start`] and
+/// [`Application::stop`]. Only [`Application::outputs`] with `false` may also be called at other times.
 pub trait Application {
-    /// Starts the program.
+    /// Starts the application program.
     fn start(&mut self, now_us: u64);
 
-    /// Ends the program. The outputs of the program MUST be safe when this method returns.
+    /// Ends the application program. The outputs of the program MUST be safe when this method returns.
     fn stop(&mut self);
 
-    /// Returns `true` if the program has started and can serve requests.
+    /// Returns `true` if the application program has started and can serve requests.
     fn is_up(&mut self, now_us: u64) -> bool;
 
-    /// Returns the number of inputs, outputs and parameters. The numbers MUST NOT change while the program runs.
+    /// Returns the number of inputs, outputs and parameters of the application. These numbers MUST NOT change while the application runs.
     fn dimensions(&self) -> Dimensions;
 
-    /// Returns a description in Latin-1. The text is empty if the application has no such description.
+    /// Returns a description of the application in Latin-1. The text is empty if the application has no such description.
     fn text(&self, text: Text) -> &[u8];
 
-    /// Returns the initial value of an input. The value applies until the input is set.
+    /// Returns the initial value of a controller input. The initial value applies until the PC sets the input.
     fn initial_ci(&self, index: u16) -> u16;
 
-    /// Returns the buffer for received inputs, one word for each input. The received inputs take effect at
+    /// Returns the buffer for received controller inputs, one word for each input. The received inputs take effect at
     /// [`Application::latch_ci`].
     fn ci(&mut self) -> &mut [u16];
 
     /// Applies all inputs in [`Application::ci`] at the same time.
     fn latch_ci(&mut self);
 
-    /// Returns the buffer for received parameters. The received parameters take effect in the next control cycle
-    /// (D-35).
+    /// Returns the buffer for received parameters, one word for each parameter. The received parameters take effect in the next control
+    /// cycle (D-35).
     fn par(&mut self) -> &mut [u16];
 
-    /// Takes a snapshot of the outputs for [`Application::so`].
+    /// Stores a snapshot of the sensor outputs for [`Application::so`].
     fn sample_so(&mut self);
 
-    /// Returns the outputs of the last snapshot, one word for each output.
+    /// Returns the sensor outputs of the last snapshot, one word for each output.
     fn so(&self) -> &[u16];
 
     /// Informs the application that the control loop starts or ends.
     fn run(&mut self, now_us: u64, running: bool);
 
-    /// Runs a control cycle. Called only while the loop runs.
+    /// Runs one control cycle. The node calls this method only while the control loop runs.
     fn step(&mut self, now_us: u64);
 
     /// Enables the outputs of the board (`true`), or makes the outputs safe (`false`).
@@ -156,7 +158,7 @@ pub trait Application {
         None
     }
 
-    /// Removes the oldest debug text. Called after the text was sent, or if the text is dropped.
+    /// Removes the oldest debug text. The node calls this method after the text was sent, or if the text is dropped.
     fn debug_done(&mut self) {}
 }
 
@@ -164,7 +166,7 @@ pub trait Application {
 mod tests {
     use super::*;
 
-    /// Minimal application.
+    /// Minimal application for the tests.
     struct Mute;
 
     impl Application for Mute {

@@ -1,35 +1,34 @@
-//! Progress of answers that consist of several frames.
+//! Progress of a board's answers that consist of several frames.
 
 use crate::frame::Payload;
 use crate::profile::Profile;
 use crate::string::string_package;
 
-/// Progress of an answer: no frame sent yet, or the number of the next package of the string `string`.
+/// Progress of an answer: no frame is sent yet, or the number of the next package of the string with the index `string`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     First,
     String { string: u32, package: u16 },
 }
 
-/// Answers in progress.
+/// Answers of the board that are in progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jobs {
     pub info: Option<Place>,
     pub info_again: bool,
     pub dump_io: Option<Place>,
-    /// Earliest time at which the next frame of the dump may be sent.
+    /// Earliest time at which the next frame of the IO description may be sent.
     pub dump_io_at: u64,
-    /// Earliest time of another dump, if the PC requested another dump during the current one.
+    /// Earliest time of another IO description, if the PC requested it again during the current answer.
     pub dump_io_again: Option<u64>,
-    /// Offset of the next package of the initial inputs.
+    /// Offset of the next package of the initial controller inputs.
     pub dump_ci: Option<u16>,
     pub dump_ci_again: bool,
-    /// Offset of the next package of the outputs.
+    /// Offset of the next package of the sensor outputs.
     pub so: Option<u16>,
-    /// Index of the next package of the text in progress. The second value is `true` if the node itself wrote the
-    /// text.
+    /// Index of the next package of the debug text in progress. The second value is `true` if the node itself wrote the text.
     pub text: Option<(u16, bool)>,
-    /// Text that the node itself wrote.
+    /// Debug text that the node itself wrote.
     pub own_text: Option<&'static [u8]>,
 }
 
@@ -49,15 +48,15 @@ impl Jobs {
         }
     }
 
-    /// Requests DSP_INFO. A request that arrives during a DSP_INFO answer is served after that answer, so strings are
-    /// never mixed (D-14).
+    /// Records a request for DSP_INFO. A request that arrives during a DSP_INFO answer is served after that answer, so the strings of two
+    /// answers are never mixed (D-14).
     pub(super) fn ask_info(&mut self) {
         self.info_again = self.info.is_some();
         self.info = self.info.or(Some(Place::First));
     }
 
-    /// Requests the IO description, like `ask_info` for DSP_INFO. The board does not send a frame of the answer before `due_us`. At
-    /// that time, the request with the same identifier has left the bus (D-05).
+    /// Records a request for the IO description, like `ask_info` for DSP_INFO. The board does not send a frame of the answer before
+    /// `due_us`. At `due_us`, the request with the same identifier has left the bus (D-05).
     pub(super) fn ask_dump_io(&mut self, due_us: u64) {
         if let Some(Place::String { .. }) = self.dump_io {
             self.dump_io_again = Some(due_us);

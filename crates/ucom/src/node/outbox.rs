@@ -1,37 +1,37 @@
-//! Single frames that wait for the bus.
+//! Single frames of a board that wait for the bus.
 
 use crate::error_code::ErrorCode;
 use crate::frame::Frame;
 use crate::function::Sequence;
 
-/// Largest number of waiting DSP_ERROR frames.
+/// Largest number of DSP_ERROR frames that wait for the bus.
 const ERRORS: usize = 8;
-/// Largest number of waiting reports.
+/// Largest number of reports that wait for the bus.
 const REPORTS: usize = 4;
 
-/// Single frames that wait for the bus.
+/// Single frames of a board that wait for the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outbox {
     /// Frame that the CAN controller has not sent yet.
     pub in_flight: Option<Frame>,
     /// `true` if the CAN controller failed to send a frame; DSP_ERROR 6 follows after the next frame that is sent.
     pub trouble: bool,
-    /// INITACK.
+    /// `true` if an INITACK waits for the bus.
     pub ack: bool,
     errors: [Option<(ErrorCode, Sequence)>; ERRORS],
-    /// DSP_READY.
+    /// `true` if a DSP_READY waits for the bus.
     pub block_taken: bool,
-    /// DSP_PROGFINISHED.
+    /// `true` if a DSP_PROGFINISHED waits for the bus.
     pub finished: bool,
     /// Due time of each report, and the index of the next frame of the report.
     pub reports: [Option<(u64, u8)>; REPORTS],
-    /// `true` if a report is due after the boot.
+    /// `true` if the board must send a report after the boot.
     pub report_after_boot: bool,
-    /// MCA_DSP_READY.
+    /// `true` if an MCA_DSP_READY waits for the bus.
     pub mca_ready: bool,
-    /// Heartbeat.
+    /// `true` if a heartbeat waits for the bus.
     pub alive: bool,
-    /// Due time of MCA_ADMIN_DATA.
+    /// Time at which MCA_ADMIN_DATA must be sent.
     pub admin_at: Option<u64>,
 }
 
@@ -52,20 +52,20 @@ impl Outbox {
         }
     }
 
-    /// Drops answers of a transfer that has ended.
+    /// Drops the waiting answers of a transfer that has ended.
     pub(super) fn forget_transfer(&mut self) {
         self.block_taken = false;
         self.finished = false;
     }
 
-    /// Drops frames that only an application sends.
+    /// Drops the waiting frames that only an application sends.
     pub(super) fn forget_application(&mut self) {
         self.mca_ready = false;
         self.alive = false;
         self.admin_at = None;
     }
 
-    /// Queues an error. Returns `false` if the queue is full.
+    /// Queues a DSP_ERROR frame. The function returns `false` if the queue is full.
     pub(super) fn push_error(&mut self, code: ErrorCode, from: Sequence) -> bool {
         let place = self.errors.iter_mut().find(|place| place.is_none());
         place.map(|place| *place = Some((code, from))).is_some()
@@ -86,7 +86,7 @@ impl Outbox {
         }
     }
 
-    /// Returns the earliest due time of the waiting frames.
+    /// Returns the earliest time at which a waiting frame is due.
     pub(super) fn deadline(&self) -> u64 {
         let first_error = self.errors.first().is_some_and(Option::is_some);
         if self.ack || first_error || self.block_taken || self.finished || self.mca_ready || self.alive {

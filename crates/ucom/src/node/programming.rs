@@ -1,4 +1,4 @@
-//! Programming of a new application: receipt of blocks, the two cycles, checks and flash operations (D-40 to D-46).
+//! Programming of a new application: reception of blocks, the two cycles, checks and flash operations (D-40 to D-46).
 
 use super::transfer::{Cycle, Work};
 use super::{Application, Area, Flash, FlashError, FlashState, Node, Pins, RECORD_LEN, Record, Store};
@@ -7,7 +7,7 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::{HeaderForm, Plan};
 use crate::program::{Checksum, Digest};
 
-/// Number of bytes that are read back from flash in one step. The limit ensures that a step is short.
+/// Number of bytes that the board reads back from flash in one step. The limit ensures that a verification step is short.
 const VERIFY_STEP: usize = 1024;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
@@ -16,8 +16,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.record.is_some()
     }
 
-    /// Aborts the transfer: sends one error, and ignores program data until PC_XRESET arrives or PROG changes from 0
-    /// to 1 (D-43).
+    /// Aborts the transfer: sends one error, and ignores program data until PC_XRESET arrives or PROG changes from 0 to 1 (D-43).
     pub(super) fn abort(&mut self, code: ErrorCode) {
         self.programming.cancel(&self.config.profile);
         self.programming.discard = true;
@@ -55,7 +54,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Checks if the pause between two frames is too long, and performs one step of the work in progress.
+    /// Checks if the pause between two frames of program data is too long, and performs one step of the work in progress.
     pub(super) fn program_timers(&mut self) {
         let programming = &self.programming;
         let pause = u64::from(self.config.profile.prog_frame_timeout) * 1000;
@@ -75,7 +74,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Work::Block(_) => return self.take_block(),
             _ => {}
         }
-        // No operation starts while the flash is busy.
+        // The board starts no flash operation while the flash is busy.
         let state = self.flash.state(now);
         if state == FlashState::Busy {
             return Ok(());
@@ -126,7 +125,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Parses a header (D-41). Rejects headers that this board cannot accept.
+    /// Parses the header of a cycle (D-41). The function rejects headers that this board cannot accept.
     fn take_header(&mut self) -> Result<(), ErrorCode> {
         let endian = self.config.profile.prog_endian;
         let header = Header::parse(&self.programming.block, endian).map_err(|_| ErrorCode::Data)?;
@@ -143,8 +142,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if self.programming.work == Work::ClearRecord { Ok(()) } else { self.block_taken() }
     }
 
-    /// Returns the header for a board whose images have no header block. The length is the configured length, but at
-    /// most the length of the area.
+    /// Returns the header for a board whose images have no header block. The length of the image is the configured length, but at most the
+    /// length of the application area.
     fn header_by_itself(&self) -> Option<Header> {
         let cycle = self.programming.number;
         let memory = match (self.config.profile.prog_plan, cycle) {
@@ -157,7 +156,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        // If the image of the second cycle is different, its Program ID replaces the Program ID of the first image.
+        // If the second cycle contains another image, the Program ID of that image replaces the Program ID of the first image.
         let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
@@ -187,7 +186,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         let digest = Digest::new(profile.prog_checksum, profile.prog_endian);
         self.programming.cycle = Some(Cycle { header, area, memory, writes, done: 0, digest });
-        // RAM is not erased, and the application in flash remains valid.
+        // A cycle that writes to RAM erases nothing, and the application in flash remains valid.
         if writes && memory != Memory::Ram {
             self.programming.work = Work::ClearRecord;
         }
@@ -204,13 +203,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if !cycle.writes {
             return self.after_data();
         }
-        // The bytes are written in wire order. The checksum uses wire order, too.
+        // The board writes the bytes in the order in which it received them. The checksum uses the same order of bytes.
         self.flash.write(self.now_us, cycle.memory, address, data).map_err(|_| ErrorCode::Flash)?;
         self.programming.work = Work::AwaitWrite;
         Ok(())
     }
 
-    /// Continues after a block was stored. Ends the cycle after the last block.
+    /// Continues the cycle after a block was stored. After the last block, the function ends the cycle.
     fn after_data(&mut self) -> Result<(), ErrorCode> {
         let profile = self.config.profile;
         let headerless = profile.prog_header == HeaderForm::None;
@@ -235,7 +234,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reads the image back from flash. The checksum of the image must match the Program ID (D-44).
+    /// Reads a part of the image back from flash. The checksum of the image must match the Program ID (D-44).
     fn verify(&mut self, done: u32) -> Result<(), ErrorCode> {
         let checksum = self.config.profile.prog_checksum;
         let cycle = self.programming.cycle.as_mut().ok_or(ErrorCode::ExloadCycle)?;

@@ -1,11 +1,11 @@
-//! A limit on the number of events in any second.
+//! Limit on the number of events in any second.
 
 const SECOND_US: u64 = 1_000_000;
 
 /// Times of the last events, at most `N` in any second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RateLimit<const N: usize> {
-    /// Times of the events, the oldest at index `next`; `None` for entries without an event.
+    /// Times of the events, the oldest time at index `next`; `None` for entries without an event.
     times: [Option<u64>; N],
     next: usize,
 }
@@ -15,8 +15,8 @@ impl<const N: usize> RateLimit<N> {
         Self { times: [None; N], next: 0 }
     }
 
-    /// Records an event and returns `true` if the event is allowed now. At most `limit` events (and at most `N`) are
-    /// allowed in any second.
+    /// Records an event and returns `true` if the rate limit allows the event now. At most `limit` events (and at most `N`) are allowed in
+    /// any second.
     pub(super) fn allow(&mut self, now_us: u64, limit: u32) -> bool {
         let recent = |time: &&Option<u64>| time.is_some_and(|time| now_us.saturating_sub(time) < SECOND_US);
         if self.times.iter().filter(recent).count() >= (limit as usize).min(N) {
@@ -51,8 +51,8 @@ mod tests {
         assert!(!RateLimit::<10>::new().allow(0, 0));
     }
 
-    /// Section 9: an event that occurred 1 s ago is not counted, and an event that occurred 999 999 µs ago is
-    /// counted. More than `N` events are never allowed.
+    /// Section 9: an event that occurred 1 s ago is not counted, and an event that occurred 999 999 µs ago is counted. The rate limit never
+    /// allows more than `N` events in a second.
     #[test]
     fn a_second_is_a_second() {
         let mut limit = RateLimit::<2>::new();

@@ -23,7 +23,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Ok((_, message)) => self.act(to, message),
             Err(error) if error.is_length() => self.wrong_length(function, to),
             Err(DecodeError::Foreign(_)) => self.count_foreign(),
-            // The frame was sent by a board, or a flag is neither 0 nor 1.
+            // The frame is a message of another board, or one of its flags is neither 0 nor 1.
             Err(_) => self.ignore(),
         }
     }
@@ -64,8 +64,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Sends DSP_ERROR 7 (D-12), but not for messages that the board ignores anyway. A board without a number does not send DSP_ERROR 7.
-    /// All boards without a number would send this error at the same time with the same identifier (D-06).
+    /// Sends DSP_ERROR 7 (D-12), except for messages that the board ignores anyway. A board without a number does not send DSP_ERROR 7.
+    /// Otherwise, all boards without a number would send this error at the same time with the same identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
         let served = matches!(self.app, App::Up | App::Running);
@@ -98,7 +98,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             ToBoard::Prog(data) => self.program(data, self.is_broadcast(to)),
             ToBoard::Start => self.start(),
             ToBoard::Alive => self.pc_is_alive(to),
-            // Functions that need the application are served only while the application runs.
+            // The board serves functions that need the application only while the application runs.
             _ if !served => self.ignore(),
             ToBoard::Ci(package) => self.receive_ci(&package),
             ToBoard::Par(package) => self.receive_par(&package),

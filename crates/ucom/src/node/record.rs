@@ -1,15 +1,15 @@
-//! The validity record, which is written last and cleared first (D-45).
+//! Validity record of an application. The board writes it last and clears it first (D-45).
 
 use super::hardware::RECORD_LEN;
 use crate::profile::Endian;
 use crate::program::{Checksum, checksum};
 
-/// Record of the application in flash. Without a complete record, the board has no application.
+/// Validity record of the application in flash. Without a complete validity record, the board has no application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// Program ID (D-44).
+    /// Program ID of the application (D-44).
     pub program_id: u16,
-    /// Flash date (D-45).
+    /// Flash date of the application (D-45).
     pub date: u16,
     /// Address of the image in words.
     pub address: u32,
@@ -20,8 +20,8 @@ pub struct Record {
 const MAGIC: [u8; 2] = *b"UR";
 
 impl Record {
-    /// Returns the bytes for the flash, including a checksum. Because of the checksum, a record that was not
-    /// completely written before a power loss is invalid.
+    /// Returns the bytes of the record for the flash, including a checksum. The checksum makes a record invalid if it was not completely
+    /// written before a power loss.
     pub fn build(&self) -> [u8; RECORD_LEN] {
         let [p0, p1] = self.program_id.to_le_bytes();
         let [d0, d1] = self.date.to_le_bytes();
@@ -36,7 +36,7 @@ impl Record {
         bytes
     }
 
-    /// Parses a record. Returns `None` if any byte is invalid.
+    /// Parses a validity record. Returns `None` if any byte is invalid.
     pub fn parse(bytes: &[u8; RECORD_LEN]) -> Option<Self> {
         let [_, _, p0, p1, d0, d1, a0, a1, a2, a3, w0, w1, w2, w3, ..] = *bytes;
         let record = Self {
@@ -53,7 +53,7 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// D-45: erased flash is not a valid record. A record is also invalid if one of its bytes was not written.
+    /// D-45: erased flash does not contain a valid record. A record is also invalid if one of its bytes was not written.
     #[test]
     fn d45_half_a_record_is_none() {
         let record = Record { program_id: 0x4B3F, date: 0x3AC1, address: 0x1000, words: 500 };

@@ -1,4 +1,4 @@
-//! The order in which a board sends its frames.
+//! Order in which a board sends its frames.
 
 use super::{Application, Flash, Node, Pins, Store};
 use crate::frame::Frame;
@@ -13,7 +13,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.number.unwrap_or(self.config.profile.unnumbered())
     }
 
-    /// Queues DSP_REPORT. The delay of the report in milliseconds equals the UCoM id (D-07).
+    /// Queues a DSP_REPORT. The delay of the report in milliseconds equals the UCoM id (D-07).
     pub(super) fn report(&mut self) {
         let wait = u32::from(self.config.flash_number & 0xFF);
         self.outbox.push_report(self.after_ms(wait));
@@ -33,8 +33,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.admin_at.get_or_insert(due);
     }
 
-    /// Returns the next frame. Single frames come first, ordered by urgency, and then answers that consist of several
-    /// frames.
+    /// Returns the next frame that the board must send. Single frames come first, ordered by urgency, and then answers that consist of
+    /// several frames.
     pub(super) fn next_frame(&mut self) -> Option<Frame> {
         let profile = self.config.profile;
         if let Some(number) = self.taking.or(self.number)
@@ -48,7 +48,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if let Some(report) = self.due_report() {
             return Some(FromBoard::Report(report).encode(self.own_number(), &profile));
         }
-        // All other frames need a sequence number.
+        // A board without a sequence number sends no other frames.
         let number = self.number?;
         let message = self.single_message().or_else(|| self.next_of_answers())?;
         Some(message.encode(number, &profile))

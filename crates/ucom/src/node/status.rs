@@ -5,7 +5,7 @@ use crate::error_code::ErrorCode;
 use crate::status::Status;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Returns the status byte.
+    /// Returns the status byte of the board.
     pub fn status(&self) -> Status {
         let started = self.app != App::Stopped;
         Status::default()
@@ -19,7 +19,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             .with(Status::IPINIT, self.pins.init_in())
     }
 
-    /// Handles PC_RESET and similar resets: makes the outputs safe, clears the state and returns to the exloader.
+    /// Handles PC_RESET and similar resets: makes the outputs safe, clears the state and returns the board to the exloader.
     pub(super) fn reboot(&mut self, now_us: u64, report: bool) {
         self.stop_application();
         self.forget_number();
@@ -33,7 +33,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.boot_until = Some(now_us.saturating_add(self.config.boot_us));
     }
 
-    /// Makes the exloader listen for frames. Reads the record of the application that is in flash at this time.
+    /// Ends the boot, so that the exloader listens for frames. The function reads the validity record of the application that is in flash
+    /// at this time.
     pub(super) fn booted(&mut self) {
         self.boot_until = None;
         self.record = Record::parse(&self.flash.record());
@@ -42,7 +43,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Deletes the sequence number and all state that depends on it.
+    /// Deletes the sequence number and all state of the board that depends on the number.
     pub(super) fn forget_number(&mut self) {
         self.number = None;
         self.taking = None;
@@ -57,7 +58,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.pins.set_init_out(active);
     }
 
-    /// Takes the number. Called when the CAN controller has sent INITACK (D-24).
+    /// Takes the number that the board has acknowledged. The node calls this function when the CAN controller has sent INITACK (D-24).
     pub(super) fn numbered(&mut self) {
         let Some(number) = self.taking.take() else { return };
         self.number = Some(number);

@@ -4,14 +4,14 @@ use super::{App, Application, Flash, FlashState, Node, Pins, Store};
 use crate::error_code::ErrorCode;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Returns the time that is `ms` milliseconds from now.
+    /// Returns the time that is `ms` milliseconds after the current time.
     pub(super) fn after_ms(&self, ms: u32) -> u64 {
         self.now_us.saturating_add(u64::from(ms) * 1000)
     }
 
     /// Returns a random number from 1 to `most`.
     pub(super) fn random(&mut self, most: u32) -> u32 {
-        // xorshift32, Marsaglia 2003.
+        // The generator is xorshift32 (Marsaglia 2003).
         self.random ^= self.random << 13;
         self.random ^= self.random >> 17;
         self.random ^= self.random << 5;
@@ -29,7 +29,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Advances the time to `now_us`, never backwards.
+    /// Sets the current time to `now_us`; the time never moves backwards.
     pub(super) fn advance(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         let now = self.now_us;

@@ -1,4 +1,4 @@
-//! Progress of a transfer of a new application.
+//! Progress of the transfer of a new application.
 
 use super::config::NodeConfig;
 use super::hardware::Area;
@@ -6,27 +6,27 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::Profile;
 use crate::program::Digest;
 
-/// Work that the board does after it has received a block.
+/// Work that the board performs after it has received a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
-    /// Waits for frames.
+    /// The board waits for frames.
     None,
-    /// A complete block was received and is processed at this time.
+    /// The board has received a complete block and processes the block at this time.
     Block(u64),
-    /// The validity record will be cleared before the flash is erased.
+    /// The board will clear the validity record before it erases the flash.
     ClearRecord,
     Erase,
     AwaitErase,
     AwaitWrite,
-    /// The image is being read back from flash; the value is the number of bytes read so far.
+    /// The board reads the image back from flash; the value is the number of bytes read so far.
     Verify(u32),
     WriteRecord,
     AwaitRecord,
-    /// DSP_READY is being sent. Until it has been sent, the block buffer must not change.
+    /// The board is sending DSP_READY. Until DSP_READY has been sent, the block buffer must not change.
     Answer,
 }
 
-/// Cycle in progress.
+/// Cycle of the transfer that is in progress.
 #[derive(Clone, Debug)]
 pub(super) struct Cycle {
     pub header: Header,
@@ -34,9 +34,9 @@ pub(super) struct Cycle {
     pub memory: Memory,
     /// `true` if the data of the cycle are written to memory; `false` if the data are only checked.
     pub writes: bool,
-    /// Bytes of the image received so far.
+    /// Number of bytes of the image that were received so far.
     pub done: u32,
-    /// Digest of the received data, and later of the data that are read back.
+    /// Digest of the received data. Later, the board uses it for the data that it reads back.
     pub digest: Digest,
 }
 
@@ -46,7 +46,7 @@ impl Cycle {
     }
 }
 
-/// State of a transfer.
+/// State of the transfer of an application.
 #[derive(Clone, Debug)]
 pub(super) struct Programming {
     pub block: [u8; BLOCK_LEN],
@@ -56,9 +56,9 @@ pub(super) struct Programming {
     /// Number of the cycle, 1 or 2.
     pub number: u16,
     pub cycle: Option<Cycle>,
-    /// Header of the first cycle, once that cycle has ended.
+    /// Header of the first cycle; `None` until that cycle has ended.
     pub first: Option<Header>,
-    /// `true` after an error: program data are dropped silently (D-43).
+    /// `true` after an error: the board drops program data silently (D-43).
     pub discard: bool,
 }
 
@@ -81,7 +81,7 @@ impl Programming {
         *self = Self::new(profile);
     }
 
-    /// Drops the transfer. If an error occurred before, the board continues to ignore program data.
+    /// Drops the transfer that is in progress. If an error occurred before, the board continues to ignore program data.
     pub(super) fn cancel(&mut self, profile: &Profile) {
         *self = Self { discard: self.discard, ..Self::new(profile) };
     }
@@ -90,7 +90,7 @@ impl Programming {
         self.discard
     }
 
-    /// Allows the next block. Called when DSP_READY has been sent.
+    /// Allows the PC to send the next block. The node calls this function when DSP_READY has been sent.
     pub(super) fn answered(&mut self) {
         if self.work == Work::Answer {
             self.work = Work::None;
@@ -104,7 +104,7 @@ impl Programming {
             Work::None | Work::Answer => u64::MAX,
             Work::Block(at) => at,
             Work::Verify(_) => 0,
-            // The state of the flash is polled again after 500 µs.
+            // The node polls the state of the flash again after 500 µs.
             _ => now_us.saturating_add(500),
         }
     }

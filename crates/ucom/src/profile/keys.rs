@@ -1,4 +1,4 @@
-//! The keys. Each line of the table contains field, default, range, rule and meaning of a key.
+//! Table of the profile keys. Each line of the table contains field, default, range, rule and meaning of a key.
 
 use core::fmt;
 
@@ -8,19 +8,19 @@ use crate::program::{Checksum, DateForm};
 /// Kind of a key's value, for file formats with typed values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A whole number.
+    /// The value is a whole number.
     Number,
-    /// `yes` or `no`.
+    /// The value is `yes` or `no`.
     YesNo,
-    /// A word from a fixed list.
+    /// The value is a word from a fixed list.
     Word,
 }
 
-/// Key of the profile.
+/// Key of the compatibility profile.
 pub struct Key {
     /// Name of the key in files, for example `prog.frame_gap_us`.
     pub name: &'static str,
-    /// Default as text.
+    /// Default of the key, as text.
     pub default: &'static str,
     /// Allowed values of the key, as text.
     pub range: &'static str,
@@ -62,16 +62,16 @@ impl Eq for Key {}
 macro_rules! keys {
     ($($field:ident: $type:ty = $value:expr, $kind:ident, $name:literal, $default:literal, $range:literal,
        $allowed:pat, $doc:literal;)+) => {
-        /// The values of all keys. [`Profile::default`] is this project's interpretation of the protocol.
+        /// Values of all profile keys. [`Profile::default`] is this project's interpretation of the protocol.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub struct Profile { $(#[doc = concat!("`", $name, "`: ", $doc, " Allowed: ", $range, ".")] pub $field: $type),+ }
 
         impl Profile {
-            /// The defaults, as a constant.
+            /// Defaults of all keys, as a constant.
             pub const DEFAULT: Self = Self { $($field: $value),+ };
         }
 
-        /// All keys, in the order that files and help use.
+        /// All keys of the profile, in the order that files and help use.
         pub static KEYS: &[Key] = &[$(Key {
             name: $name,
             default: $default,

@@ -1,4 +1,4 @@
-//! Types of keys whose values are not numbers.
+//! Types of the profile keys whose values are not numbers.
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ pub(crate) trait Value: Sized {
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
-/// Declares an enum with a word for each variant. Profile files use the words.
+/// Declares an enum with a word for each variant. Profile files contain these words.
 macro_rules! words {
     ($(#[$about:meta])* pub enum $name:ident { $($(#[doc = $doc:literal])+ $variant:ident = $word:literal,)+ }) => {
         $(#[$about])*
@@ -18,10 +18,10 @@ macro_rules! words {
         pub enum $name { $($(#[doc = $doc])+ $variant),+ }
 
         impl $name {
-            /// All values.
+            /// All values of the type.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// Returns the word that profile files use.
+            /// Returns the word that profile files contain for the value.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }
@@ -48,9 +48,9 @@ pub(crate) use words;
 words! {
     /// Order of the two bytes of a word (D-10).
     pub enum Endian {
-        /// The first byte is the least significant.
+        /// The first byte is the least significant byte.
         Little = "little",
-        /// The first byte is the most significant.
+        /// The first byte is the most significant byte.
         Big = "big",
     }
 }
@@ -74,11 +74,11 @@ impl Endian {
 }
 
 words! {
-    /// The broadcast number (D-04).
+    /// Number to which the PC sends broadcasts (D-04).
     pub enum Broadcast {
-        /// 0.
+        /// The broadcast number is 0.
         Zero = "0",
-        /// 31.
+        /// The broadcast number is 31.
         ThirtyOne = "31",
         /// There is no broadcast number for numbered boards; number 0 addresses the boards without a number.
         None = "none",
@@ -88,11 +88,11 @@ words! {
 words! {
     /// Form of the boards' reports to PC_REPORT and PC_RESET (D-07).
     pub enum ReportMode {
-        /// A single frame whose function and sequence field contain the 7-bit flash id.
+        /// The board sends a single frame whose function and sequence field contain the 7-bit flash id.
         Flash7 = "flash7",
-        /// A single DSP_REPORT0 with the board's sequence number.
+        /// The board sends a single DSP_REPORT0 with its sequence number.
         Seq = "seq",
-        /// Four frames, one for each of the functions DSP_REPORT0..3.
+        /// The board sends four frames, one for each of the functions DSP_REPORT0..3.
         All4 = "all4",
     }
 }
@@ -100,11 +100,11 @@ words! {
 words! {
     /// Content of the two cycles of an update (D-40).
     pub enum Plan {
-        /// The image is sent twice: the first cycle checks it, the second cycle writes it.
+        /// The update sends the image twice: the first cycle checks the image, and the second cycle writes the image.
         VerifyWrite = "verify-write",
-        /// The first cycle loads an exloader into RAM, the second cycle writes the application.
+        /// The first cycle loads an exloader into RAM, and the second cycle writes the application.
         ExloaderApp = "exloader-app",
-        /// The first cycle writes program memory, the second cycle writes data memory.
+        /// The first cycle writes program memory, and the second cycle writes data memory.
         PmemXmem = "pmem-xmem",
         /// Each cycle sends one of two files unchanged.
         Raw = "raw",
@@ -116,15 +116,15 @@ words! {
     pub enum HeaderForm {
         /// The header block that this project defines.
         V1 = "v1",
-        /// No header. The first block contains data, and the length is configured in the board.
+        /// The cycle has no header. The first block of the cycle contains data, and the length of the image is configured in the board.
         None = "none",
     }
 }
 
 words! {
-    /// Time at which controller inputs take effect (D-34).
+    /// Time at which received controller inputs take effect (D-34).
     pub enum CiLatch {
-        /// Each package takes effect when it arrives.
+        /// Each package of inputs takes effect when it arrives.
         Frame = "frame",
         /// All inputs take effect together with the package that contains the last word.
         Last = "last",
@@ -132,13 +132,13 @@ words! {
 }
 
 words! {
-    /// Receivers of the PC's heartbeat (D-04, D-50).
+    /// Receivers of a heartbeat frame from the PC (D-04, D-50).
     pub enum AliveMode {
         /// The PC sends a single broadcast frame.
         Broadcast = "broadcast",
-        /// The PC sends a frame to each board, and boards ignore broadcast heartbeats.
+        /// The PC sends a heartbeat to each board, and boards ignore broadcast heartbeats.
         Unicast = "unicast",
-        /// Both.
+        /// The PC sends both broadcast heartbeats and a heartbeat to each board.
         Both = "both",
     }
 }
@@ -146,11 +146,11 @@ words! {
 words! {
     /// Reaction of the PC if a board's heartbeat is missing (D-51).
     pub enum OnLost {
-        /// The PC only reports an event.
+        /// The PC only reports an event to its user.
         Report = "report",
-        /// Stops that board.
+        /// The PC stops the board whose heartbeat is missing.
         StopBoard = "stop-board",
-        /// Stops every board. For coupled joints.
+        /// The PC stops every board. This reaction is intended for coupled joints.
         StopAll = "stop-all",
     }
 }

@@ -1,5 +1,5 @@
-//! The acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. Rows of the table that transmit 16-bit words
-//! are tested in both byte orders.
+//! Tests of the acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. The tests use both byte orders for rows of the table that
+//! transmit 16-bit words.
 
 use ucom::profile::Endian;
 use ucom::{Frame, Profile, Sequence, Status};
@@ -9,7 +9,7 @@ use super::bus::{Bus, MS, frames, sorted};
 const FIVE: [u16; 5] = [0x21, 0x42, 0x63, 0x04, 0x7F];
 const FIVE_REPORTS: &str = "404#04 441#21 482#42 4C3#63 4DF#7F";
 
-/// D-T1, D-07: each board sends one report within 500 ms.
+/// D-T1, D-07: each board sends one report within 500 ms after the reset.
 #[test]
 fn d_t1_reset_reports() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -20,7 +20,7 @@ fn d_t1_reset_reports() {
     assert_eq!(sorted(bus.take()), frames(FIVE_REPORTS));
 }
 
-/// D-T2: PC_REPORT does not reset a board.
+/// D-T2: PC_REPORT requests reports without a reset of the boards.
 #[test]
 fn d_t2_report_without_reset() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -63,7 +63,7 @@ fn d_t4_numbers_follow_the_wire() {
     assert_eq!(numbers, [Some(1), Some(2), None, None, None]);
 }
 
-/// D-T5, D-24: a repeated request is acknowledged again and has no other effect.
+/// D-T5, D-24: a board acknowledges a repeated PC_INIT again, and the repetition has no other effect.
 #[test]
 fn d_t5_init_again() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -87,7 +87,7 @@ fn d_t6_set_status_is_literal() {
     assert_eq!(bus.status(1), 0x1B);
 }
 
-/// D-T7, D-22: bits that show the state of the board cannot be written.
+/// D-T7, D-22: PC_SETSTATUS cannot write bits that show the state of the board.
 #[test]
 fn d_t7_mirror_bits_stay() {
     let mut bus = Bus::initialised();
@@ -95,7 +95,7 @@ fn d_t7_mirror_bits_stay() {
         bus.send(text);
         assert_eq!(bus.status(1), 0x1B, "{text}");
     }
-    // The state bits cannot be written while the loop runs, either.
+    // PC_SETSTATUS cannot write the state bits while the control loop runs, either.
     let mut bus = Bus::running();
     for text in ["1C1#2000", "1C1#1010", "1C1#0010"] {
         bus.send(text);
@@ -103,7 +103,7 @@ fn d_t7_mirror_bits_stay() {
     }
 }
 
-/// D-T8, D-20, D-23: the status byte is correct in every state.
+/// D-T8, D-20, D-23: the status byte of a board is correct in every state.
 #[test]
 fn d_t8_status_walk() {
     let mut bus = Bus::one();
@@ -137,8 +137,8 @@ fn d_t9_start() {
     assert_eq!(bus.status(1), 0x1B);
 }
 
-/// D-T10, D-36, D-12: the board sends the dimensions, and then one string for each signal. A frame with data is not
-/// treated as a request.
+/// D-T10, D-36, D-12: the board sends the dimensions of its buffers, and then one string for each signal. The board does not treat a frame
+/// with data as a request.
 #[test]
 fn d_t10_io_description() {
     let mut bus = Bus::started();
@@ -200,7 +200,7 @@ fn d_t12_inputs_beyond_the_dimension() {
     assert_eq!(bus.boards[0].application.par, [0, 0, 7]);
 }
 
-/// D-T13, D-50: without the PC's heartbeat the board stops, and only a start command starts the application again.
+/// D-T13, D-50: without the PC's heartbeat, the board ends its control loop, and only a start command starts the loop again.
 #[test]
 fn d_t13_pc_lost() {
     let mut bus = Bus::started();
@@ -237,7 +237,7 @@ fn d_t13_pc_lost() {
     assert!(bus.take().iter().any(|frame| frame.id() == 0x381));
 }
 
-/// D-T14, D-50: one missing heartbeat has no effect, and three missing heartbeats stop the board.
+/// D-T14, D-50: one missing heartbeat of the PC has no effect, and three missing heartbeats end the control loop.
 #[test]
 fn d_t14_alive_for_a_minute() {
     let mut bus = Bus::started();
@@ -254,7 +254,7 @@ fn d_t14_alive_for_a_minute() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-T15, D-37, D-12: a board ignores flags other than 0 and 1, and reports a frame that is too short.
+/// D-T15, D-37, D-12: a board ignores flags other than 0 and 1, and reports an MCA_ADMIN_DATA frame that is too short.
 #[test]
 fn d_t15_bad_flags() {
     let mut bus = Bus::started();
@@ -301,7 +301,7 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(bus.boards[0].status(), Status(0x59));
 }
 
-/// D-T20, D-24, D-06: a second request arrives before the acknowledgement has been sent.
+/// D-T20, D-24, D-06: a second PC_INIT arrives before the acknowledgement of the first PC_INIT has been sent.
 #[test]
 fn d_t20_init_while_the_acknowledgement_waits() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());

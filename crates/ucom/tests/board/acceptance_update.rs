@@ -1,10 +1,10 @@
-//! The acceptance table for boards, D-T17 to D-T19: updates of a board with raw frames.
+//! Tests of the acceptance table for boards, D-T17 to D-T19: updates of a board with raw frames.
 
 use ucom::{Frame, Profile, Status};
 
 use super::bus::{Bus, blocks, frames, header, image, sorted};
 
-/// D-T17, D-40, D-42: a complete update with raw frames and the golden header.
+/// D-T17, D-40, D-42: the test performs a complete update with raw frames and the golden header.
 #[test]
 fn d_t17_update() {
     let mut bus = Bus::initialised();
@@ -134,7 +134,7 @@ fn d_t18_mistakes_in_a_transfer() {
         let before = bus.errors.len();
         mistake(&mut bus);
         bus.run(5);
-        // Forty frames that the PC sent before it received the error.
+        // The PC sends these forty frames before it receives the error.
         for _ in 0..40 {
             bus.send("2C1#FFFFFFFFFFFFFFFF");
         }

@@ -5,7 +5,7 @@ use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
 
 use super::bus::{Bus, MS, frames};
 
-/// Returns the debug texts among received frames.
+/// Returns the debug texts in the received frames.
 fn texts(received: &[Frame]) -> Vec<String> {
     let profile = Profile::default();
     let mut assembler = StringAssembler::<512>::new();
@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: on shared identifiers, a board sends an answer 2 ms after the request, and a message without a request
-/// after 1 to 8 ms. Different boards send at different times.
+/// D-05: on a shared identifier, a board sends an answer 2 ms after the request, and a message without a request after 1 to 8 ms. Different
+/// boards send their messages at different times.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();
@@ -43,7 +43,7 @@ fn d05_shared_identifiers() {
     assert!(delays.len() >= 6, "{delays:?}");
 }
 
-/// D-33: a board sends one snapshot of all outputs every 10 ms, in ascending order.
+/// D-33: a board sends one snapshot of all sensor outputs every 10 ms, with ascending offsets.
 #[test]
 fn d33_outputs() {
     let mut bus = Bus::running();
@@ -63,7 +63,7 @@ fn d33_outputs() {
     }
 }
 
-/// D-33: if the bus is too busy for the outputs, the board skips them. The length of the queue remains limited.
+/// D-33: if the bus is too busy for the sensor outputs, the board skips them. The length of the board's queue remains limited.
 #[test]
 fn d33_outputs_on_a_blocked_bus() {
     let mut bus = Bus::running();
@@ -76,7 +76,7 @@ fn d33_outputs_on_a_blocked_bus() {
     assert!(bus.take().len() <= 6);
 }
 
-/// D-34, D-50: a start sets the initial inputs, even if inputs were set before.
+/// D-34, D-50: a start of the application sets the initial inputs, even if the PC set inputs before.
 #[test]
 fn d34_initial_inputs_at_the_start() {
     let mut bus = Bus::initialised();
@@ -91,7 +91,7 @@ fn d34_initial_inputs_at_the_start() {
     }
 }
 
-/// D-34: with the latch `last`, all inputs take effect together.
+/// D-34: with `ci.latch = last`, all inputs take effect together.
 #[test]
 fn d34_latch_last() {
     let profile = Profile { ci_latch: CiLatch::Last, ..Profile::default() };
@@ -107,7 +107,7 @@ fn d34_latch_last() {
     assert_eq!(bus.boards[0].application.latched_ci, [1, 2, 3, 4]);
 }
 
-/// D-38: texts are sent only if requested, at most 20 in any second.
+/// D-38: a board sends debug texts only if the PC requests them, at most 20 texts in any second.
 #[test]
 fn d38_debug_texts() {
     let mut bus = Bus::started();
@@ -135,7 +135,7 @@ fn d38_debug_texts() {
     assert!(bus.boards[0].counters().texts_dropped > 300);
 }
 
-/// D-50: the loss of the PC is reported as a text if texts are requested. The debug flags do not change.
+/// D-50: a board reports the loss of the PC as a debug text if the PC requested texts. The debug flags of the board do not change.
 #[test]
 fn d50_text_when_the_pc_is_lost() {
     let mut bus = Bus::started();
@@ -174,8 +174,8 @@ fn d34_error_rate() {
     assert_eq!(bus.boards[0].counters().errors_dropped, 90);
 }
 
-/// D-14: if a request is repeated while it is being answered, the second answer follows after the first one.
-/// Packages of different strings are not mixed.
+/// D-14: if the PC repeats a request while the board answers it, the second answer follows after the first answer. The board does not mix
+/// packages of different strings.
 #[test]
 fn d14_requests_during_their_answers() {
     let mut bus = Bus::started();
@@ -192,7 +192,7 @@ fn d14_requests_during_their_answers() {
     assert_eq!(bus.take(), [one.clone(), one].concat());
 }
 
-/// D-34, D-35: the control loop is called periodically while it runs, and is not called while it does not run.
+/// D-34, D-35: the node calls the control cycle periodically while the loop runs, and does not call it at other times.
 #[test]
 fn d35_control_cycles() {
     let mut bus = Bus::started();
@@ -207,7 +207,7 @@ fn d35_control_cycles() {
     assert_eq!(bus.boards[0].application.steps, steps);
 }
 
-/// Events of the CAN controller cause errors 6 and 8.
+/// Problems of the CAN controller cause the errors 6 and 8.
 #[test]
 fn controller_troubles_are_reported() {
     let mut bus = Bus::initialised();
@@ -222,7 +222,7 @@ fn controller_troubles_are_reported() {
     assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
 }
 
-/// `sent` and `not_sent` have an effect only if they name the frame that is in the CAN controller.
+/// `sent` and `not_sent` have an effect only if their frame is the frame in the CAN controller.
 #[test]
 fn other_frames_than_the_one_on_its_way_are_ignored() {
     let mut bus = Bus::initialised();
@@ -238,13 +238,13 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     board.sent(now, &acknowledge);
     assert_eq!(board.poll(now), Some("081#07".parse().unwrap()), "and no DSP_ERROR 6 before it");
     assert_eq!(board.counters().not_sent, 0);
-    // The frame has been sent, and the board does not send it a second time.
+    // The frame has been sent, so the board does not send it a second time.
     board.sent(now, &acknowledge);
     board.not_sent(now, &acknowledge);
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
 }
 
-/// D-38: while a program is starting, the board neither reads nor drops the texts of the program.
+/// D-38: while an application is starting, the board neither reads nor drops the debug texts of the application.
 #[test]
 fn d38_texts_of_a_program_that_is_not_up() {
     let mut bus = Bus::initialised();
@@ -259,8 +259,8 @@ fn d38_texts_of_a_program_that_is_not_up() {
     assert_eq!(bus.boards[0].counters().texts_dropped, 1, "up, and nobody wants it");
 }
 
-/// D-37: a change of the flag `active` enables the outputs. If the program has made its outputs safe, they stay
-/// safe when the PC repeats its flags.
+/// D-37: only a change of the flag `active` enables the outputs. If the application has made its outputs safe, they stay safe when the PC
+/// repeats its flags.
 #[test]
 fn d37_repeated_flags_enable_nothing() {
     let mut bus = Bus::started();
@@ -274,12 +274,12 @@ fn d37_repeated_flags_enable_nothing() {
     assert!(bus.boards[0].application.active, "0 and 1 again");
 }
 
-/// Contract of [`ucom::node::Application`]: `stop` is called only for a program that runs.
+/// Contract of [`ucom::node::Application`]: the node calls `stop` only for an application that runs.
 #[test]
 fn a_program_is_stopped_once() {
     for text in ["000#", "041#", "1C1#0800", "1C1#0404"] {
         let mut bus = Bus::initialised();
-        // Only a stop would change the flag `running`.
+        // Only a call of `stop` would change the field `running`.
         bus.boards[0].application.running = true;
         bus.send(text);
         assert!(bus.boards[0].application.running, "{text}");
@@ -290,7 +290,7 @@ fn a_program_is_stopped_once() {
     assert_eq!(bus.boards[0].application.started_us, None);
 }
 
-/// D-50: a start command while the loop runs is not a heartbeat of the PC.
+/// D-50: a start command while the control loop runs does not count as a heartbeat of the PC.
 #[test]
 fn d50_a_repeated_start_is_no_heartbeat() {
     let mut bus = Bus::running();
@@ -303,7 +303,7 @@ fn d50_a_repeated_start_is_no_heartbeat() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-14, D-36: the end of the application ends its dumps, but not the board's own description.
+/// D-14, D-36: the end of the application ends its dumps, but does not end the board's own description.
 #[test]
 fn d14_info_survives_the_application() {
     let mut bus = Bus::started();
@@ -322,8 +322,8 @@ fn d14_info_survives_the_application() {
     assert!(received.iter().all(|frame| frame.id() == first.id()));
 }
 
-/// D-14, D-36: a second request during a dump of the inputs causes one further dump after the first dump. If the
-/// application has no inputs, the board does not send a dump.
+/// D-14, D-36: a second request during a dump of the inputs causes one further dump after the first dump. If the application has no inputs,
+/// the board does not send a dump.
 #[test]
 fn d14_dump_of_inputs_twice() {
     for (dimension, packages) in [(0, 0), (3, 1), (7, 3)] {

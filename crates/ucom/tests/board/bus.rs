@@ -1,4 +1,4 @@
-//! A chain of boards on an in-memory bus, in virtual time.
+//! Test bus in memory with a chain of boards, in virtual time.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{BoardInfo, Frame, Header, Profile, checksum, data_block};
@@ -8,22 +8,22 @@ pub(super) type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplicati
 
 pub(super) const MS: u64 = 1000;
 
-/// Boards and the frames on their bus.
+/// Boards on a test bus, and the frames that they sent.
 pub(super) struct Bus {
     pub boards: Vec<Board>,
     pub now: u64,
     /// Frames that the boards have sent since the last `take`, with their times.
     pub received: Vec<(u64, Frame)>,
-    /// All DSP_ERROR frames since the start.
+    /// All DSP_ERROR frames since the start of the test.
     pub errors: Vec<Frame>,
-    /// Condition for frames that the bus delays; the boards of these frames wait for `sent`.
+    /// Condition for frames that the bus delays; the boards that sent these frames wait for `sent`.
     pub hold: fn(&Frame) -> bool,
     pub held: Vec<(usize, Frame)>,
-    /// Index (from 0) of the frame from the PC to the boards that is lost.
+    /// Index (from 0) of the frame that is lost between the PC and the boards.
     pub lose_to_boards: Option<usize>,
     pub frames_to_boards: usize,
-    /// Index (from 0) of the frame from the boards that is lost. The board is told by `sent` that the lost frame was
-    /// sent.
+    /// Index (from 0) of the frame that is lost between the boards and the PC. The bus calls `sent` for the board although this frame is
+    /// lost.
     pub lose_from_boards: Option<usize>,
     pub frames_from_boards: usize,
 }
@@ -42,11 +42,11 @@ pub(super) fn application() -> MemoryApplication {
     )
 }
 
-/// The application of the golden vectors: Program ID 0x1234, 2008-03-14.
+/// Record of the application of the golden vectors: Program ID 0x1234, date 2008-03-14.
 pub(super) const GOLDEN: Record = Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 };
 
 impl Bus {
-    /// Creates boards with these flash numbers that are programmed, powered up at time 0 and ready to listen.
+    /// Creates boards with these flash numbers. The boards are programmed, powered up at time 0 and ready to listen.
     pub(super) fn new(flash_numbers: &[u16], profile: Profile) -> Self {
         let mut boards = Vec::new();
         for (flash_number, pins) in flash_numbers.iter().zip(WirePins::chain(flash_numbers.len())) {
@@ -129,20 +129,20 @@ impl Bus {
         self.check();
     }
 
-    /// Lets milliseconds pass.
+    /// Advances the time by `ms` milliseconds.
     pub(super) fn run(&mut self, ms: u64) {
         self.run_us(ms * MS);
     }
 
     pub(super) fn run_us(&mut self, us: u64) {
         let end = self.now + us;
-        // Number of consecutive steps without a frame. The limit below is much larger than the number of wake-ups
+        // Number of consecutive steps of the test bus without a frame. The limit of quiet steps is much larger than the number of wake-ups
         // that can be due at one time.
         let mut quiet = 0;
         loop {
             let now = self.now;
-            // Arbitration of the bus: every board offers a frame. The frame with the lowest identifier is sent
-            // first, and the other frames wait.
+            // Arbitration of the bus: every board has at most one frame ready. The frame with the lowest identifier is sent first, and the
+            // other frames wait.
             let mut offers: Vec<(u16, usize, Frame)> = Vec::new();
             for (i, board) in self.boards.iter_mut().enumerate() {
                 if let Some(frame) = board.poll(now) {
@@ -208,7 +208,7 @@ impl Bus {
         std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
 
-    /// Sends a frame, waits, and returns the frames received after it.
+    /// Sends a frame of the PC, waits, and returns the frames that boards sent after it.
     pub(super) fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
         self.received.clear();
         self.send(text);
@@ -216,7 +216,7 @@ impl Bus {
         self.take()
     }
 
-    /// Returns DSP_INFO of board `n`; `None` if the board does not answer.
+    /// Returns the DSP_INFO of board `n`; returns `None` if the board does not answer.
     pub(super) fn info(&mut self, n: u8) -> Option<BoardInfo> {
         let id = 0x140 + u16::from(n);
         let endian = self.boards[0].config().profile.endian;
@@ -230,7 +230,7 @@ impl Bus {
         self.info(n).unwrap_or_else(|| panic!("board {n} does not answer")).status.0
     }
 
-    /// Sends a block in frames 200 µs apart and waits for an answer of board 1. Returns the received frames.
+    /// Sends a block as frames 200 µs apart and waits for an answer of board 1. The function returns the received frames.
     pub(super) fn block(&mut self, block: &[u8; 64], wait_ms: u64) -> Vec<Frame> {
         self.received.clear();
         for data in block.chunks_exact(8) {
@@ -247,17 +247,17 @@ impl Bus {
     }
 }
 
-/// Parses frames in candump's form that are separated by blanks.
+/// Parses frames in the format of candump that are separated by blanks.
 pub(super) fn frames(text: &str) -> Vec<Frame> {
     text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
 }
 
-/// Returns the image of the golden vectors: 1000 bytes.
+/// Returns the image of the golden vectors, which has 1000 bytes.
 pub(super) fn image() -> Vec<u8> {
     (0..1000).map(|i| (37 * i + 11) as u8).collect()
 }
 
-/// Returns the header of an image for any board.
+/// Returns the header of an image that is intended for any board.
 pub(super) fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     Header {
         cycle,
@@ -270,7 +270,7 @@ pub(super) fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     }
 }
 
-/// Returns all blocks of both cycles, including the headers.
+/// Returns all blocks of both cycles of an update, including the headers.
 pub(super) fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     let mut all = Vec::new();
     for cycle in 1..=2 {

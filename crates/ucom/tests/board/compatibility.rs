@@ -12,7 +12,7 @@ fn with(change: impl FnOnce(&mut Profile)) -> Profile {
     profile
 }
 
-/// D-07: boards report in the modes that are not the default.
+/// D-07: boards send reports in the modes that are not the default.
 #[test]
 fn d07_report_modes() {
     let mut bus = Bus::new(&[0x21], with(|p| p.report_mode = ReportMode::All4));
@@ -29,7 +29,7 @@ fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
         let mut bus = Bus::new(&[0x21, 0x42, 0x63], with(|p| p.chain_auto_opinit = auto));
         bus.number(1);
-        // The PC does not receive INITACK(2).
+        // In this test, the PC does not receive INITACK(2).
         bus.ask("282#", 20);
         if blind {
             bus.ask("282#", 20);
@@ -61,7 +61,7 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.status(1), 0x5D);
 }
 
-/// D-10, D-13: boards with the other byte order and with the other way to count packages of strings.
+/// D-10, D-13: the test uses boards with the other byte order and with the other count of string packages.
 #[test]
 fn d10_d13_words_and_counts() {
     let profile = with(|p| {
@@ -74,7 +74,7 @@ fn d10_d13_words_and_counts() {
     assert_eq!(bus.ask("201#", 20), frames(expected));
 }
 
-/// D-15: with `pd_short_last`, the last package contains no unused words.
+/// D-15: with `pd_short_last`, the last package of a buffer contains no unused words.
 #[test]
 fn d15_short_last_package() {
     let mut bus = Bus::new(&[0x21], with(|p| p.pd_short_last = true));
@@ -84,8 +84,7 @@ fn d15_short_last_package() {
     assert_eq!(bus.ask("5C1#", 20), frames("6C1#000000000000"));
 }
 
-/// D-04: a profile whose numbers begin at 0 and whose broadcast number is 31, and a profile without a broadcast
-/// number.
+/// D-04: the test uses a profile whose numbers begin at 0 and whose broadcast number is 31, and a profile without a broadcast number.
 #[test]
 fn d04_other_addresses() {
     let profile = with(|p| {
@@ -182,7 +181,7 @@ fn d04_boards_do_not_listen_to_boards() {
     assert_eq!((board.status(), board.poll(now)), (Status(0x1B), None));
 }
 
-/// A message that the board's state does not allow is counted and not answered.
+/// A board counts a message that its state does not allow, and does not answer it.
 #[test]
 fn ignored_messages_are_counted() {
     let mut bus = Bus::initialised();

@@ -6,7 +6,7 @@ use ucom_sim::memory::{MemoryFlash, WirePins};
 
 use super::bus::application;
 
-/// Value of ASTART, and the number of writes to it.
+/// Stored value of ASTART, and the number of writes to it.
 #[derive(Default)]
 struct Counted {
     autostart: bool,
@@ -28,8 +28,8 @@ impl Store for Counted {
     }
 }
 
-/// D-22 and the contract of [`Store::set_autostart`]: the board writes non-volatile memory only if the value
-/// changes, because each write causes wear.
+/// D-22 and the contract of [`Store::set_autostart`]: the board writes non-volatile memory only if the value of ASTART changes, because
+/// each write causes wear.
 #[test]
 fn d22_autostart_is_kept_on_changes_only() {
     let pins = WirePins::chain(1).remove(0);
@@ -47,7 +47,7 @@ fn d22_autostart_is_kept_on_changes_only() {
         ("1C1#0200", true, 1),
         ("1C1#4000", false, 2),
         ("1C1#4000", false, 2),
-        // A board without a number also stores ASTART.
+        // A PC_SETSTATUS that clears INIT and sets ASTART also stores ASTART.
         ("1C1#0840", true, 3),
     ] {
         board.receive(now, &text.parse::<Frame>().unwrap());

@@ -1,4 +1,4 @@
-//! Tests of boards over the bus, which send raw frames and check the raw answers.
+//! Tests of boards over the bus: the tests send raw frames and check the raw answers.
 
 mod acceptance;
 mod acceptance_update;

@@ -1,4 +1,4 @@
-//! A million random frames, and the size of a board.
+//! Tests with a million random frames, and a test of the size of a board.
 
 use ucom::node::Phase;
 use ucom::{Frame, Profile};
@@ -22,8 +22,8 @@ impl Random {
     }
 }
 
-/// D-20: any frame may arrive at any time. The status byte is always consistent, and no two boards get the same
-/// number. Outputs are active only while the loop runs, and boards send only frames of the protocol.
+/// D-20: the test sends any frame at any time. The status byte of a board is always consistent, and no two boards get the same number.
+/// Outputs are active only while the control loop runs, and boards send only frames of the protocol.
 #[test]
 fn d20_a_million_random_frames() {
     let seed = std::env::var("UCOM_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(2026);
@@ -32,7 +32,7 @@ fn d20_a_million_random_frames() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());
     let mut seen = std::collections::BTreeMap::new();
     for i in 0..1_000_000u32 {
-        // Most frames are valid messages, because random identifiers alone never bring a board out of state S1.
+        // Most frames of the test are valid messages, because random identifiers alone never bring a board out of state S1.
         let function = if random.below(8) == 0 { random.below(32) } else { random.below(28) };
         let sequence = if random.below(8) == 0 { random.below(64) } else { random.below(4) };
         let (len, data) = match random.below(3) {
@@ -41,7 +41,7 @@ fn d20_a_million_random_frames() {
             _ => (0, 0),
         };
         let id = (function << 6 | sequence) as u16 & 0x7FF;
-        // With frequent resets, all boards would remain in state S1.
+        // The test skips most resets, because with frequent resets all boards would remain in state S1.
         if id >> 6 == 0 && random.below(50) != 0 {
             continue;
         }
@@ -80,7 +80,7 @@ fn d20_a_million_random_frames() {
     }
 }
 
-/// The state of a board fits into 4 KiB, not including its flash and the buffers of its application.
+/// The state of a board fits into 4 KiB, without its flash and the buffers of its application.
 #[test]
 fn size_of_a_board() {
     use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};

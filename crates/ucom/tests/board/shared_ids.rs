@@ -1,5 +1,4 @@
-//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes during the
-//! transmission.
+//! Tests of identifiers that the PC and a board share (D-05), and of answers whose text changes during the transmission.
 
 use proptest::prelude::*;
 use ucom::Profile;
@@ -25,7 +24,7 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
         "1C1#8000",
     ]);
     let short = (0_u64..3_000).prop_map(Act::Wait);
-    // During this time without a frame of the PC, the board itself may report that the PC is lost.
+    // If the PC sends no frame during this time, the board itself may report that the PC is lost.
     let long = (1_490_000_u64..1_512_000).prop_map(Act::Wait);
     let act = prop_oneof![3 => send.prop_map(Act::Send), 4 => short, 1 => long];
     prop::collection::vec(act, 1..40)
@@ -45,16 +44,15 @@ proptest! {
                 Act::Send(text) => {
                     bus.send(text);
                     let id = u16::from_str_radix(&text[..3], 16).unwrap();
-                    // MCA_PC_START is recorded with its own identifier, which only the PC uses. The answer to
-                    // MCA_PC_START is MCA_ADMIN_DATA.
+                    // The test records MCA_PC_START with its own identifier, which only the PC uses. The answer to MCA_PC_START is
+                    // MCA_ADMIN_DATA.
                     asked.push((bus.now, id));
                 }
             }
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // A dump of the IO description begins with the dimensions. The remaining frames of a dump in progress
-            // follow at once (D-14).
+            // A dump of the IO description begins with the dimensions. The remaining frames of a dump in progress follow at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());
@@ -65,8 +63,8 @@ proptest! {
     }
 }
 
-/// D-14: if the text of an answer becomes shorter during the transmission, the answer ends. The board then answers
-/// later requests.
+/// D-14: if the text of an answer becomes shorter during the transmission, the answer ends. After such an answer, the board answers later
+/// requests.
 #[test]
 fn d14_an_answer_ends_when_its_text_changes() {
     let long = "a description of more than one package, so that it can end early".to_owned();
@@ -79,7 +77,7 @@ fn d14_an_answer_ends_when_its_text_changes() {
                 bus.boards[0].store.description = long.clone().into_bytes();
                 bus.boards[0].application.texts.application = long.clone().into_bytes();
                 bus.send(request);
-                // The text changes after `after` frames of the answer have been sent.
+                // The text of the board changes after `after` frames of the answer have been sent.
                 while bus.received.iter().filter(|(_, f)| f.id() == id).count() < after {
                     bus.run_us(50);
                 }
@@ -104,9 +102,8 @@ fn d14_an_answer_ends_when_its_text_changes() {
     }
 }
 
-/// D-06, D-12: a board without a number does not report wrong lengths, even with `dlc.strict`, and does not
-/// answer. Otherwise all boards without a number would send the report at the same time with the same
-/// identifier.
+/// D-06, D-12: a board without a number does not report wrong lengths, even with `dlc.strict`, and does not answer. Otherwise, all boards
+/// without a number would report a wrong length at the same time with the same identifier.
 #[test]
 fn d06_d12_no_error_without_a_number() {
     let profile = Profile { dlc_strict: true, ..Profile::default() };
@@ -117,7 +114,7 @@ fn d06_d12_no_error_without_a_number() {
         assert_eq!(bus.ask(text, 300), [], "{text}");
         bus.number(1);
         let expected = match text {
-            // A board with a number reports the wrong length.
+            // A board that has a number reports the wrong length.
             "000#00" | "240#00" | "281#00" | "200#00" | "000#0000000000000000" => "081#07",
             _ => "",
         };

@@ -1,11 +1,11 @@
-//! Tests of the state table, in which each event is tested in each state.
+//! Tests of the state table of a board; the tests send each event in each state.
 
 use ucom::node::Phase;
 use ucom::{Frame, Profile, Sequence, Status};
 
 use super::bus::{Bus, blocks, frames, image};
 
-/// The columns of the state table. S3x (`Aborted`) and S4 (`Starting`) are separate columns here.
+/// Columns of the state table. S3x (`Aborted`) and S4 (`Starting`) are separate columns here.
 const STATES: [Phase; 7] = [
     Phase::Uninitialised,
     Phase::Idle,
@@ -16,7 +16,7 @@ const STATES: [Phase; 7] = [
     Phase::Running,
 ];
 
-/// Returns board 1 (flash number 0x21) in a state, with no frame waiting on the bus.
+/// Returns board 1 (flash number 0x21) in the given state, with no frame waiting for the bus.
 fn in_state(phase: Phase) -> Bus {
     let mut bus = match phase {
         Phase::Uninitialised => Bus::one(),
@@ -45,19 +45,18 @@ fn in_state(phase: Phase) -> Bus {
 /// State and frames of a board after an event.
 struct Seen {
     phase: Phase,
-    /// Frames sent within 9 ms, before the first transfer of the outputs.
+    /// Frames that the board sent within 9 ms, before the first transfer of the outputs.
     sent: Vec<Frame>,
 }
 
 fn event(phase: Phase, text: &str) -> Seen {
     let mut bus = in_state(phase);
-    // In S6 the board sends the outputs every 10 ms; output frames are not answers.
+    // In S6, the board sends its outputs every 10 ms; output frames are not answers.
     let sent = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
     Seen { phase: bus.boards[0].phase(), sent }
 }
 
-/// Checks a row of the table. For each state, `expected` returns the state after the event and the frames that the
-/// board sends.
+/// Checks one row of the state table. For each state, `expected` returns the state after the event and the frames that the board sends.
 fn row(text: &str, expected: impl Fn(Phase) -> (Phase, &'static str)) {
     for phase in STATES {
         let seen = event(phase, text);
@@ -188,7 +187,7 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
-/// D-12, D-06: a frame that is too short is reported, unless the board ignores messages of this kind.
+/// D-12, D-06: a board reports a frame that is too short, unless it ignores messages of this kind.
 #[test]
 fn d12_short_frames_in_every_state() {
     row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
@@ -202,7 +201,7 @@ fn d12_short_frames_in_every_state() {
     }
 }
 
-/// D-12: with `dlc.strict`, the board also reports surplus data.
+/// D-12: with `dlc.strict`, the board also reports surplus data bytes.
 #[test]
 fn d12_long_frames_when_lengths_are_strict() {
     for (text, idle, ready) in [
@@ -271,7 +270,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
             let taken = application.latched_ci[1] == 7 || application.par[1] == 7;
             assert_eq!(taken, matches!(phase, Ready | Running), "{text} in {phase:?}");
         }
-        // Inputs and parameters that are sent by broadcast have no effect.
+        // Inputs and parameters that the PC sends by broadcast have no effect.
         let mut bus = in_state(phase);
         bus.send("340#010007000000");
         bus.send("3C0#010007000000");
@@ -279,7 +278,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
     }
 }
 
-/// D-36: dumps are sent only while the application is running, and never after a broadcast request.
+/// D-36: a board sends dumps only while its application is running, and never after a broadcast request.
 #[test]
 fn d36_dumps_in_every_state() {
     for phase in STATES {
@@ -295,7 +294,7 @@ fn d36_dumps_in_every_state() {
     }
 }
 
-/// D-26: a board that reboots without a command reports the reboot once.
+/// D-26: a board that reboots without a command sends one report about the reboot.
 #[test]
 fn d26_spontaneous_report() {
     for phase in STATES {
@@ -308,7 +307,7 @@ fn d26_spontaneous_report() {
     }
 }
 
-/// D-21: only PC_SETSTATUS changes the pin. The pin also becomes inactive when the board loses its number.
+/// D-21: only PC_SETSTATUS and the loss of the board's number change the level of the outgoing pin. After the loss, the pin is inactive.
 #[test]
 fn d21_pin_of_the_next_board() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());
@@ -323,7 +322,7 @@ fn d21_pin_of_the_next_board() {
     assert!(!out(&bus));
 }
 
-/// D-42, D-43: between the cycles and after a cancelled transfer the board is in one of the states of the table.
+/// D-42, D-43: between the cycles of an update, and after a cancelled transfer, the board is in one of the states of the table.
 #[test]
 fn d43_cancel_and_again() {
     let mut bus = in_state(Programming);
@@ -343,8 +342,8 @@ fn d43_cancel_and_again() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
 }
 
-/// D-24: the board's number is removed while the acknowledgement is in the CAN controller. If the controller fails to
-/// send the acknowledgement, the board does not offer it again and can sleep.
+/// D-24: the board loses its number while the acknowledgement is in the CAN controller. If the controller fails to send the
+/// acknowledgement, the board does not send it again, and no action of the board is due.
 #[test]
 fn d24_no_acknowledge_without_a_number() {
     let mut bus = in_state(Idle);
@@ -359,9 +358,8 @@ fn d24_no_acknowledge_without_a_number() {
     assert!(board.next_deadline() > now, "nothing to do");
 }
 
-/// D-24: the board's number is removed while its acknowledgement is in the CAN controller, and the PC
-/// assigns another number. When the old acknowledgement is sent, the board does not accept the new number
-/// yet.
+/// D-24: the board loses its number while its acknowledgement is in the CAN controller, and the PC assigns another number. When the old
+/// acknowledgement is sent, the board does not accept the new number yet.
 #[test]
 fn d24_acknowledge_of_a_forgotten_number() {
     let mut bus = in_state(Idle);

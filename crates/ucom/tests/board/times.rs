@@ -1,5 +1,4 @@
-//! Tests of the exact times of one board. The board does not act a microsecond too early, and it requests a wake-up
-//! for the exact time.
+//! Tests of the exact times of one board. The board does not act a microsecond too early, and `next_deadline` returns the exact time.
 
 use ucom::Frame;
 use ucom::node::{Phase, Store};
@@ -10,12 +9,12 @@ fn frame(text: &str) -> Frame {
     text.parse().unwrap()
 }
 
-/// Returns the board of a bus, and the time.
+/// Returns the board on a bus, and the current time.
 fn board(mut bus: Bus) -> (Board, u64) {
     (bus.boards.remove(0), bus.now)
 }
 
-/// Confirms each offered frame at once, and returns all offered frames.
+/// Immediately confirms each frame that the board returns. The function returns all these frames.
 fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     let mut left = Vec::new();
     while let Some(frame) = board.poll(now) {
@@ -86,7 +85,7 @@ fn d43_pause_inside_a_block() {
     assert_eq!(board.next_deadline(), u64::MAX);
 }
 
-/// D-42: a block is processed after exactly the configured time.
+/// D-42: the board processes a block after exactly the configured time.
 #[test]
 fn d42_block_time() {
     let (mut board, now) = board(Bus::initialised());
@@ -102,7 +101,7 @@ fn d42_block_time() {
     assert_eq!(board.next_deadline(), u64::MAX);
 }
 
-/// D-25: the application starts 500 ms after INITACK has been sent.
+/// D-25: the application starts automatically 500 ms after INITACK has been sent.
 #[test]
 fn d25_hold_off() {
     let (mut board, now) = board(Bus::one());
@@ -117,7 +116,7 @@ fn d25_hold_off() {
         assert_eq!(board.phase(), phase, "{}", at - now);
     }
     assert_eq!(board.next_deadline(), start + MS, "the application is asked again");
-    // Without ASTART the application does not start by itself.
+    // Without ASTART, the application does not start by itself.
     let (mut board, now) = self::board(Bus::one());
     board.receive(now, &frame("281#"));
     assert_eq!(flush(&mut board, now), frames("0C1#01"));
@@ -144,34 +143,34 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(flush(&mut board, now + 2 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 2 * MS), frames("601#01000000"));
     assert_eq!(board.application.steps, 2);
-    // Missed cycles are skipped; later cycles run at their planned times.
+    // The board skips missed control cycles; later cycles run at their planned times.
     assert_eq!((flush(&mut board, now + 7 * MS + 300), board.application.steps), (vec![], 3));
     assert_eq!(board.next_deadline(), now + 8 * MS);
     assert_eq!(flush(&mut board, now + 10 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 10 * MS).len(), 2, "all outputs");
     assert_eq!(flush(&mut board, now + 20 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 20 * MS).len(), 2);
-    // During the following time, no frame arrives from the PC.
+    // During the following time, no frame of the PC arrives.
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
     board.poll(now + 1500 * MS);
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// D-50: a board regards the PC as lost 1500 ms after its last heartbeat.
+/// D-50: a board considers the PC lost 1500 ms after the PC's last heartbeat.
 #[test]
 fn d50_heartbeat_of_the_pc() {
     let (mut board, now) = board(Bus::running());
     board.receive(now, &frame("680#"));
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
-    // A heartbeat exactly 1500 ms after the last heartbeat is too late.
+    // A heartbeat that arrives exactly 1500 ms after the previous heartbeat is too late.
     board.receive(now + 1500 * MS, &frame("680#"));
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// If a frame becomes due while another is in the CAN controller, the board offers it as soon as the other frame
-/// has been sent, without sleeping.
+/// If a frame becomes due while another frame is in the CAN controller, the board returns the due frame as soon as the other frame has been
+/// sent.
 #[test]
 fn what_waits_goes_when_the_frame_before_has_left() {
     let programming = || {
@@ -219,7 +218,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
         assert!(board.next_deadline() <= now, "{what}: {} at {now}", board.next_deadline());
         assert_eq!(board.poll(now), Some(frame(expected)), "{what}");
     }
-    // The acknowledgement is the waiting frame, and the frame before it is an error.
+    // The acknowledgement is the frame that waits, and the frame before it is an error.
     let mut bus = Bus::initialised();
     bus.hold = |_| true;
     bus.send("1C1#00");
@@ -228,7 +227,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     let (mut waiting, now) = board(bus);
     waiting.sent(now, &frame("081#07"));
     assert_eq!((waiting.next_deadline(), waiting.poll(now)), (0, Some(acknowledge)));
-    // The test also checks the two answers of a transfer.
+    // The test also checks the two answers of a board to a transfer.
     let (whole, last) = last_block();
     let first = super::bus::blocks(&[1; 64], &ucom::Profile::default())[0];
     for (mut bus, data, expected) in [(programming(), first, "181#"), (whole, last, "101#")] {
@@ -266,15 +265,13 @@ fn d36_a_dump_ends_with_its_last_package() {
     }
 }
 
-/// D-14: the packages of an answer follow one another without a pause. After the last package, no action of the board
-/// is due at once.
+/// D-14: the packages of an answer follow one another without a pause. After the last package, no action of the board is due at once.
 #[test]
 fn d14_packages_follow_back_to_back() {
     type Case = (&'static str, fn() -> Bus, &'static str, u16, usize);
     let cases: [Case; 5] = [
         ("info", Bus::initialised, "201#", 0x141, 4),
-        // The answer consists of the dimensions, a name of two packages and nine names of one package; each name has
-        // a header.
+        // The answer consists of the dimensions, a name of two packages and nine names of one package; each name also has a header.
         ("description", Bus::started, "581#", 0x581, 1 + 3 + 2 * 9),
         ("inputs", Bus::started, "5C1#", 0x6C1, 1),
         ("outputs", Bus::running, "", 0x381, 2),
@@ -311,8 +308,8 @@ fn d14_packages_follow_back_to_back() {
     }
 }
 
-/// D-42, D-44: each step that follows the last block of an update is short. The flash is polled every 500 µs. The
-/// image is read back in steps of 1024 bytes without a pause.
+/// D-42, D-44: each step of the board after the last block of an update is short. The board polls the flash every 500 µs. The board reads
+/// the image back in steps of 1024 bytes without a pause.
 #[test]
 fn d44_steps_after_the_last_block() {
     let mut bus = Bus::initialised();
@@ -338,15 +335,15 @@ fn d44_steps_after_the_last_block() {
         }
     };
     assert_eq!(finished, frame("101#"));
-    // The board processes and writes the block, reads three pieces back, and then begins and completes the record.
+    // The board processes and writes the block, reads three pieces of the image back, and then begins and completes the record.
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
 }
 
-/// D-05: the random delays come from Marsaglia's xorshift32, which has no short cycle. If a seed would set the
-/// generator's state to 0, the state is set to 1.
+/// D-05: the random delays come from Marsaglia's xorshift32, which has no short cycle. If a seed would set the generator's state to 0, the
+/// state is set to 1.
 #[test]
 fn d05_random_delays() {
-    // The published sequence of random numbers that begins at state 1.
+    // The expected values are the published sequence of random numbers that begins at state 1.
     let expected = [270_369, 67_634_689, 2_647_435_461u32, 307_599_695, 2_398_689_233];
     let mixed = 0x21u32.wrapping_mul(0x9E37_79B9);
     for seed in [mixed ^ 1, mixed] {

@@ -1,5 +1,5 @@
-//! Updates with faults: power loss during each flash operation, loss of each single frame, and flash errors. Also
-//! other plans.
+//! Tests of updates with faults: power loss during each flash operation, loss of each single frame, and flash errors. Some tests use other
+//! plans than the default plan.
 
 use ucom::node::Phase;
 use ucom::profile::{Endian, HeaderForm, Plan};
@@ -12,7 +12,8 @@ pub(super) fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
-/// Sends all blocks and waits for any answer after each block. Returns `true` if the board has sent PROGFINISHED.
+/// Sends all blocks of an update and waits for any answer after each block. The function returns `true` if the board has sent
+/// DSP_PROGFINISHED.
 pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
@@ -27,7 +28,7 @@ pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     finished
 }
 
-/// Checks that the record of a valid application belongs to a complete image, either the old or the new image.
+/// Checks that the record of a valid application belongs to a complete image, either the old image or the new image.
 pub(super) fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
@@ -46,7 +47,7 @@ fn d45_power_loss_at_every_flash_operation() {
     let mut whole = Bus::initialised();
     assert!(update(&mut whole, &all));
     let operations = whole.boards[0].flash.operations;
-    // The seven operations clear the record, erase the area, write four blocks and write the record.
+    // The seven flash operations clear the record, erase the area, write four blocks and write the record.
     assert_eq!(operations, 7);
     for cut in 0..operations {
         let mut bus = Bus::initialised();
@@ -60,7 +61,7 @@ fn d45_power_loss_at_every_flash_operation() {
         assert_eq!(bus.boards[0].status(), Status(0x11), "cut {cut}: S1");
         assert_no_half_image(&bus, &image, &format!("cut {cut}"));
         assert!(!bus.boards[0].has_application(), "cut {cut}");
-        // The board can be programmed again.
+        // After the power loss, the board can be programmed again.
         bus.take();
         bus.number(1);
         assert!(update(&mut bus, &all), "again after cut {cut}");
@@ -100,16 +101,16 @@ fn d43_every_frame_lost_once() {
     for lost in first..whole.frames_to_boards {
         let mut bus = Bus::initialised();
         bus.lose_to_boards = Some(lost);
-        // If PC_XRESET is lost, the board does not accept a block. If a data frame is lost, the checks fail.
+        // If PC_XRESET is lost, the board does not accept a block. If a data frame is lost, the checks of the board fail.
         assert!(!update(&mut bus, &all), "lost {}", lost - first);
         bus.run(1000);
         assert_no_half_image(&bus, &image, &format!("lost {}", lost - first));
         let errors: Vec<_> = bus.errors.iter().map(|frame| frame.data()[0]).collect();
         assert_eq!(errors.len(), 1, "lost {}: {errors:?}", lost - first);
-        // The next attempt succeeds.
+        // The next attempt to update the board succeeds.
         assert!(update(&mut bus, &all), "again after {}", lost - first);
     }
-    // A lost answer does not change the board's work.
+    // The loss of an answer does not change the work of the board.
     for lost in first_answer..whole.frames_from_boards {
         let mut bus = Bus::initialised();
         bus.lose_from_boards = Some(lost);
@@ -119,7 +120,7 @@ fn d43_every_frame_lost_once() {
     }
 }
 
-/// If a flash operation fails, the board sends error 3. The test also checks which application is valid afterwards.
+/// If a flash operation fails, the board sends error 3. The test also checks which application is valid after the failure.
 #[test]
 fn d45_failing_flash() {
     let all = blocks(&small(), &Profile::default());
@@ -135,7 +136,7 @@ fn d45_failing_flash() {
     }
 }
 
-/// D-43: the block buffer is in use until the CAN controller has sent READY.
+/// D-43: the block buffer is in use until the CAN controller has sent DSP_READY.
 #[test]
 fn d43_frame_before_ready_has_left() {
     let mut bus = Bus::initialised();
@@ -148,7 +149,7 @@ fn d43_frame_before_ready_has_left() {
     assert_eq!(bus.take(), frames("181# 081#04"));
 }
 
-/// D-44: the board computes the Program ID from the received data and also from the flash.
+/// D-44: the board computes the Program ID from the received data and also from the data in flash.
 #[test]
 fn d44_flash_is_read_back() {
     let image = small();
@@ -161,8 +162,8 @@ fn d44_flash_is_read_back() {
     }
 }
 
-/// D-42: after the header of cycle 2, the board sends READY when the erase is complete. During the erase, the board
-/// answers other requests.
+/// D-42: after the header of cycle 2, the board sends DSP_READY when the erase is complete. During the erase, the board answers other
+/// requests.
 #[test]
 fn d42_long_erase_blocks_nothing() {
     let all = blocks(&small(), &Profile::default());
@@ -180,7 +181,7 @@ fn d42_long_erase_blocks_nothing() {
     }
     bus.run(1000);
     assert_eq!(bus.take(), frames("181#"));
-    // The board is reset during an erase. After the reset, the board accepts frames when the erase is complete.
+    // The test resets the board during an erase. After this reset, the board accepts frames only when the erase is complete.
     let mut bus = Bus::initialised();
     bus.boards[0].flash.erase_us = 8_000_000;
     bus.send("041#");
@@ -193,7 +194,7 @@ fn d42_long_erase_blocks_nothing() {
     assert!(!bus.boards[0].has_application());
 }
 
-/// D-40: the plan exloader-app first writes the exloader to RAM. The flash does not change until cycle 2.
+/// D-40: with the plan `exloader-app`, the board first writes the exloader to RAM. The flash of the board does not change until cycle 2.
 #[test]
 fn d40_exloader_then_application() {
     let profile = Profile { prog_plan: Plan::ExloaderApp, ..Profile::default() };
@@ -215,7 +216,7 @@ fn d40_exloader_then_application() {
     assert_eq!(bus.boards[0].flash.bytes(Memory::Ram)[..120], exloader);
     assert_no_half_image(&bus, &image, "");
     assert_eq!(bus.boards[0].record().unwrap().program_id, second.program_id);
-    // An exloader is not written to flash.
+    // The board does not write an exloader to flash.
     bus.send("041#");
     assert_eq!(bus.block(&header(&image, 1, &profile).build(Endian::Little), 5), frames("081#02"));
 }
@@ -224,7 +225,7 @@ pub(super) fn data(image: &[u8]) -> Vec<[u8; 64]> {
     (0..).map_while(|i| ucom::data_block(image, i)).collect()
 }
 
-/// D-40: the plan pmem-xmem writes two memories for one application. The application is valid when both memories are
+/// D-40: with the plan `pmem-xmem`, the board writes two memories for one application. The application is valid only when both memories are
 /// written.
 #[test]
 fn d40_program_then_data_memory() {
@@ -253,7 +254,7 @@ fn d40_program_then_data_memory() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, first.program_id);
 }
 
-/// D-41: without header blocks the board uses its configured length and computes the Program ID itself.
+/// D-41: without header blocks, the board uses its configured length and computes the Program ID itself.
 #[test]
 fn d41_no_header() {
     let profile = Profile { prog_header: HeaderForm::None, ..Profile::default() };
@@ -290,7 +291,7 @@ fn d41_no_header() {
     assert_eq!(bus.errors, frames("081#01"));
 }
 
-/// D-44, D-10: a complete update with each checksum and byte order that is not the default.
+/// D-44, D-10: the test performs a complete update with each checksum and byte order that is not the default.
 #[test]
 fn d44_update_in_other_profiles() {
     for (checksum, endian) in [
@@ -311,7 +312,7 @@ fn d44_update_in_other_profiles() {
     }
 }
 
-/// D-40: the plan raw accepts two different files, as their headers require. The first file is only checked.
+/// D-40: with the plan `raw`, the board accepts two different files, as their headers require. The board only checks the first file.
 #[test]
 fn d40_raw_takes_two_files() {
     let profile = Profile { prog_plan: Plan::Raw, ..Profile::default() };
@@ -329,8 +330,8 @@ fn d40_raw_takes_two_files() {
     assert_no_half_image(&bus, &two, "");
 }
 
-/// D-43: the checksum detects reordered frames of a block. CAN adapters with several mailboxes may change the
-/// order of frames.
+/// D-43: the checksum detects frames of a block that arrive in another order. CAN adapters with several mailboxes may change the order of
+/// frames.
 #[test]
 fn d43_reordered_frames_are_refused() {
     let image = small();

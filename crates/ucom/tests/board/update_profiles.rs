@@ -1,4 +1,4 @@
-//! Updates of boards that follow another reading of the protocol description, plan by plan.
+//! Tests of updates with boards that follow another interpretation of the protocol description, plan by plan.
 
 use ucom::node::{Area, Node, NodeConfig};
 use ucom::profile::{HeaderForm, Plan};
@@ -8,7 +8,7 @@ use ucom_sim::memory::MemoryFlash;
 use super::bus::{Board, Bus, blocks, frames, header, image};
 use super::update::{data as data_blocks, small, update};
 
-/// Returns a board with number 1, for images without header blocks that are as long as `small`.
+/// Returns a board with number 1 for images without header blocks that are as long as `small`.
 fn headerless(plan: Plan) -> Bus {
     headerless_in(MemoryFlash::default(), plan, 100)
 }
@@ -24,8 +24,7 @@ fn headerless_in(flash: MemoryFlash, plan: Plan, headerless_words: u32) -> Bus {
     bus
 }
 
-/// D-40, D-41: without header blocks the plan determines the memories of its cycles, and which image's Program ID
-/// is recorded.
+/// D-40, D-41: without header blocks, the plan determines the memories of the cycles, and the image whose Program ID is recorded.
 #[test]
 fn d41_no_header_in_every_plan() {
     let (one, two) = ([0x5A; 200].to_vec(), small());
@@ -52,8 +51,8 @@ fn d41_no_header_in_every_plan() {
     }
 }
 
-/// D-41: an image without a header has the configured length, limited to the length of the area. Its address is
-/// the start of the area.
+/// D-41: an image without a header has the configured length, limited to the length of the application area. The address of such an image
+/// is the start of the application area.
 #[test]
 fn d41_no_header_fills_the_area() {
     let image: Vec<u8> = (0..128).collect();
@@ -72,7 +71,7 @@ fn d41_no_header_fills_the_area() {
     }
 }
 
-/// D-44: with the checksum `none` the board stores and reports the Program ID in the header unchanged.
+/// D-44: with the checksum `none`, the board stores and reports the Program ID in the header unchanged.
 #[test]
 fn d44_program_id_as_the_header_says() {
     let profile = Profile { prog_checksum: Checksum::None, ..Profile::default() };
@@ -91,13 +90,13 @@ fn d44_program_id_as_the_header_says() {
     assert_eq!(bus.info(1).map(|info| info.program_id), Some(0xC0DE));
 }
 
-/// D-43: a transfer ends when PROG changes from 1 to 0. After an error, the board accepts program data again only
-/// when PROG changes from 0 to 1.
+/// D-43: a transfer ends when the bit PROG changes from 1 to 0. After an error, the board accepts program data again only when PROG changes
+/// from 0 to 1.
 #[test]
 fn d43_silence_lasts_until_programming_is_enabled_again() {
     let mut bus = Bus::initialised();
     bus.send("041#");
-    // The block is not a valid header.
+    // The block in this test is not a valid header.
     assert_eq!(bus.block(&[0; 64], 5), frames("081#05"));
     bus.send("1C1#0400");
     assert_eq!(bus.ask("2C1#0011223344556677", 5), [], "silent although PROG is 0");
@@ -171,7 +170,7 @@ fn d41_headers_of_the_second_cycle() {
     }
 }
 
-/// Returns a board that has accepted the first block but has not sent READY yet, and the blocks of the update.
+/// Returns a board that has accepted the first block but has not sent DSP_READY yet, and the blocks of the update.
 fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     let all = blocks(&small(), &Profile::default());
     let mut bus = Bus::initialised();
@@ -181,14 +180,14 @@ fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     (bus, all)
 }
 
-/// Delivers all frames of a block at the same time.
+/// Delivers all frames of a block to the board at the same time.
 fn receive_at_once(bus: &mut Bus, block: &[u8; 64]) {
     for data in block.chunks_exact(8) {
         bus.boards[0].receive(bus.now, &ucom::Frame::new(0x2C1, data).unwrap());
     }
 }
 
-/// D-43: if the CAN controller fails to send READY, the block buffer is free and the PC may send a block again.
+/// D-43: if the CAN controller fails to send DSP_READY, the block buffer is free and the PC may send a block again.
 #[test]
 fn d43_ready_that_was_given_up() {
     let (mut bus, all) = ready_held();
@@ -197,13 +196,13 @@ fn d43_ready_that_was_given_up() {
     let now = bus.now;
     bus.boards[0].not_sent(now, &ready);
     assert_eq!(bus.boards[0].counters().not_sent, 1);
-    // DSP_ERROR 6 is sent after the next frame.
+    // The board sends DSP_ERROR 6 after its next frame.
     assert_eq!(bus.block(&all[1], 10), frames("181# 081#06"));
     assert_eq!(bus.block(&all[2], 10), frames("181#"));
 }
 
-/// D-43: if the READY of a cancelled transfer is sent while the board processes the first block of the next transfer,
-/// the board still accepts that block.
+/// D-43: if the DSP_READY of a cancelled transfer is sent while the board processes the first block of the next transfer, the board still
+/// accepts that block.
 #[test]
 fn d43_ready_of_the_transfer_before() {
     let (mut bus, all) = ready_held();
@@ -215,7 +214,7 @@ fn d43_ready_of_the_transfer_before() {
     assert_eq!(board.poll(now + board.config().block_us), Some(ready), "the block is taken");
 }
 
-/// D-42: a block of an image without a header is accepted as soon as the block's processing time has passed.
+/// D-42: the board accepts a block of an image without a header as soon as the block's processing time has passed.
 #[test]
 fn d42_block_time_without_header() {
     let mut bus = headerless(Plan::VerifyWrite);
@@ -225,8 +224,8 @@ fn d42_block_time_without_header() {
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
 
-/// D-23, D-42: if a transfer is cancelled, a READY that still waits is not sent. The PC would assign this READY to
-/// the next transfer.
+/// D-23, D-42: if a transfer is cancelled, the board does not send a DSP_READY that still waits. Otherwise, the PC would assign this
+/// DSP_READY to the next transfer.
 #[test]
 fn d42_no_ready_of_a_transfer_that_is_no_more() {
     let all = blocks(&small(), &Profile::default());

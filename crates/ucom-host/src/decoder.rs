@@ -1,5 +1,5 @@
-//! Descriptions of frames as text. The decoder tracks answers that consist of several frames, so that it can distinguish packages of
-//! strings from first frames.
+//! Describes frames as text. The decoder tracks answers that consist of several frames, because packages of strings and first frames of
+//! answers look alike.
 
 use std::collections::BTreeMap;
 
@@ -9,34 +9,34 @@ use ucom::{
     StringAssembler, ToBoard,
 };
 
-/// Description of a frame.
+/// Description of a frame as text and JSON.
 pub struct Described {
     /// Function of the frame, or the reason why the frame is foreign.
     pub name: String,
-    /// Sender: `PC`, `board 3`, or both if the identifier does not show the sender.
+    /// Sender of the frame: `PC`, `board 3`, or both if the identifier does not show the sender.
     pub who: String,
-    /// Contents as text.
+    /// Contents of the frame as text.
     pub text: String,
-    /// Contents as JSON.
+    /// Contents of the frame as JSON.
     pub value: Value,
 }
 
-/// Decoder for the frames on a bus, which must be passed in their order.
+/// Decoder for the frames on a bus. The caller must pass the frames in their order.
 pub struct Decoder {
     profile: Profile,
     answers: BTreeMap<(Function, Sequence), Answer>,
 }
 
-/// Received part of an answer that consists of several frames.
+/// Parts of an answer that were received so far; the answer consists of several frames.
 struct Answer {
     strings: Box<StringAssembler>,
-    /// Number of strings that are still missing; `None` before the first frame.
+    /// Number of strings of the answer that are still missing; `None` before the first frame.
     left: Option<u32>,
     last_us: u64,
 }
 
 impl Decoder {
-    /// Creates a decoder for this profile.
+    /// Creates a decoder for boards with this profile.
     pub fn new(profile: Profile) -> Self {
         Self { profile, answers: BTreeMap::new() }
     }
@@ -54,7 +54,7 @@ impl Decoder {
         let from_pc = match function.sender() {
             Sender::Pc => Some(true),
             Sender::Board => Some(false),
-            // If a frame of this function has data, it is always the answer of a board (D-12). Broadcasts are sent only by the PC (D-05).
+            // An MCA_DUMP_IO_DESCRIPTION frame with data is always the answer of a board (D-12). Only the PC sends broadcasts (D-05).
             Sender::Both if function == Function::DumpIo => Some(frame.dlc() == 0),
             Sender::Both if Some(sequence) == self.profile.broadcast_number() => Some(true),
             Sender::Both => None,
@@ -221,14 +221,14 @@ fn admin_value(admin: ucom::Admin) -> Value {
     json!({ "run": admin.run, "active": admin.active, "debug": admin.debug, "global_debug": admin.global_debug })
 }
 
-/// Returns bytes in the form `11 22`.
+/// Returns bytes as hexadecimal text in the form `11 22`.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     let all: Vec<String> = bytes.iter().map(|b| format!("{b:02X}")).collect();
     all.join(" ")
 }
 
-/// Returns a flash date as text, such as `2026-05-04`. If the number is not a date in the format of the profile,
-/// returns the number as text.
+/// Returns a flash date as text, such as `2026-05-04`. If the number is not a date in the format of the profile, the function returns the
+/// number as text.
 pub fn date_text(profile: &Profile, date: u16) -> String {
     match profile.prog_date.decode(date) {
         Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),

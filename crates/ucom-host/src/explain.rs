@@ -1,22 +1,22 @@
-//! Explanations of the words that the tools display: the meaning and next step of status bits, states, heartbeats,
-//! events, outcomes and errors.
+//! Explanations of the words that the tools display: the meaning and the next step for status bits, states, heartbeats, events, outcomes
+//! and errors.
 
 use ucom::ErrorCode;
 
-/// A displayed word.
+/// A word that the tools display, with its explanation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Group to which the word belongs.
+    /// Group to which the displayed word belongs.
     pub family: &'static str,
-    /// Displayed forms. The first form is the name of the word.
+    /// Forms in which the word is displayed. The first of these forms is the name of the word.
     pub shown: Vec<String>,
-    /// Meaning.
+    /// Meaning of the displayed word.
     pub meaning: String,
     /// Next command or action that helps the user.
     pub next: String,
 }
 
-/// Group, displayed forms, meaning, next step.
+/// Group, displayed forms, meaning and next step of a word.
 type Fixed = (&'static str, &'static [&'static str], &'static str, &'static str);
 
 const BIT: &str = "status bit";
@@ -25,7 +25,7 @@ const HEARTBEAT: &str = "heartbeat of a board";
 const EVENT: &str = "event of ucom run";
 const OUTCOME: &str = "outcome of ucom update";
 
-/// Words of the tools; the status bits come first, beginning with bit 7.
+/// Words that the tools display; the status bits come first, beginning with bit 7.
 const WORDS: [Fixed; 38] = [
     (BIT, &["MSTART", "M"], "The exloader has started the application.", "ucom stop N ends the application"),
     (
@@ -190,7 +190,7 @@ const WORDS: [Fixed; 38] = [
     ),
 ];
 
-/// Returns all words.
+/// Returns all words that the tools display.
 pub fn words() -> Vec<Word> {
     let fixed = WORDS.iter().map(|(family, shown, meaning, next)| Word {
         family,
@@ -210,8 +210,9 @@ pub fn words() -> Vec<Word> {
     fixed.chain(errors).collect()
 }
 
-/// Returns the words that match exactly. If no word matches exactly, returns the words that match without regard to letter case and
-/// punctuation. If no word matches in this way and the query has at least 3 letters, returns the words that contain the query.
+/// Returns the words that match the query exactly. If no word matches exactly, the function returns the words that match without regard to
+/// letter case and punctuation. If no word matches in this way and the query has at least 3 letters, the function returns the words that
+/// contain the query.
 pub fn find<'a>(all: &'a [Word], query: &str) -> Vec<&'a Word> {
     let any = |fits: &dyn Fn(&str) -> bool| -> Vec<&'a Word> {
         all.iter().filter(|word| word.shown.iter().any(|shown| fits(shown))).collect()

@@ -1,4 +1,4 @@
-//! Files on the PC side: images, recordings, inventories, signal tables, parameters, DBC files.
+//! Files of the PC side: images, recordings, inventories, signal tables, parameters, DBC files.
 
 pub mod dbc;
 mod flash_record;

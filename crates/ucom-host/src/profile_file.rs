@@ -5,31 +5,31 @@ use std::fmt::Write;
 use ucom::Profile;
 use ucom::profile::{KEYS, Kind, ProfileError};
 
-/// Reasons why a profile file is refused.
+/// Reasons why the reader refuses a profile file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProfileFileError {
-    /// The text is not TOML.
+    /// The text of the file is not TOML.
     #[error("profile: {0}")]
     Toml(String),
-    /// The key does not exist.
+    /// The profile has no key with this name.
     #[error("profile: unknown key `{key}`{}; the keys are: {}", near(.nearest), known())]
     UnknownKey {
         /// Key in the file.
         key: String,
-        /// Most similar key.
+        /// Existing key that is most similar to the key in the file.
         nearest: Option<&'static str>,
     },
-    /// A value is outside the key's range.
+    /// The value of a key is outside the key's range.
     #[error("profile: {key} = {value} is not valid, expected {range}; see `ucom help profile`")]
     Value {
-        /// The key.
+        /// Key to which the value belongs.
         key: &'static str,
         /// Value in the file.
         value: String,
-        /// Allowed values.
+        /// Values that the key allows.
         range: &'static str,
     },
-    /// Values that contradict each other.
+    /// Values of several keys contradict each other.
     #[error("profile: {0}")]
     Contradiction(&'static str),
 }
@@ -47,7 +47,7 @@ fn unknown(key: &str) -> ProfileFileError {
     ProfileFileError::UnknownKey { key: key.to_string(), nearest }
 }
 
-/// Flattens tables: `a.b = 1` and `[a] b = 1` define one key.
+/// Flattens nested tables: `a.b = 1` and `[a] b = 1` define one key.
 fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)>) {
     for (name, value) in table {
         let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };
@@ -64,16 +64,16 @@ fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)
     }
 }
 
-/// Reading and writing of a profile as a file.
+/// Reads and writes a profile as a file.
 pub trait ProfileFile: Sized {
-    /// Reads a profile from TOML. Missing keys keep their defaults.
+    /// Reads a profile from TOML. A key that is missing in the file keeps its default.
     ///
     /// # Errors
     ///
-    /// The text is not TOML, a key is unknown, or a value is out of range. Each error message lists the allowed values.
+    /// Returns an error if the text is not TOML, a key is unknown, or a value is out of range. Each error message lists the allowed values.
     fn from_toml(text: &str) -> Result<Self, ProfileFileError>;
 
-    /// Returns all keys as TOML, each with its meaning in a comment.
+    /// Returns all keys of the profile as TOML, each with its meaning in a comment.
     fn to_toml(&self) -> String;
 }
 
@@ -128,7 +128,7 @@ fn capital(text: &str) -> String {
     characters.next().map(|first| first.to_uppercase().chain(characters).collect()).unwrap_or_default()
 }
 
-/// Returns the text of `ucom help profile`: every key with default, range, rule and meaning.
+/// Returns the text of `ucom help profile`: every key with its default, range, rule and meaning.
 pub fn profile_help() -> String {
     let mut text = String::from(
         "A profile defines how the boards on a bus interpret the parts of the protocol that its published\n\

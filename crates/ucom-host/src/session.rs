@@ -2,16 +2,16 @@
 //!
 //! - [`Link`]: an open bus with its clock; [`Prompt`]: a bus with a short receive timeout; [`pump`]: moves frames between the bus and the
 //!   master, in the order that keeps times correct.
-//! - [`Driver`]: runs procedures from start to end, with an [`Operator`] who can stop the procedures and reads notes.
+//! - [`Driver`]: runs procedures from start to end, with an [`Operator`] who can end the procedures and who receives notes.
 //! - [`Examination`]: diagnosis of a bus; [`Watch`]: live view of a bus.
-//! - [`CleanupList`]: work that would remain undone if the process ended now.
-//! - [`Cache`], [`History`]: data about boards that are kept between sessions.
+//! - [`CleanupList`]: work that would remain undone if the process ended now, and the next commands for this work.
+//! - [`Cache`], [`History`]: data about boards that are stored between sessions.
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: conversion of named values to words of boards, with checks before anything is
 //!   sent.
-//! - [`FlashRecords`]: images that this tool wrote to boards, for [`Driver::update`].
+//! - [`FlashRecords`]: records of the images that this tool wrote to boards, for [`Driver::update`].
 //! - [`Recorder`], [`replay()`]: recording of the frames on a bus, and replay of a recording.
 //! - [`Followed`]: supervision of the boards of a run.
-//! - [`Session`], [`Held`]: started boards and data about them, for a program that owns a bus and shares it with other programs.
+//! - [`Session`], [`Held`]: started boards and data about them, for a program that owns a bus and shares the bus with other programs.
 pub mod bus_off;
 mod cache;
 mod changes;

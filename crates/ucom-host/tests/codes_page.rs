@@ -1,5 +1,5 @@
-//! Compares the part of docs/codes.md about boards with the texts of `ucom explain`. `UPDATE_DOCS=1` rewrites that
-//! part.
+//! Compares the part of docs/codes.md about boards with the texts of `ucom explain`. With `UPDATE_DOCS=1`, the test rewrites that part of
+//! the page.
 
 use std::fmt::Write as _;
 

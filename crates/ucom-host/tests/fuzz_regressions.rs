@@ -1,4 +1,4 @@
-//! Runs the code of the fuzz targets with stored inputs, some manual inputs, and random inputs.
+//! Runs the code of the fuzz targets with stored inputs, some handwritten inputs, and random inputs.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};

@@ -1,9 +1,9 @@
-//! DBC files for cantools, SavvyCAN and similar tools. The files describe the frames of the protocol, and the process data of known
-//! boards by name.
+//! Writes DBC files for cantools, SavvyCAN and similar tools. A DBC file describes the frames of the protocol, and the process data of
+//! known boards by name.
 //!
-//! CI, SO and PAR are multiplexed by their buffer offset: the first word selects which three words follow (D-15). Packages of strings have
-//! the same identifier as other frames, and do not contain a mark that shows that they are strings. Therefore, for DSP_INFO and the IO
-//! description, the file describes only the first frame. Debug texts and program data are raw bytes.
+//! CI, SO and PAR frames are multiplexed by their buffer offset: the first word of the frame selects which three words follow (D-15).
+//! Packages of strings have the same identifier as other frames, and a frame does not show that it is such a package. Therefore, the DBC
+//! file describes only the first frame of DSP_INFO and of the IO description. In the DBC file, debug texts and program data are raw bytes.
 mod names;
 #[cfg(test)]
 mod tests;
@@ -18,27 +18,27 @@ use ucom::{Endian, Function, Sender, Sequence, Status};
 /// Input, output or parameter of a board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSignal {
-    /// Name of the signal. In the file, the name is converted to an identifier.
+    /// Name of the signal. In the DBC file, the name is converted to an identifier.
     pub name: String,
-    /// Meaning of the word of this signal (D-11).
+    /// Meaning of the word that carries this signal (D-11).
     pub signal: Signal,
 }
 
-/// Board whose process data is known.
+/// Board whose process data are known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DbcBoard {
     /// Board number.
     pub number: u8,
-    /// Controller inputs, one entry for each.
+    /// Controller inputs of the board, in the order of the buffer.
     pub ci: Vec<NamedSignal>,
-    /// The sensor outputs.
+    /// Sensor outputs of the board, in the order of the buffer.
     pub so: Vec<NamedSignal>,
-    /// The parameters.
+    /// Parameters of the board, in the order of the buffer.
     pub par: Vec<NamedSignal>,
 }
 
 impl DbcBoard {
-    /// Creates a board with its signal names and the meanings of their words.
+    /// Creates a board with the names of its signals and the meanings of their words.
     pub fn new(number: u8, description: &IoDescription, signals: &BoardSignals) -> Self {
         let of = |kind: Kind| {
             let pairs = description.names(kind).iter().zip(signals.all(kind));
@@ -53,15 +53,15 @@ impl DbcBoard {
 /// Signal of a DBC message.
 struct DbcSignal {
     name: String,
-    /// First byte.
+    /// First byte of the signal.
     byte: usize,
-    /// First bit in that byte, for fields that are shorter than a byte.
+    /// First bit in the first byte, for fields that are shorter than a byte.
     bit: usize,
     bits: usize,
     signed: bool,
     /// DBC multiplexer mark: ` M`, ` m3`, or empty.
     multiplex: String,
-    /// Scale, offset and unit, if they are known.
+    /// Scale, offset and unit of the signal, if they are known.
     signal: Option<Signal>,
 }
 
@@ -71,7 +71,7 @@ impl DbcSignal {
     }
 
     fn line(&self, endian: Endian, receiver: &str) -> String {
-        // In Motorola order, the start bit is the most significant bit of the field, which is in the first byte of the field.
+        // In Motorola order, the start bit of a field is its most significant bit, which is in the first byte of the field.
         let big = endian == Endian::Big && self.bits > 8;
         let start = self.byte * 8 + if big { 7 } else { self.bit };
         let (order, sign) = (u8::from(!big), if self.signed { '-' } else { '+' });
@@ -82,7 +82,7 @@ impl DbcSignal {
         };
         let Self { name, multiplex, bits, signal, .. } = self;
         let (scale, offset, unit) = signal.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
-        // The limit is written with as few digits as possible, without rounding errors.
+        // The file contains the limit with as few digits as possible, without rounding errors.
         let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
         let (low, high) = match signal {
             Some(signal) if signal.known && signal.kind != SignalType::Hex => {
@@ -97,9 +97,9 @@ impl DbcSignal {
     }
 }
 
-/// Returns the text of a DBC file for these boards; `endian` is the byte order of their words.
+/// Returns the text of a DBC file for these boards; `endian` is the byte order of the boards' words.
 ///
-/// Boards with numbers above 31 are omitted. The broadcasts of the PC are always part of the file.
+/// Boards with numbers above 31 are omitted from the file. The broadcasts of the PC are always part of the file.
 pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     let mut boards: Vec<(&DbcBoard, Sequence)> = boards
         .iter()
@@ -189,7 +189,7 @@ fn fields(function: Function) -> Vec<DbcSignal> {
     }
 }
 
-/// Returns the signals of an input, output or parameter buffer. Each buffer offset selects three words.
+/// Returns the signals of an input, output or parameter buffer. Each value of the buffer offset selects three words of the frame.
 fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
     let offset = DbcSignal { multiplex: " M".into(), ..DbcSignal::field("offset", 0, 16) };
     let mut fields = vec![offset];
@@ -209,7 +209,7 @@ fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
 }
 
 fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<DbcSignal>, endian: Endian) {
-    // If a board has no signals, it never sends this message, so the message needs no multiplexer.
+    // If a board has no signals of this kind, it never sends this message, so the message needs no multiplexer.
     let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
     let length = match function {
         Function::Ci | Function::So | Function::Par | Function::DspCi => 8,
@@ -223,7 +223,7 @@ fn message(text: &mut String, function: Function, number: Sequence, signals: Vec
     };
     let (sender, receiver) = match function.sender() {
         Sender::Board => (board.as_str(), "PC"),
-        // Broadcasts are sent by the PC. Most other frames that contain a board number are sent by that board.
+        // The sender of a broadcast is the PC. A board sends most other frames that contain its number.
         Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
         _ => ("PC", board.as_str()),
     };

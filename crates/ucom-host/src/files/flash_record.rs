@@ -1,26 +1,26 @@
-//! Flash records in the inventory. A record describes the image that this tool wrote to a board and read back.
+//! Flash records of an inventory. A flash record describes the image that this tool wrote to a board and read back.
 //!
-//! A board itself reports only its Program ID and flash date. The record adds the hash of the image and its load address.
+//! A board itself reports only its Program ID and flash date. The flash record adds the hash of the image and its load address.
 
 use core::fmt::Write as _;
 use serde::{Deserialize, Deserializer, de};
 use sha2::{Digest, Sha256};
 use ucom::BoardInfo;
 
-/// An image that was written to program memory and read back.
+/// Record of an image that was written to program memory and read back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlashRecord {
     /// Flash number of the board that received the image. A record that was copied to another board is not valid.
     pub flash_number: u16,
-    /// SHA-256 of the bytes in wire order.
+    /// SHA-256 of the image bytes in the order in which they were sent.
     #[serde(deserialize_with = "hash")]
     pub sha256: [u8; 32],
-    /// Load address in words.
+    /// Load address of the image in words.
     pub address: u32,
-    /// Program ID that the board reported afterwards.
+    /// Program ID that the board reported after the write.
     pub program_id: u16,
-    /// Flash date that the board reported afterwards, as 16 bits in the format that the profile defines.
+    /// Flash date that the board reported after the write, as 16 bits in the format that the profile defines.
     pub date: u16,
 }
 
@@ -36,7 +36,7 @@ impl FlashRecord {
         self.sha256 == hash_of(bytes) && self.address == address_words
     }
 
-    /// Returns the record as an inline TOML table.
+    /// Returns the flash record as an inline TOML table.
     pub(super) fn to_toml(self) -> String {
         let hash = self.sha256.iter().fold(String::new(), |mut text, byte| {
             // Writing to a string never fails.
@@ -51,7 +51,7 @@ impl FlashRecord {
     }
 }
 
-/// Returns the hash that identifies images in records.
+/// Returns the hash that identifies an image in flash records.
 fn hash_of(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }

@@ -1,5 +1,5 @@
-//! Code of the fuzz targets. Each target passes arbitrary bytes to a file reader. A panic, or a property that is not fulfilled, is an
-//! error.
+//! Code of the fuzz targets for file readers. Each target passes arbitrary bytes to a file reader. A panic of the reader, or a property
+//! that is not fulfilled, is an error.
 
 use std::io::Cursor;
 use ucom::Profile;
@@ -31,7 +31,7 @@ pub fn image(data: &[u8]) {
     }
 }
 
-/// Reads recordings in every format. A recording that was read and written again in the same format is unchanged.
+/// Reads recordings in every format. If the target reads a recording and writes it again in the same format, the recording is unchanged.
 pub fn recording(data: &[u8]) {
     // Text formats store times in whole microseconds, and a recording that this program writes is complete.
     let as_written = |recording: &mut Recording| {
@@ -63,7 +63,7 @@ pub fn recording(data: &[u8]) {
     }
 }
 
-/// Reads inventories. An inventory that was read and written again as text is unchanged.
+/// Reads inventories. If the target reads an inventory and writes it again as text, the inventory is unchanged.
 pub fn inventory(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     if let Ok(inventory) = Inventory::parse(text) {
@@ -71,7 +71,7 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Reads signal tables. For every signal, the displayed text of a word must be read as this word again, unless a limit forbids it.
+/// Reads signal tables. For every signal, the displayed text of a word must be read as this word again, unless a limit forbids the word.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -103,8 +103,8 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Reads parameter files and checks them against a board. The valid values are then written as a text. A reader must convert this text to
-/// equal words.
+/// Reads parameter files and checks the files against a board. The valid values are then written as the text of a parameter file. A reader
+/// must convert this text to equal words.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(file) = ParamsFile::parse(text) else { return };

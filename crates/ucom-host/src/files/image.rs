@@ -1,11 +1,11 @@
-//! Firmware images. Raw bytes, Intel HEX and Motorola S-records are converted to the bytes that are sent. The characters of an Intel HEX or
-//! S-record file are never sent themselves.
+//! Reads firmware images. The reader converts raw bytes, Intel HEX and Motorola S-records to the bytes that an update sends. An update
+//! never sends the characters of an Intel HEX or S-record file.
 //!
-//! The loader's addresses count 16-bit words, so every image starts at a word and consists of complete words. In S-records of the boards'
-//! toolchain, the addresses also count words. In Intel HEX and all other formats, the addresses count bytes. The reader detects from the
-//! records if a file uses the other unit. In the wrong unit, the records leave gaps or overlap; in the right unit, each record follows the
-//! previous record without a gap. The reader does not guess the unit if the file has only one or two records. An option can always set the
-//! unit.
+//! The addresses of the loader count 16-bit words, so every image starts at a word and consists of complete words. In S-records of the
+//! boards' toolchain, the addresses also count words. In Intel HEX and all other formats, the addresses count bytes. The reader detects
+//! from the records if the addresses of a file count in the other unit. In the wrong unit, the records leave gaps or overlap; in the right
+//! unit, each record follows the previous record without a gap. The reader does not guess the unit if the file has only one or two records.
+//! The user can always set the unit by an option.
 mod detect;
 mod error;
 mod hex;
@@ -23,16 +23,17 @@ use segments::Segments;
 /// Largest size of an image, in bytes, unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// Number of consecutive records that cannot follow one another by coincidence. A single gap as long as the record before it may be
-/// intended. In a table of interrupt vectors, a gap may follow every entry, but the records of such tables are short.
+/// Minimum number of consecutive records that show the unit of the addresses: fewer records can follow one another by coincidence. A single
+/// gap as long as the record before the gap may be intended. In a table of interrupt vectors, a gap may follow every entry, but the records
+/// of such tables are short.
 const EVIDENCE: usize = 3;
-/// Minimum average length, in bytes, of the records that show the unit. Linkers write records of 16 bytes and more.
+/// Minimum average length, in bytes, of the records that show the unit of the addresses. Linkers write records of 16 bytes and more.
 const EVIDENCE_BYTES: usize = 12;
 
 /// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Raw bytes in wire order.
+    /// Raw bytes in the order in which the update sends them.
     Bin,
     /// Intel HEX (records `:LLAAAATT…`).
     IntelHex,
@@ -53,7 +54,7 @@ impl fmt::Display for Format {
 impl FromStr for Format {
     type Err = ImageError;
 
-    /// Reads one of the texts `bin`, `hex` and `srec`.
+    /// Reads a format from one of the texts `bin`, `hex` and `srec`.
     fn from_str(text: &str) -> Result<Self, ImageError> {
         match text {
             "bin" => Ok(Self::Bin),
@@ -67,7 +68,7 @@ impl FromStr for Format {
 /// Unit of record addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AddressUnit {
-    /// Bytes.
+    /// Addresses count bytes.
     Byte,
     /// Addresses count words of 16 bits: each word is two bytes of the record.
     Word,
@@ -82,31 +83,31 @@ impl fmt::Display for AddressUnit {
     }
 }
 
-/// Treatment of gaps. A gap consists of addresses, between the first and the last byte, for which no record has data.
+/// Treatment of gaps between records. A gap consists of addresses, between the first and the last byte, for which no record has data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gaps {
-    /// Refuse the file.
+    /// The reader refuses a file with a gap.
     #[default]
     Refuse,
-    /// Fill the gap with 0xFF, the erased state of flash, and list it in [`Image::notes`].
+    /// The reader fills the gap with 0xFF, the erased state of flash, and lists the gap in [`Image::notes`].
     Fill,
 }
 
 /// Options for reading an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Format of the file. If `None`, the reader detects the format from content and name. Records are never read as raw bytes. A text is
-    /// read as raw bytes only if it is in a `.bin` file and the format is set.
+    /// Format of the image file. If `None`, the reader detects the format from the content and the name of the file. The reader never reads
+    /// records as raw bytes. The reader reads a text as raw bytes only if the text is in a `.bin` file and the format is set.
     pub format: Option<Format>,
-    /// Unit of record addresses. If `None`, the unit is words in S-records and bytes in Intel HEX. The other unit is used if the file has
-    /// at least three records that follow one another only in that unit.
+    /// Unit of the record addresses. If `None`, the unit is words in S-records and bytes in Intel HEX. The reader uses the other unit if
+    /// the file has at least three records that follow one another only in that unit.
     pub address_unit: Option<AddressUnit>,
     /// Treatment of gaps between records.
     pub gaps: Gaps,
-    /// `true` to swap the two bytes of each word, for tool chains whose byte order differs from the wire.
+    /// `true` to swap the two bytes of each word, for a toolchain whose byte order differs from the order in which bytes are sent.
     pub swap_bytes: bool,
-    /// Load address in words, which replaces the address in the file. If `None`, the reader uses the address in the file, or 0 for raw
-    /// bytes.
+    /// Load address in words, which replaces the address in the image file. If `None`, the reader uses the address in the file, or 0 for
+    /// raw bytes.
     pub load_address_words: Option<u32>,
     /// Largest length of the image in bytes, including gaps.
     pub max_bytes: usize,
@@ -128,21 +129,22 @@ impl Default for ImageOptions {
 /// A property of an image that the user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageNote {
-    /// A gap was filled with 0xFF.
+    /// The reader filled a gap with 0xFF.
     GapFilled {
         /// First address without data, in words.
         address_words: u32,
-        /// Length in bytes.
+        /// Length of the gap in bytes.
         bytes: usize,
     },
-    /// The last word had only one byte; 0xFF was added.
+    /// The last word had only one byte, so the reader added a byte 0xFF.
     LastWordPadded,
-    /// The file has no end record, but ends with a count record whose number of data records is correct.
+    /// The file has no end record, but it ends with a count record whose number of data records is correct.
     EndedByCount {
-        /// Number of data records.
+        /// Number of data records in the file.
         records: u32,
     },
-    /// The records follow one another only if their addresses have this unit. This unit differs from the usual unit of the format.
+    /// The records follow one another without gaps only if their addresses have this unit. This unit differs from the usual unit of the
+    /// file format.
     AddressesCount(AddressUnit),
 }
 
@@ -173,7 +175,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads the content of a file. The content is read as raw bytes unless the options or the content determine another format.
+    /// Reads the content of an image file. The content is read as raw bytes unless the options or the content determine another format.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }
@@ -212,11 +214,11 @@ impl Image {
         Ok(image)
     }
 
-    /// Reads a file.
+    /// Reads an image from a file.
     pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
         let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
-        // 16 characters per byte are enough for records with at least two data bytes. For example, an S-record with a 32-bit address, two
-        // data bytes and a line end has at most 20 characters.
+        // A limit of 16 characters per byte is enough for records with at least two data bytes. For example, an S-record with a 32-bit
+        // address, two data bytes and a line end has at most 20 characters.
         let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > most {
@@ -232,7 +234,7 @@ impl Image {
         Ok(Self { bytes: content.to_vec(), address_words: 0, format: Format::Bin, notes: Vec::new() })
     }
 
-    /// Reads records in the usual unit of their format. If the records follow one another only in the other unit, the reader uses that
+    /// Reads records in the usual unit of their format. If the records follow one another only in the other unit, the function uses that
     /// unit.
     fn records(content: &[u8], format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
         let (usual, other) = match format {
@@ -264,7 +266,7 @@ impl Image {
                     Ok(image)
                 }
                 _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
-                // There are too few records to be certain, so the user must decide.
+                // The records are too few or too short to show the unit, so the user must decide.
                 Ok(_) if e.is_of_addresses() => {
                     Err(ImageError::OtherUnit { error: Box::new(e), unit: other })
                 }
@@ -273,27 +275,27 @@ impl Image {
         }
     }
 
-    /// Returns the bytes in wire order. The number of bytes is even and at least two.
+    /// Returns the bytes of the image in the order in which they are sent. The number of bytes is even and at least two.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Converts the image to its bytes without a copy.
+    /// Converts the image to its bytes without copying them.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }
 
-    /// Returns the load address in words.
+    /// Returns the load address of the image in words.
     pub fn address_words(&self) -> u32 {
         self.address_words
     }
 
-    /// Returns the length in words.
+    /// Returns the length of the image in words.
     pub fn length_words(&self) -> u32 {
         (self.bytes.len() / 2) as u32
     }
 
-    /// Returns the name of the file's format.
+    /// Returns the name of the format of the image file.
     pub fn format_name(&self) -> &'static str {
         match self.format {
             Format::Bin => "raw bytes",
@@ -302,12 +304,12 @@ impl Image {
         }
     }
 
-    /// Returns the format of the file.
+    /// Returns the format of the image file.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Returns the unit of the record addresses; `None` for raw bytes, which have no addresses.
+    /// Returns the unit of the record addresses; returns `None` for raw bytes, which have no addresses.
     pub fn address_unit(&self, options: &ImageOptions) -> Option<AddressUnit> {
         let detected = self.notes.iter().find_map(|note| match note {
             ImageNote::AddressesCount(unit) => Some(*unit),
@@ -321,7 +323,7 @@ impl Image {
         Some(options.address_unit.or(detected).unwrap_or(usual))
     }
 
-    /// Returns the notes about the image, such as changes made while reading.
+    /// Returns notes about the image, such as changes that the reader made.
     pub fn notes(&self) -> &[ImageNote] {
         &self.notes
     }

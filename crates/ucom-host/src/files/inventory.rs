@@ -1,5 +1,5 @@
-//! Inventory files, which list the boards and their positions in the chain. An inventory is written after an init and read before an update
-//! of several boards.
+//! Reads and writes inventory files, which list the boards and their positions in the chain. An inventory is written after an init and read
+//! before an update of several boards.
 //!
 //! ```toml
 //! [[board]]
@@ -10,8 +10,8 @@
 //! program = { flash_number = 0x0021, sha256 = "…", address = 0x0, program_id = 0x4B3F, date = 0x3AC1 }
 //! ```
 //!
-//! `program` is the [`FlashRecord`] of the last update that was read back. An update changes only this key. Everything else in the file
-//! stays unchanged, including comments.
+//! The key `program` of a board is the [`FlashRecord`] of the last update that was read back. An update changes only the key `program`. An
+//! update does not change any other part of the file, including comments.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_atomically};
 use serde::Deserialize;
@@ -22,24 +22,24 @@ use toml_edit::{DocumentMut, Item, TableLike, Value};
 use super::FlashRecord;
 use crate::master::InitReport;
 
-/// Size limit of a file in bytes.
+/// Size limit of an inventory file in bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Board of an inventory.
+/// Board in an inventory.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InventoryBoard {
-    /// Position in the chain, 0..31.
+    /// Position of the board in the chain, 0..31.
     pub number: u8,
-    /// Flash number.
+    /// Flash number of the board.
     pub flash_number: u16,
-    /// Description reported by the board.
+    /// Description that the board reported.
     #[serde(default)]
     pub description: String,
-    /// Name that the user has chosen.
+    /// Name that the user has chosen for the board.
     #[serde(default)]
     pub name: String,
-    /// Record of the last update.
+    /// Flash record of the last update of the board.
     #[serde(default)]
     pub program: Option<FlashRecord>,
 }
@@ -51,7 +51,7 @@ impl InventoryBoard {
     }
 }
 
-/// Boards by position.
+/// Boards of an inventory, by position in the chain.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Inventory {
     boards: BTreeMap<u8, InventoryBoard>,
@@ -68,44 +68,44 @@ struct File {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InventoryError {
-    /// The file cannot be used.
+    /// The inventory file cannot be used.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the inventory file.
         path: PathBuf,
-        /// System error.
+        /// Error that the system reported.
         source: std::io::Error,
     },
     /// The file is larger than the size limit of an inventory.
     #[error("{}: the inventory has {bytes} bytes, expected at most {MAX_BYTES}", path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the inventory file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file in bytes.
         bytes: u64,
     },
-    /// The text is not TOML in the form of an inventory. The message contains the line.
+    /// The text is not TOML in the form of an inventory. The error message contains the line.
     #[error("{0}")]
     Form(String),
-    /// A number is higher than the highest possible number of a board.
+    /// A board number is higher than the highest possible board number.
     #[error("board number {number} is above 31")]
     Number {
-        /// The number.
+        /// Board number in the file.
         number: u8,
     },
     /// Two boards have the same position.
     #[error("board {number} has two entries")]
     Twice {
-        /// Board number.
+        /// Board number that both boards have.
         number: u8,
     },
-    /// A board has two positions.
+    /// A board is listed at two positions.
     #[error(
         "boards {first} and {second} have the same flash number 0x{flash_number:04X}; each flash number \
          must be unique"
     )]
     FlashTwice {
-        /// The flash number.
+        /// Flash number that is listed twice.
         flash_number: u16,
         /// Number of the first board.
         first: u8,
@@ -117,23 +117,23 @@ pub enum InventoryError {
 /// Reasons why the flash number of a board is not known.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
-    /// The inventory does not exist.
+    /// The inventory file does not exist.
     #[error("the flash number of board {board} is not known: there is no inventory {}", path.display())]
     NoInventory {
-        /// The board number.
+        /// Board number that was requested.
         board: u8,
-        /// The file.
+        /// Path of the inventory file.
         path: PathBuf,
     },
     /// The inventory does not list the board.
     #[error("board {board} is not in the inventory {}", path.display())]
     NotListed {
-        /// The board number.
+        /// Board number that was requested.
         board: u8,
-        /// The file.
+        /// Path of the inventory file.
         path: PathBuf,
     },
-    /// The inventory cannot be read.
+    /// The inventory file cannot be read.
     #[error(transparent)]
     Inventory(#[from] InventoryError),
 }
@@ -169,7 +169,7 @@ impl Diagnose for IdentifyError {
 /// Returns the flash number of a board from an inventory file.
 ///
 /// # Errors
-/// The file does not exist, cannot be read, or does not list the board.
+/// Returns an error if the file does not exist, cannot be read, or does not list the board.
 pub fn flash_number_of(path: &Path, board: u8) -> Result<u16, IdentifyError> {
     if !path.exists() {
         return Err(IdentifyError::NoInventory { board, path: path.into() });
@@ -179,7 +179,7 @@ pub fn flash_number_of(path: &Path, board: u8) -> Result<u16, IdentifyError> {
 }
 
 impl Inventory {
-    /// Reads TOML.
+    /// Reads an inventory from TOML text.
     pub fn parse(text: &str) -> Result<Self, InventoryError> {
         let file: File = toml::from_str(text).map_err(|e| InventoryError::Form(e.to_string()))?;
         let mut inventory = Self::default();
@@ -189,7 +189,7 @@ impl Inventory {
         Ok(inventory)
     }
 
-    /// Reads a file.
+    /// Reads an inventory from a file.
     pub fn read(path: &Path) -> Result<Self, InventoryError> {
         let io = |source| InventoryError::Io { path: path.into(), source };
         let bytes = std::fs::metadata(path).map_err(io)?.len();
@@ -203,13 +203,14 @@ impl Inventory {
         })
     }
 
-    /// Writes a file atomically.
+    /// Writes the inventory to a file atomically.
     pub fn write(&self, path: &Path) -> Result<(), InventoryError> {
         let io = |source| InventoryError::Io { path: path.into(), source };
         write_atomically(path, self.to_toml().as_bytes()).map_err(io)
     }
 
-    /// Adds a board. Refuses a number above 31, a position that is already used, and a flash number that the inventory already lists.
+    /// Adds a board to the inventory. The function refuses a number above 31, a position that is already used, and a flash number that the
+    /// inventory already lists.
     pub fn insert(&mut self, board: InventoryBoard) -> Result<(), InventoryError> {
         let number = board.number;
         if number > 31 {
@@ -226,20 +227,20 @@ impl Inventory {
         Ok(())
     }
 
-    /// Returns the board at a position.
+    /// Returns the board at a position of the chain.
     pub fn get(&self, number: u8) -> Option<&InventoryBoard> {
         self.boards.get(&number)
     }
 
-    /// Returns all boards in the order of the chain.
+    /// Returns all boards of the inventory in the order of the chain.
     pub fn boards(&self) -> impl Iterator<Item = &InventoryBoard> {
         self.boards.values()
     }
 
-    /// Creates an inventory of the boards in the report of an init. Names and flash records come from an older inventory.
+    /// Creates an inventory of the boards in the report of an init. The names and the flash records come from an older inventory.
     ///
     /// # Errors
-    /// Two boards have the same flash number.
+    /// Returns an error if two boards have the same flash number.
     pub fn of_init(report: &InitReport, older: Option<&Self>) -> Result<Self, InventoryError> {
         let mut inventory = Self::default();
         for board in &report.boards {
@@ -269,17 +270,18 @@ impl Inventory {
         }
     }
 
-    /// Returns the boards without their flash records, because records of a deleted file are not reliable.
+    /// Returns the boards without their flash records, because flash records of a deleted file are not reliable.
     #[must_use]
     pub fn without_records(mut self) -> Self {
         self.boards.values_mut().for_each(|board| board.program = None);
         self
     }
 
-    /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in it.
+    /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in the file.
     ///
     /// # Errors
-    /// The file cannot be read or written. If the file does not list the board, the file stays unchanged, and no error is returned.
+    /// Returns an error if the file cannot be read or written. If the file does not list the board, the file stays unchanged, and the
+    /// function returns no error.
     pub fn set_record(
         path: &Path,
         flash_number: u16,
@@ -315,7 +317,7 @@ impl Inventory {
         write_atomically(path, document.to_string().as_bytes()).map_err(io)
     }
 
-    /// Returns the inventory as text for a file.
+    /// Returns the inventory as the text of a file.
     pub fn to_toml(&self) -> String {
         let mut text = String::from("# Boards of the chain, by position.\n");
         for board in self.boards.values() {

@@ -1,7 +1,7 @@
-//! Parameter files: parameters and initial inputs for boards, in YAML that users edit.
+//! Parameter files: parameters and initial inputs of boards, in YAML that users edit.
 //!
-//! The protocol does not allow parameters to be read back (D-35). A file therefore contains requested values, never the present values of a
-//! board. A file identifies boards by flash number or name. The names of signals apply to one Program ID.
+//! The protocol has no function that reads parameters back (D-35). A parameter file therefore contains requested values, never the present
+//! values of a board. A parameter file identifies boards by flash number or name. The names of signals in the file apply to one Program ID.
 
 mod check;
 mod read;
@@ -17,49 +17,49 @@ use std::path::{Path, PathBuf};
 /// Help page about parameter files.
 pub const PARAMS_HELP: &str = include_str!("params/help.txt");
 
-/// A parameter file.
+/// Contents of a parameter file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParamsFile {
-    /// Boards in the order of the file. Each board number occurs once.
+    /// Boards in the order of the parameter file. Each board number occurs only once.
     pub boards: Vec<ParamsBoard>,
 }
 
-/// Board of a parameter file.
+/// Entry for a board in a parameter file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsBoard {
-    /// Position in the chain.
+    /// Position of the board in the chain.
     pub number: u8,
     /// Position of the entry in the file.
     pub place: Place,
     /// Flash number that the board at this position must have.
     pub flash_number: Option<u16>,
-    /// Name in the inventory that the board at this position must have. Each board in the file has a flash number or a name, or both.
+    /// Name in the inventory that the board at this position must have. Each board in the file has a flash number, a name, or both.
     pub name: Option<String>,
-    /// Program to which the names apply; `None` for `any` in the file.
+    /// Program ID to which the names of the signals apply; `None` for `any` in the file.
     pub program_id: Option<u16>,
-    /// Parameters.
+    /// Parameters of the board.
     pub par: Vec<ParamsEntry>,
-    /// Initial inputs, which are sent at a start.
+    /// Initial inputs of the board, which are sent at a start.
     pub ci: Vec<ParamsEntry>,
 }
 
-/// A value of a parameter file.
+/// Value in a parameter file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsEntry {
     /// Name or index of the signal.
     pub name: String,
-    /// The value.
+    /// Value that the user gave.
     pub given: SignalValue,
     /// Position of the value in the file.
     pub place: Place,
 }
 
-/// Position in a text, counted from 1.
+/// Position in the text of a file, counted from 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// Line.
+    /// Number of the line.
     pub line: u32,
-    /// Column.
+    /// Number of the column.
     pub column: u32,
 }
 
@@ -73,38 +73,38 @@ impl core::fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsError {
-    /// The file cannot be read.
+    /// The parameter file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
     /// The text is not YAML in the form of a parameter file.
     #[error("{place}: {what}")]
     Form {
-        /// Place.
+        /// Position of the error in the file.
         place: Place,
-        /// Error text.
+        /// Text of the error.
         what: String,
     },
-    /// The text is not YAML in the form of a parameter file, and the place of the error is not known.
+    /// The text is not YAML in the form of a parameter file, and the position of the error is not known.
     #[error("{0}")]
     Nowhere(String),
-    /// Error in a file.
+    /// A parameter file contains an error.
     #[error("{}: {source}", path.display())]
     In {
-        /// The file.
+        /// Path of the parameter file.
         path: PathBuf,
-        /// Error in the file.
+        /// Error in the parameter file.
         source: Box<ParamsError>,
     },
 }
 
 impl ParamsFile {
-    /// Reads a file.
+    /// Reads a parameter file.
     pub fn read(path: &Path) -> Result<Self, ParamsError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| ParamsError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Returns the entries for a board.
+    /// Returns the entries of a board in the parameter file.
     pub fn board(&self, number: u8) -> Option<&ParamsBoard> {
         self.boards.iter().find(|b| b.number == number)
     }

@@ -1,9 +1,9 @@
-//! Recordings of a bus in the formats `candump -L`, FZI-CAN 1.2 and MCAP.
+//! Recordings of the frames on a bus in the formats `candump -L`, FZI-CAN 1.2 and MCAP.
 //!
-//! A recording can be interpreted only with the profile that was used during the recording. MCAP stores the profile as metadata. The two
-//! text formats cannot store the profile in a form that every reader accepts. For example, python-can's candump reader reads each line as a
-//! frame. For text formats the profile is therefore stored in a separate file next to the recording, see [`profile_path`]. The reader also
-//! accepts comment lines `# …` with a profile.
+//! A recording can be interpreted only with the profile that was used during the recording. An MCAP file stores the profile as metadata.
+//! The two text formats cannot store the profile in a form that every reader accepts. For example, python-can's candump reader reads each
+//! line as a frame. Therefore, the profile of a text recording is stored in a separate file next to the recording, see [`profile_path`].
+//! The reader of text recordings also accepts comment lines `# …` with a profile.
 mod candump;
 mod error;
 mod frame;
@@ -26,10 +26,10 @@ pub use mcap::{McapWriter, read_mcap};
 /// Longest line of a text recording in bytes. A file with a longer line is not a recording.
 pub const MAX_LINE: usize = 4096;
 
-/// Format of a recording.
+/// Format of a recording file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordingFormat {
-    /// Lines `(sec.frac) interface ID#DATA` of can-utils.
+    /// Text lines `(sec.frac) interface ID#DATA` of can-utils.
     Candump,
     /// FZI-CAN stream 1.2.
     FziCan,
@@ -38,7 +38,7 @@ pub enum RecordingFormat {
 }
 
 impl RecordingFormat {
-    /// Returns the format according to the first bytes of the file.
+    /// Returns the format of a recording according to the first bytes of the file.
     pub fn detect(start: &[u8]) -> Self {
         if start.starts_with(b"\x89MCAP0\r\n") {
             Self::Mcap
@@ -49,7 +49,7 @@ impl RecordingFormat {
         }
     }
 
-    /// Returns the format according to the extension: `.mcap`, `.fzi`, or candump for all others.
+    /// Returns the format of a recording according to the file extension: `.mcap`, `.fzi`, or candump for all others.
     pub fn of_path(path: &Path) -> Self {
         match path.extension().and_then(|e| e.to_str()) {
             Some("mcap") => Self::Mcap,
@@ -66,20 +66,20 @@ pub fn profile_path(recording: &Path) -> PathBuf {
     name.into()
 }
 
-/// A complete recording.
+/// Contents of a recording file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
-    /// Profile of the recording, as TOML; `None` if the profile is not known.
+    /// Profile that was used during the recording, as TOML; `None` if the profile is not known.
     pub profile: Option<String>,
     /// Frames in the order of the file.
     pub records: Vec<Record>,
-    /// Place and kind of the damage if the file ends in the middle of a record because its writer was killed; `None` if the file is
+    /// Position and kind of the damage if the file ends in the middle of a record because its writer was killed; `None` if the file is
     /// complete.
     pub broken_off: Option<String>,
 }
 
 impl Recording {
-    /// Reads a file of any format, and the profile file next to it.
+    /// Reads a recording file of any format, and the profile file next to it.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let mut file = BufReader::new(File::open(path).map_err(io)?);
@@ -98,21 +98,21 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Reads candump lines.
+    /// Reads a recording from candump lines.
     pub fn read_candump(input: impl BufRead) -> Result<Self, RecordingError> {
         let mut reader = CandumpReader::new(input);
         let (records, broken_off) = whole(&mut reader)?;
         Ok(Self { profile: reader.into_profile(), records, broken_off })
     }
 
-    /// Reads an FZI-CAN stream.
+    /// Reads a recording from an FZI-CAN stream.
     pub fn read_fzi(input: impl BufRead) -> Result<Self, RecordingError> {
         let (records, broken_off) = whole(&mut FziReader::new(input)?)?;
         Ok(Self { profile: None, records, broken_off })
     }
 }
 
-/// Returns the records of a text. If the last line is cut off, also returns its error.
+/// Returns the records of a text recording. If the last line is cut off, the function also returns the error of this line.
 fn whole(
     lines: &mut dyn Iterator<Item = Result<Record, RecordingError>>,
 ) -> Result<(Vec<Record>, Option<String>), RecordingError> {
@@ -131,16 +131,16 @@ fn whole(
 
 /// Writer for a recording of any format.
 pub enum RecordingWriter {
-    /// candump.
+    /// Writer for the format of candump.
     Candump(CandumpWriter<BufWriter<File>>),
-    /// FZI-CAN.
+    /// Writer for the format FZI-CAN.
     FziCan(FziWriter<BufWriter<File>>),
-    /// MCAP.
+    /// Writer for the format MCAP.
     Mcap(Box<McapWriter<BufWriter<File>>>),
 }
 
 impl RecordingWriter {
-    /// Creates the file. For text formats, also creates the profile file next to it.
+    /// Creates the recording file. For text formats, the function also creates the profile file next to the recording.
     pub fn create(path: &Path, format: RecordingFormat, profile: &str) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let out = BufWriter::new(File::create(path).map_err(io)?);
@@ -156,7 +156,8 @@ impl RecordingWriter {
         .map_err(|e| e.with_path(path))
     }
 
-    /// Adds a frame. For a frame of another protocol, FZI-CAN returns an error and does not write the frame.
+    /// Adds a frame to the recording. FZI-CAN can represent only classic data frames with 11-bit identifiers. For other frames, the
+    /// function returns an error and does not write the frame.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.write(record),
@@ -165,7 +166,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes all data to the file. If the writer is killed later, only records after this call are lost.
+    /// Writes all data of the recording to the file. If the writer is killed later, only records that were added after this call are lost.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.flush(),
@@ -174,7 +175,8 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes the remaining data. If this function is not called, an MCAP file has no index, and a text file may lack its last lines.
+    /// Writes the remaining data of the recording and ends the file. Without this call, an MCAP file has no index, and a text file may lack
+    /// its last lines.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => Ok(w.into_inner().flush()?),
@@ -184,7 +186,7 @@ impl RecordingWriter {
     }
 }
 
-/// Converts `sec.fraction` to nanoseconds. Digits after the ninth decimal are discarded.
+/// Converts a time in the form `sec.fraction` to nanoseconds. Digits after the ninth decimal are discarded.
 fn seconds(text: &str) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());

@@ -1,5 +1,5 @@
 //! Signal tables: type, scale, offset, unit and limits of the inputs, outputs and parameters of a program (D-11), like the `SG_` lines of a
-//! DBC file. The table is a separate file, because boards send only a text for each signal.
+//! DBC file. The signal table is a separate file, because boards send only a text for each signal.
 
 mod form;
 mod signal;
@@ -14,7 +14,7 @@ use ucom::Profile;
 pub use value::{SignalValue, SignalValueError};
 pub use value_error::ValueError;
 
-/// The signals of one board, each with its meaning.
+/// Signals of one board, each with its meaning.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardSignals {
     ci: Vec<Signal>,
@@ -23,7 +23,7 @@ pub struct BoardSignals {
 }
 
 impl BoardSignals {
-    /// Creates the signals of a description. A signal that is not in the table becomes a raw word.
+    /// Creates the signals of a board from its description. A signal that is not in the table becomes a raw word.
     pub fn new(description: &IoDescription, program: Option<&ProgramSignals>, profile: &Profile) -> Self {
         let of = |kind: Kind| {
             let names = description.names(kind).iter().enumerate();
@@ -54,7 +54,7 @@ impl BoardSignals {
         }
     }
 
-    /// Returns a signal; `None` if the buffer has no signal with this index.
+    /// Returns the signal with this index; returns `None` if the buffer has no such signal.
     pub fn get(&self, kind: Kind, index: usize) -> Option<&Signal> {
         self.all(kind).get(index)
     }

@@ -1,34 +1,34 @@
-//! Small text files: reading with a limit, atomic writing, quoting.
+//! Reads small text files with a size limit, writes them atomically, and quotes texts.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use host_kit::write_atomically;
 
-/// Size limit of a file in bytes.
+/// Size limit of a text file in bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 20;
 
-/// Text file that cannot be used.
+/// Reasons why a text file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TextError {
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// System error.
+        /// Error that the system reported.
         source: std::io::Error,
     },
     /// The file is larger than the limit for files of its kind.
     #[error("{}: the file is too large, expected at most {MAX_BYTES} bytes", path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
 
-/// Reads a text file. Sources without a known length, such as a pipe, are also accepted.
+/// Reads a text file. The function also accepts sources without a known length, such as a pipe.
 pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     let io = |source| TextError::Io { path: path.into(), source };
     let mut text = String::new();
@@ -40,11 +40,12 @@ pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     Ok(text)
 }
 
-/// Writes a file atomically. If the path is a link, its target is written. An existing file keeps its mode.
+/// Writes a text file atomically. If the path is a symbolic link, the function writes the target of the link. An existing file keeps its
+/// access mode.
 ///
 /// # Errors
 ///
-/// The system returned an error. In this case the file is unchanged.
+/// Returns an error if the file cannot be written. In this case, the file is unchanged.
 pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
     write_atomically(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
 }

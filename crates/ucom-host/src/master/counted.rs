@@ -1,9 +1,9 @@
-//! Numbers with a noun in singular or plural.
+//! Text for a number with a noun in the singular or plural.
 
 use std::format;
 use std::string::String;
 
-/// Returns `1 board`, `3 boards` and so on. Supports only nouns whose plural is formed with an s.
+/// Returns `1 board`, `3 boards` and so on. The function supports only nouns whose plural is formed with an s.
 pub fn counted(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

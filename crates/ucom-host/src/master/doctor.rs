@@ -1,4 +1,4 @@
-//! Findings about bus, chain and boards. Each finding names the next command.
+//! Findings of `ucom doctor` about the bus, the chain and the boards. Each finding names the command that the user should run next.
 use crate::master::engine::{Boards, Life, Statistics};
 use crate::master::error::{SHARED_CAUSE, shared_remedy};
 use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
@@ -8,51 +8,52 @@ pub use host_kit::{Finding, Severity};
 use crate::master::counted::counted;
 use ucom::{Function, Profile};
 
-/// State reported by the CAN controller.
+/// State that the CAN controller reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Controller {
     /// `true` if the controller is bus-off.
     pub bus_off: bool,
-    /// Number of times that the controller was bus-off during the observation. The controller may be active again.
+    /// Number of times that the controller was bus-off during the observation. The controller may be on the bus again at the end of the
+    /// observation.
     pub times_bus_off: u64,
     /// `true` if the controller is error passive.
     pub passive: bool,
-    /// Transmit error counter.
+    /// Transmit error counter of the controller.
     pub tec: Option<u16>,
-    /// Receive error counter.
+    /// Receive error counter of the controller.
     pub rec: Option<u16>,
-    /// Frames without an acknowledgement.
+    /// Number of frames that no node acknowledged.
     pub no_acknowledge: u64,
-    /// Stuff, form and CRC errors. Typical causes are a wrong bit rate and reflections.
+    /// Number of stuff, form and CRC errors. Typical causes are a wrong bit rate and reflections.
     pub protocol_errors: u64,
 }
 
-/// Data for the diagnosis. Unknown values are `None` or empty.
+/// Data about the bus from which the doctor derives its findings. Unknown values are `None` or empty.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
-    /// Time of listening, µs.
+    /// Duration of the observation, µs.
     pub listened_us: u64,
     /// Time at which the observation ended, µs.
     pub now_us: u64,
-    /// Counters of the bus.
+    /// Counters of the frames on the bus.
     pub statistics: Statistics,
-    /// Boards as last seen.
+    /// Last known states of the boards.
     pub boards: Boards,
-    /// State of the adapter, if it reports one.
+    /// State of the CAN adapter; `None` if the adapter does not report its state.
     pub controller: Option<Controller>,
-    /// Report of a scan, which changes nothing.
+    /// Report of a scan, which does not change any board.
     pub scan: Option<ScanReport>,
     /// Report of an init, if the user ran an init.
     pub init: Option<InitReport>,
-    /// Another bit rate at which frames were received, in bit/s.
+    /// Another bit rate at which the PC received frames, in bit/s.
     pub other_bitrate: Option<u32>,
-    /// Last frame of another PC.
+    /// Function and destination number of the last frame of another PC.
     pub competing_master: Option<(Function, u8)>,
     /// The profile in use.
     pub profile: Profile,
 }
 
-/// Returns all findings, problems first.
+/// Returns all findings of the doctor, problems first.
 pub fn findings(o: &Observation) -> Vec<Finding> {
     let mut f = Findings::default();
     bus(o, &mut f);
@@ -219,7 +220,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         f.problem(shared.to_string(), SHARED_CAUSE, shared_remedy());
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // The other values of these boards were read in the wrong byte order, so no findings are derived from these values.
+        // The PC read the other values of these boards in the wrong byte order, so the doctor derives no findings from these values.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }

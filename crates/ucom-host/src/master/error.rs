@@ -1,5 +1,5 @@
-//! Errors with the facts, the kind of failure and the next command. Each operation has its own small error type. A procedure can return any
-//! of these errors.
+//! Errors of procedures, with the facts, the kind of failure and the command that the user should run next. Each operation has its own
+//! small error type. A procedure can return any of these errors.
 mod address;
 mod exchange;
 mod identity;

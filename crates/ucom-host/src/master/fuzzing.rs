@@ -1,4 +1,5 @@
-//! Code of the fuzz targets: a procedure runs, and random frames arrive at any time. A panic or an endless wait is an error.
+//! Code of the fuzz targets: it runs a procedure, and random frames arrive at any time. A panic or an endless wait in the procedure is an
+//! error.
 use crate::master::engine::Event;
 use crate::master::interface::Master;
 use crate::master::reports::update::{UpdateImage, UpdateOptions, UpdateTarget};
@@ -40,7 +41,8 @@ fn request(choice: u8) -> Request {
     }
 }
 
-/// Runs a procedure. The first byte selects the procedure. The remaining bytes contain frames: pause in ms, identifier, length, data.
+/// Runs a procedure with random input. The first byte of the input selects the procedure. The remaining bytes of the input contain frames:
+/// pause in ms, identifier, length, data.
 pub fn frames(data: &[u8]) {
     let Some((&choice, mut rest)) = data.split_first() else { return };
     let mut master = Master::new(Profile::default());

@@ -1,4 +1,4 @@
-//! The interface for a driver: [`Master`].
+//! Interface of the master for a driver: [`Master`].
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
@@ -11,7 +11,7 @@ use crate::master::procedures::work::{Work, work};
 use crate::master::reports::{ProcedureId, Request};
 use ucom::{Foreign, Frame, Function, Profile, Sequence};
 
-/// PC side of one bus.
+/// PC side of one UCoM bus.
 pub struct Master {
     core: Arc<Mutex<Core>>,
     work: BTreeMap<ProcedureId, Work>,
@@ -19,13 +19,13 @@ pub struct Master {
 }
 
 impl Master {
-    /// Creates a master that only listens until a caller requests more.
+    /// Creates a master that only listens until a caller starts a procedure or a session.
     pub fn new(profile: Profile) -> Self {
         Self { core: Arc::new(Mutex::new(Core::new(profile))), work: BTreeMap::new(), next_id: 1 }
     }
 
-    /// Starts a procedure. The end of the procedure is reported as [`Event::Done`]. Returns an error while another procedure works with the
-    /// same board.
+    /// Starts a procedure. [`Event::Done`] reports the end of the procedure. The function returns an error while another procedure works
+    /// with the same board.
     pub fn start(&mut self, now: u64, request: Request) -> Result<ProcedureId, Error> {
         let (id, name, claims) = (ProcedureId(self.next_id), request.name(), request.claims());
         {
@@ -46,7 +46,7 @@ impl Master {
         Ok(id)
     }
 
-    /// Cancels a procedure. Before [`Event::Done`] is reported, the procedure still undoes its changes on the boards.
+    /// Cancels a procedure. Before the master reports [`Event::Done`], the procedure still undoes its changes on the boards.
     pub fn cancel(&mut self, id: ProcedureId) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.cancel = true;
@@ -54,9 +54,9 @@ impl Master {
         self.run();
     }
 
-    /// Ends a procedure without sending another frame, because the bus is lost. [`Event::Done`] is reported at once. The event contains the
-    /// known state of each board for an update, the finished tests for conformance tests, and [`MasterError::Bus`] for all other
-    /// procedures.
+    /// Ends a procedure without sending another frame, because the bus is lost. The master reports [`Event::Done`] at once. For an update,
+    /// the event contains the known state of each board. For conformance tests, it contains the finished tests. For all other procedures,
+    /// it contains [`MasterError::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -74,13 +74,13 @@ impl Master {
         self.run();
     }
 
-    /// Returns the next frame to send. Call `poll` until it returns `None`.
+    /// Returns the next frame that the driver must send. The driver must call `poll` until it returns `None`.
     pub fn poll(&mut self, now: u64) -> Option<Frame> {
         self.poll_behind(now, now)
     }
 
-    /// Like `poll`, for a driver that has delivered the frames received before the time `received`, but not the later frames. Waits do not
-    /// end later than `received`, but heartbeats are sent up to `now`.
+    /// Like `poll`, for a driver that has delivered the frames received before the time `received`, but not the later frames. The master
+    /// ends waits only up to the time `received`, but sends heartbeats up to `now`.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -92,8 +92,8 @@ impl Master {
         lock(&self.core).pop()
     }
 
-    /// Returns the time at which [`Master::poll`] must be called next, unless a frame arrives earlier. If `None`, `poll` is needed only
-    /// when a frame arrives.
+    /// Returns the time at which the driver must call [`Master::poll`] next, unless a frame arrives earlier. If the result is `None`, the
+    /// driver needs to call `poll` only when a frame arrives.
     pub fn next_deadline(&self) -> Option<u64> {
         let core = lock(&self.core);
         if !core.idle() {
@@ -113,7 +113,7 @@ impl Master {
         !self.work.is_empty()
     }
 
-    /// Advances every procedure as far as possible.
+    /// Advances every procedure as far as the received frames and the time allow.
     fn run(&mut self) {
         let mut context = Context::from_waker(Waker::noop());
         let core = self.core.clone();
@@ -161,12 +161,13 @@ impl Master {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
 
-    /// Returns the counters of the bus.
+    /// Returns the counters of the frames on the bus.
     pub fn statistics(&self) -> Statistics {
         lock(&self.core).statistics.clone()
     }
 
-    /// Sets an input of a board whose description is known. The input is sent at once, and repeated while the board runs (D-34).
+    /// Sets an input of a board whose description is known. The master sends the input at once. If this PC repeats the inputs of the board,
+    /// it also repeats the new value (D-34).
     pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Ci, name)?;
         let mut core = lock(&self.core);
@@ -201,17 +202,17 @@ impl Master {
         core.descriptions.get(&key).cloned()
     }
 
-    /// Returns all known descriptions. The caller can store them for the next session.
+    /// Returns all descriptions of boards that the master knows. The caller can store them for the next session.
     pub fn descriptions(&self) -> BTreeMap<DescriptionKey, IoDescription> {
         lock(&self.core).descriptions.clone()
     }
 
-    /// Stores a description from an earlier session (D-36).
+    /// Stores a description of a board from an earlier session (D-36).
     pub fn know_description(&mut self, key: DescriptionKey, description: IoDescription) {
         lock(&self.core).descriptions.insert(key, description);
     }
 
-    /// Returns `true` if the inputs of a board are sent cyclically, so that a lost frame does not matter (D-34).
+    /// Returns `true` if this PC sends the inputs of a board cyclically, so that the loss of one frame has no lasting effect (D-34).
     pub fn repeats_inputs(&self, board: u8) -> bool {
         lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
     }
@@ -227,8 +228,8 @@ impl Master {
         lock(&self.core).data.get(&board).map(|d| d.par.values().to_vec()).unwrap_or_default()
     }
 
-    /// Begins or stops reporting the sensor outputs of a board as [`Event::Snapshot`]. `dimension` is needed if the board's description is
-    /// not known.
+    /// Starts or stops reporting the sensor outputs of a board as [`Event::Snapshot`]. The caller must give `dimension` if the board's
+    /// description is not known.
     pub fn watch(&mut self, board: u8, dimension: Option<u16>, on: bool) {
         let mut core = lock(&self.core);
         let data = core.data.entry(board & 31).or_default();
@@ -238,15 +239,16 @@ impl Master {
         }
     }
 
-    /// Makes this PC the master without a procedure. Heartbeats are sent from now on.
+    /// Makes this PC the master without a procedure. From this call on, the PC sends heartbeats.
     pub fn begin_session(&mut self, now: u64) {
         let mut core = lock(&self.core);
         core.advance(now);
         core.start_session();
     }
 
-    /// Stops control loops (ADMIN_DATA, all 0) before all queued frames, and repeats the stop twice shortly afterwards. The stop is sent to
-    /// the given boards, in reverse order, or to all boards by broadcast. Does not wait for an answer; [`Request::Stop`] checks each board.
+    /// Sends a command that stops control loops (ADMIN_DATA, all 0) before all queued frames. Repeats this command twice shortly
+    /// afterwards. The command is sent to the given boards, in reverse order, or to all boards by broadcast. This function does not wait
+    /// for an answer; [`Request::Stop`] checks each board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

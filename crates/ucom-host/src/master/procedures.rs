@@ -1,4 +1,4 @@
-//! The procedures: `async` functions that use a [`Link`](crate::master::engine::Link).
+//! The procedures of the master: `async` functions that use a [`Link`](crate::master::engine::Link).
 //!
 //! Each file imports only files that come before it in this list: exchange, mastership, one_board, ask_reports, byte_order, survey, scan,
 //! take_number, repair, init, control, stop, raw_status, describe, run, update, probe, conformance, work.

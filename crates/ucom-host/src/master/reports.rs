@@ -1,5 +1,5 @@
-//! Data that procedures receive and return: requests with options, outcomes with reports and findings. The module does not send frames and
-//! does not wait.
+//! Data that procedures receive and return: requests with options, and outcomes with reports and findings. This module does not send frames
+//! and does not wait.
 mod conformance;
 mod flags;
 mod init;

@@ -1,11 +1,11 @@
-//! Bus-off (ISO 11898-1). The message reports that the CAN controller of this computer has left the bus, and names the next command.
+//! Message about bus-off (ISO 11898-1): the CAN controller of this computer has left the bus. The message also names the next command.
 
 use host_kit::{Action, Next, next};
 
 /// Minimum time between two messages in µs. With a bad wire, the controller enters bus-off repeatedly.
 const AGAIN_US: u64 = 5_000_000;
 
-/// The likely causes.
+/// Likely causes of a bus-off.
 pub const WHY: &str =
     "too many of its frames failed: a wrong bit rate, no termination, or CAN_H and CAN_L swapped or shorted";
 
@@ -17,7 +17,8 @@ pub struct BusOff {
 }
 
 impl BusOff {
-    /// Returns the message for a new bus-off. Returns `None` without a new bus-off, or if a bus-off was reported in the last 5 s.
+    /// Returns the message for a new bus-off. The function returns `None` without a new bus-off, or if a bus-off was reported in the last 5
+    /// s.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
         let new = times.saturating_sub(self.reported);
         if new == 0 || self.reported_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {
@@ -50,7 +51,8 @@ pub fn next(url: &str) -> Next {
 mod tests {
     use super::*;
 
-    /// The first bus-off is reported at once. Later bus-offs are reported at most every 5 s. The report contains the number of bus-offs.
+    /// The first bus-off of the controller is reported at once. Later bus-offs are reported at most once in 5 s. The message contains the
+    /// number of bus-offs.
     #[test]
     fn it_is_reported_once_and_counted() {
         let mut off = BusOff::default();

@@ -1,4 +1,4 @@
-//! Cache that keeps data between sessions, as small files in a directory.
+//! Cache that stores data between sessions, as small files in a directory.
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Size limit of a file that is read in advance, in bytes.
 const FILE_MAX: u64 = 1 << 20;
-/// Limit of files that wait to be written. Further files are not stored on the disk.
+/// Limit of files that wait until the writer thread writes them. If the limit is reached, further files are not written to the disk.
 const WAITING_MAX: usize = 64;
 
-/// Cache of names, and a flag to ignore it.
+/// Cache of signal names, and a flag to ignore the cached names.
 #[derive(Clone, Debug, Default)]
 pub struct Cache {
     place: Place,
@@ -20,14 +20,14 @@ pub struct Cache {
 
 #[derive(Clone, Debug, Default)]
 enum Place {
-    /// The session has no cache.
+    /// The session has no cache directory.
     #[default]
     Nowhere,
     Directory(PathBuf),
     Memory(Memory),
 }
 
-/// Files of a directory in memory, and the channel to the thread that writes new files.
+/// Contents of the cache files in memory, and the channel to the thread that writes new files.
 #[derive(Clone, Debug)]
 struct Memory {
     texts: Arc<Mutex<BTreeMap<String, String>>>,
@@ -35,19 +35,20 @@ struct Memory {
 }
 
 impl Cache {
-    /// Creates a cache in this directory. With `None`, creates no cache for the session.
+    /// Creates a cache in this directory. If the directory is `None`, the session has no cache.
     pub fn new(directory: Option<PathBuf>, fresh: bool) -> Self {
         Self { place: directory.map_or(Place::Nowhere, Place::Directory), fresh }
     }
 
-    /// Converts the cache for a caller that must never wait for a disk. Reads all files now; a separate thread writes new files.
+    /// Converts the cache for a caller that must never wait for a disk. The function reads all files now; a separate thread writes new
+    /// files.
     #[must_use]
     pub fn in_memory(self) -> Self {
         let Self { place: Place::Directory(directory), fresh } = self else { return self };
         let texts = Arc::new(Mutex::new(all(&directory)));
         let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
-        // The thread ends with the last clone of this cache. The clone does not wait for the thread. If data are not stored in time, they
-        // are read from the boards again.
+        // The writer thread ends with the last clone of this cache. The last clone does not wait for the thread. If data are not stored in
+        // time, the next session reads them from the boards again.
         std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
         Self { place: Place::Memory(Memory { texts, writer }), fresh }
     }
@@ -57,7 +58,7 @@ impl Cache {
         Self { fresh: true, ..self.clone() }
     }
 
-    /// Reads a file; returns `None` if the file does not exist or cannot be read.
+    /// Reads a file of the cache; returns `None` if the file does not exist or cannot be read.
     pub(super) fn read(&self, name: &str) -> Option<String> {
         match &self.place {
             Place::Nowhere => None,
@@ -68,7 +69,7 @@ impl Cache {
         }
     }
 
-    /// Stores a file. An error while writing is ignored.
+    /// Stores a file in the cache. The function ignores an error that occurs while the file is written.
     pub(super) fn write(&self, name: String, text: String) {
         match &self.place {
             Place::Nowhere => {}
@@ -90,7 +91,7 @@ fn all(directory: &Path) -> BTreeMap<String, String> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let text = |entry: fs::DirEntry| {
         let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".json"))?;
-        // Only regular files are read. Reading from other files could block endlessly.
+        // The cache reads only regular files. Reading from other kinds of files could block endlessly.
         let about = entry.metadata().ok().filter(|about| about.is_file() && about.len() <= FILE_MAX);
         about.and_then(|_| Some((name, fs::read_to_string(entry.path()).ok()?)))
     };
@@ -107,7 +108,7 @@ mod tests {
         let on_disk = Cache::new(Some(dir.path().join("new")), false);
         on_disk.write("a.json".into(), "1".into());
         let cache = on_disk.clone().in_memory();
-        // From this point on, the cache does not read from the disk.
+        // From this point on, the cache in memory does not read from the disk.
         on_disk.write("a.json".into(), "2".into());
         assert_eq!(cache.read("a.json").as_deref(), Some("1"));
         cache.write("b.json".into(), "3".into());

@@ -1,5 +1,5 @@
-//! Single actions on several boards. No board is changed until all boards have answered. After a failure, the boards that were already
-//! changed are reported.
+//! Performs single actions on several boards. The PC changes no board until all boards have answered. After a failure, the error lists the
+//! boards that were already changed.
 
 use std::collections::BTreeSet;
 
@@ -10,19 +10,19 @@ use super::error::SessionError;
 use super::selection::Boards;
 use crate::master::{Error, MasterError, Outcome, RawStatus, Request, StopLevel};
 
-/// Board number and the board's answer to PC_INFO.
+/// Board number, with the board's answer to PC_INFO.
 pub type Numbered = (u8, BoardInfo);
 
-/// Result of a stop of several boards, or of switching off their outputs.
+/// Result of stopping several boards, or of switching off their outputs.
 #[derive(Debug)]
 pub struct Stopped {
-    /// Boards that confirmed the stop.
+    /// Boards that confirmed the stop command.
     pub boards: Vec<Numbered>,
-    /// Boards that may still run, each with the reason.
+    /// Boards that may still run, each with the reason why the stop failed.
     pub failed: Vec<(u8, SessionError)>,
 }
 
-/// Returns the board of an outcome. The outcome must contain exactly one board.
+/// Returns the board number and the answer that an outcome contains. The outcome must contain exactly one board.
 fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
     match outcome {
         Outcome::Status { board, info } => Ok((board, info)),
@@ -32,7 +32,7 @@ fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
 }
 
 impl SessionError {
-    /// Adds the boards that were changed before this error.
+    /// Adds the list of the boards that were changed before this error.
     #[must_use]
     pub fn after(self, done: impl IntoIterator<Item = u8>) -> Self {
         let done: Vec<u8> = done.into_iter().collect();
@@ -41,18 +41,18 @@ impl SessionError {
 }
 
 impl Driver {
-    /// Returns number and status of boards.
+    /// Returns the number and the status of each board.
     ///
     /// # Errors
-    /// Error of the first board that does not answer.
+    /// Returns the error of the first board that does not answer.
     pub fn statuses(&mut self, boards: &[u8]) -> Result<Vec<Numbered>, SessionError> {
         boards.iter().map(|board| numbered(self.run(Request::Info { board: *board })?)).collect()
     }
 
-    /// Changes one board after the other. No board is changed until all of them have answered.
+    /// Changes one board after the other. The function changes no board until all boards have answered.
     ///
     /// # Errors
-    /// Error of the first board that fails; [`SessionError::Partly`] if other boards were changed before.
+    /// Returns the error of the first board that fails. The error is [`SessionError::Partly`] if other boards were changed before.
     pub fn change_each(
         &mut self,
         boards: &[u8],
@@ -69,10 +69,10 @@ impl Driver {
         Ok(all)
     }
 
-    /// Sends a single PC_SETSTATUS with these two bytes to each board, or a single broadcast to all: `new = (old & ~mask) | value`.
+    /// Sends a single PC_SETSTATUS with these two bytes to each board, or a single broadcast to all boards: `new = (old & ~mask) | value`.
     ///
     /// # Errors
-    /// The errors of [`Self::change_each`].
+    /// Returns the errors of [`Self::change_each`].
     pub fn set_raw_status(
         &mut self,
         boards: &Boards,
@@ -102,11 +102,11 @@ impl Driver {
         several.try_for_each(|board| self.seen(*board).map(drop))
     }
 
-    /// Stops boards down to `level`. Sends all stop commands before it sends a query to any board, so that a silent board does not delay
-    /// the others. Failures are collected.
+    /// Stops boards down to the stop level `level`. The function sends all stop commands before it sends a query to any board, so that a
+    /// silent board does not delay the stop of other boards. The function collects the failures of boards.
     ///
     /// # Errors
-    /// The boards on the bus are not known, or no board answers.
+    /// Returns an error if the boards on the bus are not known, or if no board answers.
     pub fn stop_each(&mut self, boards: &Boards, level: StopLevel) -> Result<Stopped, SessionError> {
         match boards {
             Boards::All => self.stop_at_once(None),
@@ -129,8 +129,8 @@ impl Driver {
         Ok(stopped)
     }
 
-    /// Makes the outputs of boards safe; their control loops continue. Every board gets the command, even if some boards do not answer.
-    /// Failures are collected.
+    /// Makes the outputs of boards safe; the control loops of the boards continue. Every board gets the command, even if other boards do
+    /// not answer. The function collects the failures of boards.
     pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
         let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
         for board in boards {
@@ -150,11 +150,12 @@ impl Driver {
         stopped
     }
 
-    /// Ends a run. First stops all control loops at once, then the applications in reverse order, and then ends the session. Returns the
-    /// boards that may still run. Each reason is shown once, and the reason in `known` is not shown again.
+    /// Ends a run of boards. The function stops all control loops at once, then stops the applications in reverse order, and then ends the
+    /// session. The function returns the boards that may still run. Each reason of a failure is shown once, and the reason in `known` is
+    /// not shown again.
     pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
         self.stop_at_once(Some(boards));
-        // A lost bus is the reason for all boards, so it is shown only once.
+        // A lost bus is the reason of the failure for all boards, so it is shown only once.
         let mut noted: BTreeSet<String> = known.into_iter().collect();
         let mut running = BTreeSet::new();
         for level in [StopLevel::Loop, StopLevel::Application] {

@@ -5,28 +5,28 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::master::{Request, StopLevel};
 
-/// Work that would remain undone if the process ended now, and the next command.
+/// Work that would remain undone if the process ended now, and the command that the user should run next.
 type Cleanup = (String, String);
 
-/// List of unfinished work. Clones share one list, including the clone in the thread that receives Ctrl-C.
+/// List of work that is not finished. All clones share one list, including the clone in the thread that receives Ctrl-C.
 #[derive(Clone, Debug, Default)]
 pub struct CleanupList(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Work of the requests in progress that would remain undone, the outermost request first.
+    /// Work of the requests in progress that would remain undone, with the outermost request first.
     now: Vec<Option<Cleanup>>,
-    /// Boards that run after a finished request.
+    /// Boards that still run after their request has finished.
     running: Vec<u8>,
     /// Boards that finished requests started.
     started: BTreeSet<u8>,
-    /// `true` if the state of the boards was changed.
+    /// `true` if a request has changed the state of the boards.
     changed: bool,
 }
 
 impl State {
     fn words(&self) -> String {
-        // Running boards are listed even if a request that works with them is in progress.
+        // The list contains running boards even if a request that works with them is in progress.
         let runs = (!self.running.is_empty()).then(|| cleanup_of_running(&self.running));
         let under_way = self.now.iter().flatten().next().cloned().filter(|_| runs.is_none());
         let started: Vec<String> =
@@ -47,20 +47,21 @@ impl State {
 }
 
 impl CleanupList {
-    /// Returns lines for the operator. The lines name the work that would remain undone if the process ended now, and the commands that
-    /// finish it.
+    /// Returns the list as text for the operator: the work that would remain undone if the process ended now, each with the command that
+    /// the user should run next.
     pub fn words(&self) -> String {
         self.lock().words()
     }
 
-    /// Begins an action that is not a request. `what` is the work that would remain undone; `next` is the next command.
+    /// Adds an action that is not a request to the list. `what` is the work that would remain undone; `next` is the command that the user
+    /// should run next.
     pub fn begin_other(&self, what: &str, next: &str) {
         let mut state = self.lock();
         state.changed = true;
         state.now.push(Some((what.into(), next.into())));
     }
 
-    /// Begins a request.
+    /// Adds a request to the list.
     pub fn begin(&self, request: &Request) {
         let cleanup = cleanup_of(request);
         let mut state = self.lock();
@@ -68,7 +69,8 @@ impl CleanupList {
         state.now.push(cleanup);
     }
 
-    /// Ends the request that began last. Boards that the request has started, or that run, stay on the list until they are stopped.
+    /// Removes the request that began last from the list. Boards that the request has started, or that run, stay on the list until they are
+    /// stopped.
     pub fn end(&self, request: &Request, done: bool) {
         let mut state = self.lock();
         state.now.pop();
@@ -84,7 +86,7 @@ impl CleanupList {
         }
     }
 
-    /// Clears the list of running and started boards.
+    /// Removes all running and started boards from the list.
     pub fn forget(&self) {
         let mut state = self.lock();
         state.running.clear();
@@ -109,7 +111,7 @@ fn several(count: usize, list: &str) -> String {
     format!("board{} {list}", if count == 1 { "" } else { "s" })
 }
 
-/// Returns the work that would remain undone; returns `None` if the request changes no board.
+/// Returns the work of a request that would remain undone; returns `None` if the request changes no board.
 fn cleanup_of(request: &Request) -> Option<Cleanup> {
     let (what, next) = match request {
         Request::Scan | Request::Info { .. } | Request::Describe { .. } | Request::InitialInputs { .. } => {
@@ -146,7 +148,7 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
             let what = format!("the state of {} is not known", several(boards.len(), &boards.join(", ")));
             (what, format!("ucom status {}", boards.join(",")))
         }
-        // These requests may have started a board or renumbered the chain.
+        // A probe or a conformance test may have started a board or renumbered the chain.
         Request::Probe(_) | Request::Conformance(_) => {
             ("the state of the boards is not known".into(), "ucom scan".into())
         }
@@ -203,7 +205,7 @@ mod tests {
         assert!(cleanup.words().contains("ucom stop 2\n"));
     }
 
-    /// A dry run does not change any board, and the message says this.
+    /// A dry run does not change any board, and the text of the list says this.
     #[test]
     fn a_dry_run_leaves_nothing_undone() {
         for dry_run in [true, false] {

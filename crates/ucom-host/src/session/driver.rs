@@ -17,25 +17,26 @@ use crate::master::{
     StopLevel, Supervision,
 };
 
-/// Operator of a session. The operator can end the session, and receives notes in addition to the results.
+/// Interface to the operator of a session. The operator can end the session, and receives notes in addition to the results.
 pub trait Operator {
     /// Returns `true` if the operator requested an end (Ctrl-C).
     fn stop_asked(&self) -> bool;
-    /// Shows a line. Must return without waiting until the line is read.
+    /// Shows a line of text to the operator. The implementation must return without waiting until the line is read.
     fn note(&self, text: String);
-    /// Handles an event that is not a result of the running procedure. `text` is the note for it.
+    /// Handles an event that is not a result of the running procedure. `text` is the note about the event.
     fn happened(&self, _event: &Event, text: Option<String>) {
         if let Some(text) = text {
             self.note(text);
         }
     }
-    /// Called once per loop iteration, even during procedures. Used for work that cannot wait until the procedures end.
+    /// The driver calls this function once in each iteration of its loop, even during procedures. The implementation can perform work that
+    /// cannot wait until the procedures end.
     fn turned(&self, _master: &mut Master, _link: &mut Link) {}
 }
 
 /// Connection of the PC side to an open bus.
 pub struct Driver {
-    /// Master: procedures and boards.
+    /// Master that runs the procedures and stores the state of the boards.
     pub master: Master,
     link: Link,
     pump: Pump,
@@ -44,14 +45,14 @@ pub struct Driver {
     lost: RefCell<Vec<Loss>>,
 }
 
-/// Loss or reboot of a board.
+/// Loss or reboot of a board during the session.
 struct Loss {
     board: u8,
     rebooted: bool,
 }
 
 impl Driver {
-    /// Creates the PC side on a bus. `cleanup` lists the work of its requests that would remain undone.
+    /// Creates the PC side on an open bus. `cleanup` lists the work of the driver's requests that would remain undone if the process ended.
     pub fn new(profile: Profile, link: Link, operator: Box<dyn Operator>, cleanup: CleanupList) -> Self {
         let (master, pump) = (Master::new(profile), Pump::default());
         Self { master, link, pump, operator, cleanup, lost: RefCell::default() }
@@ -72,7 +73,8 @@ impl Driver {
         self.operator.stop_asked()
     }
 
-    /// Delivers received frames and sends the frames that are due. Waits at most `patience` until a frame arrives or is due.
+    /// Delivers received frames to the master and sends the frames that are due. The function waits at most `patience` until a frame
+    /// arrives or is due.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
         self.operator.turned(&mut self.master, &mut self.link);
@@ -87,7 +89,7 @@ impl Driver {
         self.run_with(request, &mut |_| {})
     }
 
-    /// Like `run`, but passes every event to `see`.
+    /// Like `run`, but passes every event of the master to `see`.
     pub fn run_with(
         &mut self,
         request: Request,
@@ -155,7 +157,8 @@ impl Driver {
         loop {
             let broken = self.turn(LOOK).err();
             if let Some(failure) = &broken {
-                // The bus has failed. The procedure ends at once, and its report contains the results that are known.
+                // The bus has failed while the procedure was in progress. The procedure ends at once, and its report contains the results
+                // that are known.
                 self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
@@ -164,7 +167,7 @@ impl Driver {
                     Event::Done { id: done, result } if done == id => {
                         return match (result, broken) {
                             (Err(Error::Master(MasterError::Bus { .. })), Some(failure)) => Err(failure),
-                            // The results for the boards are reported even if the bus fails.
+                            // The report of an update or of conformance tests is returned even if the bus fails.
                             (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
                             (result, None) => {
                                 let sent = self.pump.flush(&mut self.master, &mut self.link);
@@ -191,12 +194,12 @@ impl Driver {
         self.cleanup.forget();
     }
 
-    /// Shows a line to the operator.
+    /// Shows a line of text to the operator.
     pub fn note(&self, text: String) {
         self.operator.note(text);
     }
 
-    /// Returns an error if a board was lost, or if one of these boards has rebooted. The check uses the supervision events that were
+    /// Returns an error if a board was lost, or if one of the given boards has rebooted. The check uses the supervision events that were
     /// received so far.
     pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), SessionError> {
         let losses = self.lost.borrow();
@@ -205,7 +208,7 @@ impl Driver {
         if lost + rebooted == 0 { Ok(()) } else { Err(SessionError::Lost { lost, rebooted }) }
     }
 
-    /// Passes an event to the operator, with its note. `during` is the running procedure.
+    /// Passes an event to the operator, with the note about the event. `during` is the procedure that is running.
     pub fn note_event(&self, event: &Event, during: Option<ProcedureId>) {
         if let Event::Supervision {
             board,
@@ -223,7 +226,8 @@ impl Driver {
         self.operator.happened(event, None);
     }
 
-    /// Returns the numbers of the selected boards. For `all`, scans the bus and returns an error if two boards have the same number.
+    /// Returns the numbers of the selected boards. For `all`, the function scans the bus and returns an error if two boards have the same
+    /// number.
     pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         let numbers = self.numbers_to_stop(boards)?;
         match self.master.shared_numbers().into_iter().next() {
@@ -232,7 +236,7 @@ impl Driver {
         }
     }
 
-    /// Like `numbers`, but accepts numbers that two boards share, because a stop reaches both boards.
+    /// Like `numbers`, but accepts numbers that two boards share, because a stop command reaches both boards.
     pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
@@ -246,7 +250,7 @@ impl Driver {
                 }));
                 numbers.sort_unstable();
                 if !numbers.is_empty() {
-                    // Reports boards that are not among these numbers, so that the user notices them.
+                    // Reports boards on the bus that are not among these numbers, so that the user notices them.
                     let more = report.findings.iter().filter(|finding| finding.error().is_none());
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
@@ -260,7 +264,7 @@ impl Driver {
     }
 }
 
-/// Returns the note for an event; returns `None` if the procedure itself reports the event.
+/// Returns the note about an event; returns `None` if the procedure itself reports the event.
 pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),
@@ -302,7 +306,7 @@ pub fn nothing_shared(master: &Master) -> Result<(), SessionError> {
     master.shared_numbers().into_iter().next().map_or(Ok(()), |error| Err(error.into()))
 }
 
-/// Returns a short line about a finished test.
+/// Returns a short line of text about a finished conformance test.
 fn test_text(test: &ConformanceTest) -> String {
     let how = match &test.verdict {
         Verdict::Pass => "passed",

@@ -16,7 +16,7 @@ pub enum SessionError {
     /// A procedure failed.
     #[error(transparent)]
     Procedure(#[from] Error),
-    /// The values are not valid for the boards, or the boards may not have received the values.
+    /// The values are not valid for the boards, or the boards may not have received them.
     #[error(transparent)]
     Values(#[from] ValuesError),
     /// The inventory cannot be read.
@@ -34,26 +34,26 @@ pub enum SessionError {
     /// No answer was received while the controller of this computer was bus-off, so the request may never have been sent.
     #[error("{failure}; the CAN controller of this computer was bus-off meanwhile")]
     BusOff {
-        /// The failure.
+        /// Failure of the request.
         failure: Box<SessionError>,
-        /// The URL of the bus.
+        /// URL of the bus.
         url: String,
     },
     /// A board failed after other boards had been changed.
     #[error("{failure}; already changed: board {}", list(done))]
     Partly {
-        /// The failure.
+        /// Failure of the board.
         failure: Box<SessionError>,
-        /// Boards that had been changed before.
+        /// Boards that had been changed before the failure.
         done: Vec<u8>,
     },
     /// No board answers.
     #[error("no board answers")]
     NoBoards,
-    /// Boards exist on the bus, but none of them has a number.
+    /// The bus has boards, but no board has a number.
     #[error("{}", if *boards == 1 { "1 board reports, but it has no number".to_owned() } else { format!("{boards} boards report, but none has a number") })]
     NoNumbers {
-        /// Number of boards.
+        /// Number of boards without a number.
         boards: usize,
     },
     /// Boards were lost or have rebooted during the session.
@@ -64,19 +64,19 @@ pub enum SessionError {
         /// Number of times that a board rebooted.
         rebooted: usize,
     },
-    /// Boards left their control loops by themselves.
+    /// Boards left their control loops without a command of this PC.
     #[error("{}", left(boards))]
     LeftLoop {
-        /// Numbers of these boards.
+        /// Numbers of the boards that left their control loops.
         boards: Vec<u8>,
     },
-    /// The names of boards' inputs, outputs and parameters are not known.
+    /// The names of the boards' inputs, outputs and parameters are not known.
     #[error("{}", unnamed(failed))]
     NoNames {
         /// Boards without known names, each with its error.
         failed: Vec<(u8, SessionError)>,
     },
-    /// The type of the outcome does not match the request. The cause is an error in this library.
+    /// The type of the outcome does not match the request. An error in this library is the cause.
     #[error("unexpected outcome {0:?}")]
     Unexpected(Box<Outcome>),
 }
@@ -90,67 +90,68 @@ pub enum ValuesError {
     NoSignal {
         /// Board number.
         board: u8,
-        /// Buffer.
+        /// Kind of the buffer.
         kind: Kind,
-        /// Index in the buffer.
+        /// Index of the signal in the buffer.
         index: u16,
     },
     /// The value is not valid for the signal.
     #[error("board {board}: {} `{name}`: {error}", kind.name())]
     Value {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// Buffer.
+        /// Kind of the buffer.
         kind: Kind,
-        /// Name that the user gave.
+        /// Name of the signal that the user gave.
         name: String,
         /// Program ID of the board.
         program_id: u16,
-        /// Error in the value.
+        /// Reason why the value is not valid.
         error: Box<ValueError>,
     },
-    /// A signal has two values.
+    /// The user gave two values for one signal.
     #[error("board {board}: {} `{name}` has two values", kind.name())]
     Twice {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// Buffer.
+        /// Kind of the buffer.
         kind: Kind,
-        /// Name.
+        /// Name of the signal.
         name: String,
     },
-    /// A value is assigned to a board that is not selected.
+    /// The user gave a value for a board that is not selected.
     #[error("{board}.{name}: board {board} is not one of the boards to {to}")]
     NotMeant {
-        /// The board.
+        /// Board number.
         board: u8,
         /// Name of the signal.
         name: String,
-        /// Verb for the action for which the boards were selected.
+        /// Verb of the action for which the boards were selected.
         to: &'static str,
     },
-    /// Values were sent, but the application was not running and could not receive them.
+    /// The PC sent values, but then the application was not running or the board did not answer. The board may not have received the
+    /// values.
     #[error("board {board}: values were sent, but {why}: its values are unknown now{}", before(written))]
     Unknown {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// Reason.
+        /// Reason why the board may not have received the values.
         why: String,
-        /// Boards that were written before; `None` if the list does not apply.
+        /// Boards that were written before this board; `None` if the list does not apply.
         written: Option<Vec<u8>>,
     },
     /// A parameter file cannot be read, or contains no value.
     #[error("{message}")]
     File {
-        /// Message with the file's name.
+        /// Error message with the file's name.
         message: String,
-        /// Remedy.
+        /// Remedy for the error.
         hint: &'static str,
     },
-    /// A parameter file does not match the boards. The error contains one line for each difference.
+    /// A parameter file does not match the boards. The error contains one line for each difference between the file and the boards.
     #[error("{}", lines.join("\n"))]
     Misfit {
-        /// Lines, each with the file's name and the line number.
+        /// Text lines, each with the file's name and the line number.
         lines: Vec<String>,
     },
 }
@@ -166,7 +167,7 @@ impl SessionError {
         matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
     }
 
-    /// Returns `true` if the board could answer after a start of its application.
+    /// Returns `true` if the board could answer after its application is started.
     fn is_not_started(&self) -> bool {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }
@@ -300,7 +301,7 @@ impl Diagnose for ValuesError {
     }
 }
 
-/// Returns the cause for each board. For several boards, adds the next command for each board.
+/// Returns the cause of the failure for each board. For several boards, the text also contains the next command for each board.
 fn unnamed(failed: &[(u8, SessionError)]) -> String {
     let asked = "the names of inputs, outputs and parameters are not known";
     match failed {

@@ -1,4 +1,4 @@
-//! Diagnosis of a bus: listens, sends queries if they cannot do harm, and reports findings.
+//! Diagnosis of a bus: listens, sends queries if the queries cannot do harm, and reports findings.
 
 use std::time::{Duration, Instant};
 
@@ -11,19 +11,19 @@ use super::link::Link;
 use crate::master::doctor::{Controller, Observation, findings};
 use crate::master::{BoardSeen, Outcome, Request};
 
-/// Result of a diagnosis.
+/// Result of the diagnosis of a bus.
 #[derive(Clone, Debug)]
 pub struct Examination {
     /// Findings, the most serious first.
     pub findings: Vec<Finding>,
     /// Boards that answered.
     pub boards: Vec<BoardSeen>,
-    /// Number of received frames of boards.
+    /// Number of frames that were received from boards.
     pub received: u64,
 }
 
 impl Examination {
-    /// Returns the kind of failure; `None` if no problem was found.
+    /// Returns the kind of failure; returns `None` if the diagnosis found no problem.
     pub fn failure(&self) -> Option<ErrorKind> {
         let bad = self.findings.iter().any(|f| f.severity == Severity::Problem);
         bad.then_some(if self.received == 0 { ErrorKind::NoLink } else { ErrorKind::Device })
@@ -31,11 +31,11 @@ impl Examination {
 }
 
 impl Driver {
-    /// Listens to the bus for a while, then scans it. If a competing master is on the bus, no query is sent, because a query could
-    /// interfere with the queries of that master (D-08).
+    /// Listens to the bus for the time `listen`, and then scans the bus. If a competing master is on the bus, no query is sent, because a
+    /// query could interfere with the queries of that master (D-08).
     ///
     /// # Errors
-    /// The bus failed, or the operator requested an end.
+    /// Returns an error if the bus failed or if the operator requested an end.
     pub fn examine(&mut self, listen: Duration) -> Result<Examination, SessionError> {
         let (start, start_us) = (Instant::now(), self.now_us());
         while start.elapsed() < listen && !self.stop_asked() {
@@ -70,14 +70,14 @@ impl Driver {
         Ok(Examination { findings, boards, received: seen.statistics.received })
     }
 
-    /// Returns the state that the CAN adapter reports; `None` if the adapter does not report its state.
+    /// Returns the state that the CAN adapter reports; returns `None` if the adapter does not report its state.
     pub fn controller(&mut self) -> Option<Controller> {
         self.link().controller()
     }
 }
 
 impl Link {
-    /// Returns the state that the CAN adapter reports; `None` if the adapter does not report its state.
+    /// Returns the state that the CAN adapter reports; returns `None` if the adapter does not report its state.
     pub fn controller(&mut self) -> Option<Controller> {
         let state = self.state();
         (state.errors != ErrorState::Unknown).then_some(Controller {

@@ -1,4 +1,5 @@
-//! Updates with flash records. An update uses the records of the boards, and stores its results as new records.
+//! Updates boards with the help of flash records. An update uses the flash records of the boards, and stores its results as new flash
+//! records.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -9,8 +10,8 @@ use crate::files::{FlashRecord, Inventory, InventoryError};
 use crate::master::update::{UpdateOptions, UpdateReport};
 use crate::master::{Event, Outcome, Request};
 
-/// Flash records of this tool (D-62). Records of boards in the inventory are stored in the inventory file; other records are stored in
-/// memory until the session ends.
+/// Flash records of this tool (D-62). Flash records of boards in the inventory are stored in the inventory file; other flash records are
+/// stored in memory until the session ends.
 #[derive(Debug, Default)]
 pub struct FlashRecords {
     inventory: Option<PathBuf>,
@@ -19,7 +20,8 @@ pub struct FlashRecords {
 }
 
 impl FlashRecords {
-    /// Creates the records of an inventory file, which need not exist. With `None`, records are kept only during the session.
+    /// Creates the flash records of an inventory file, which need not exist. Without an inventory file, the flash records are stored only
+    /// during the session.
     pub fn new(inventory: Option<PathBuf>) -> Self {
         Self { inventory, ..Self::default() }
     }
@@ -53,11 +55,11 @@ impl FlashRecords {
 }
 
 impl Driver {
-    /// Updates boards. The record of a board is removed before the board is reset for programming, and stored again after the board has
-    /// been read back. If the record cannot be removed, the update is cancelled before more memory is erased.
+    /// Updates the firmware of boards. The flash record of a board is removed before the board is reset for programming, and stored again
+    /// after the board has been read back. If the flash record cannot be removed, the update is cancelled before more memory is erased.
     ///
     /// # Errors
-    /// The errors of [`Driver::run`], or the inventory cannot be read.
+    /// Returns the errors of [`Driver::run`], or an error if the inventory cannot be read.
     pub fn update(
         &mut self,
         mut options: UpdateOptions,

@@ -1,8 +1,8 @@
-//! Supervision of the boards of a run: boards that have left their control loops, and the age of the values of each board.
+//! Supervises the boards of a run: boards that have left their control loops, and the age of the values of each board.
 //!
 //! A board can leave its control loop without a command from this PC. The cause may be missing heartbeats of this PC, a stop from another
-//! PC, or the end of the loop in the application. The board reports the end of its loop in a single MCA_ADMIN_DATA frame. If that frame is
-//! lost, the sensor outputs of the board stop in any case, and the master then reads the board's status.
+//! PC, or the end of the loop in the application. The board reports the end of its control loop in a single MCA_ADMIN_DATA frame. If the
+//! frame is lost, the sensor outputs of the board stop in any case, and the master then reads the board's status.
 
 use std::collections::BTreeMap;
 
@@ -13,25 +13,25 @@ use super::error::SessionError;
 use crate::master::io::Snapshot;
 use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
-/// Age in µs above which the last outputs are considered old. Outputs normally arrive every few milliseconds.
+/// Age in µs above which the last outputs of a board are considered old. Outputs of a board normally arrive every few milliseconds.
 const OLD_US: u64 = 500_000;
 /// Minimum time in µs between queries to a board that sends heartbeats but no outputs.
 const ASK_US: u64 = 1_000_000;
 /// Time in µs after which a run has ended if no board has been in its control loop.
 const OVER_US: u64 = 3_000_000;
 
-/// Change of a board.
+/// Change of a board's state during a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// The heartbeat is late.
+    /// A heartbeat of the board is late.
     Late,
-    /// The heartbeats have ended.
+    /// The heartbeats of the board have ended.
     Lost,
-    /// The heartbeats have returned.
+    /// The board sends heartbeats again.
     Back,
     /// The board has rebooted.
     Rebooted,
-    /// The board left its control loop by itself.
+    /// The board left its control loop without a command of this PC.
     LeftLoop,
     /// The board was stopped because another board was lost.
     StoppedByPolicy,
@@ -40,7 +40,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// Returns a short name for JSON.
+    /// Returns a short name of the change for JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Late => "late",
@@ -54,14 +54,14 @@ impl Change {
     }
 }
 
-/// Change of a board that is shown to the user at once.
+/// Change of a board's state that is shown to the user at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Notice {
-    /// The board.
+    /// Board number.
     pub board: u8,
-    /// The change.
+    /// Change of the board's state.
     pub change: Change,
-    /// Time in s.
+    /// Time of the change in s.
     pub time_s: f64,
     /// Age of the board's last outputs in s; `None` if the board has sent no outputs, or if the change concerns heartbeats.
     pub age_s: Option<f64>,
@@ -73,7 +73,7 @@ impl Notice {
         matches!(self.change, Change::LeftLoop | Change::StoppedByPolicy | Change::InLoop)
     }
 
-    /// Returns the text; `None` if the driver shows the event itself.
+    /// Returns the text of the notice; returns `None` if the driver shows the event itself.
     pub fn text(&self) -> Option<String> {
         let board = self.board;
         let age = self.age_s.map_or_else(|| "none received".to_owned(), |s| format!("{s:.1} s old"));
@@ -91,12 +91,12 @@ impl Notice {
     }
 }
 
-/// Boards of a run and their state.
+/// Boards of a run, with the state of each board.
 #[derive(Default)]
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// Start of the time in which no board has been in its loop.
+    /// Start of the time in which no board has been in its control loop.
     nobody_since: Option<u64>,
 }
 
@@ -107,9 +107,10 @@ struct One {
     /// `true` if any board was lost or has rebooted since this board started to run. With `on_lost`, this loss or reboot may be the reason
     /// for the stop of this board.
     lost: bool,
-    /// `true` if the board left its loop at any time before a board was lost or had rebooted.
+    /// `true` if the board left its control loop at any time before any board was lost or had rebooted.
     left: bool,
-    /// `true` if the status byte shows that the board has left its loop. In this case, the board's own report was lost.
+    /// `true` if the status byte of the board shows that the board has left its control loop. In this case, the PC did not receive the
+    /// board's own report about the end of the loop.
     status_out: bool,
     asked_us: u64,
 }
@@ -122,7 +123,7 @@ impl Followed {
         new
     }
 
-    /// Adds boards that run now or have been restarted. The state of other boards does not change.
+    /// Adds boards to the supervision that run now or have been restarted. The state of other boards does not change.
     pub fn add(&mut self, boards: &[u8], now_us: u64) {
         for board in boards {
             let one = self.boards.entry(*board).or_default();
@@ -131,12 +132,12 @@ impl Followed {
         self.nobody_since = None;
     }
 
-    /// Removes a board from supervision.
+    /// Removes a board from the supervision.
     pub fn remove(&mut self, board: u8) {
         self.boards.remove(&board);
     }
 
-    /// Handles an event of the bus. Returns a notice if a board changed; the driver shows the event's own text.
+    /// Handles an event of the bus. The function returns a notice if the state of a board changed; the driver shows the event's own text.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         match event {
             Event::Snapshot { board, snapshot } => {
@@ -170,7 +171,8 @@ impl Followed {
         None
     }
 
-    /// Returns the boards that have left or re-entered their loops since the last call. Reads the status of boards that send no outputs.
+    /// Returns the boards that have left or re-entered their control loops since the last call. The function reads the status of boards
+    /// that send no outputs.
     pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Notice> {
         let boards = master.boards();
         let (mut notices, mut silent) = (Vec::new(), None);
@@ -202,8 +204,9 @@ impl Followed {
         notices
     }
 
-    /// Returns `true` if the run has ended: every board has left its loop, has rebooted, or was lost and stopped by `on_lost`. Only a new
-    /// run can start the loop of a board again. With `on_lost = report` the run waits for a lost board, which may still be in its loop.
+    /// Returns `true` if the run has ended: every board has left its control loop, has rebooted, or was lost and stopped by `on_lost`. Only
+    /// a new run can start the control loop of such a board again. With `on_lost = report`, the run waits for a lost board, which may still
+    /// be in its control loop.
     pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
         let boards = master.boards();
         let waits_for_lost = master.profile().on_lost == OnLost::Report;
@@ -218,14 +221,14 @@ impl Followed {
         now_us.saturating_sub(*self.nobody_since.get_or_insert(now_us)) >= OVER_US
     }
 
-    /// Cancels the query in progress, so that the next request does not find the board busy.
+    /// Cancels the status query in progress, so that the next request does not find the board busy.
     pub fn ask_no_more(&mut self, master: &mut Master) {
         if let Some(id) = self.asking.take() {
             master.cancel(id);
         }
     }
 
-    /// Returns the last outputs of each board, their age in s, and `true` if they may be outdated.
+    /// Returns the last outputs of each board, their age in s, and `true` if the outputs may be outdated.
     pub fn outputs(&self, master: &Master, now_us: u64) -> Vec<(u8, &Snapshot, f64, bool)> {
         let boards = master.boards();
         let rows = self.boards.iter().filter_map(|(number, one)| Some((number, one, one.last.as_ref()?)));
@@ -237,7 +240,7 @@ impl Followed {
         .collect()
     }
 
-    /// Returns an error if a board has left its loop by itself.
+    /// Returns an error if a board has left its control loop without a command of this PC.
     pub fn nobody_left(&self) -> Result<(), SessionError> {
         let boards: Vec<u8> = self.boards.iter().filter(|(_, one)| one.left).map(|(n, _)| *n).collect();
         if boards.is_empty() { Ok(()) } else { Err(SessionError::LeftLoop { boards }) }
@@ -280,7 +283,7 @@ mod tests {
         sent.into_iter().filter(|f| f != "680#").chain(notices.into_iter().map(event)).collect()
     }
 
-    /// Board 1 runs and has sent its outputs.
+    /// Returns a state in which board 1 runs and has sent its outputs.
     fn running() -> (Master, Followed) {
         running_with(Profile::default().on_lost)
     }
@@ -306,7 +309,7 @@ mod tests {
         assert_eq!(receive(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
         assert!(receive(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "reported once");
         assert_eq!(stale(&master, &followed, 30_000), [true]);
-        // Another PC starts the board again. The run is still reported as interrupted.
+        // Another PC starts the control loop of the board again. The run is still reported as interrupted.
         let again = ["601#01000000", "381#0000640065006600"];
         assert_eq!(receive(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
         assert_eq!(stale(&master, &followed, 40_000), [false]);
@@ -352,7 +355,8 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // The board is restarted. Earlier losses are not considered any more: when the board leaves its loop, it does so by itself.
+        // The control loop of the board is restarted. The supervision does not consider earlier losses any more. Therefore, if the board
+        // leaves its control loop now, no loss counts as the reason.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);
@@ -375,7 +379,7 @@ mod tests {
         assert!(followed.is_over(&master, 5_100_000));
     }
 
-    /// The policy has stopped a lost board, so the run ends. With `report` the run waits for the board.
+    /// With a policy that stops a lost board, the run ends. With `on_lost = report`, the run waits for the lost board.
     #[test]
     fn d51_a_lost_board_is_waited_for_only_where_nobody_stops_it() {
         for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {

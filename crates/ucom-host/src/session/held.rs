@@ -1,8 +1,8 @@
-//! Boards that a session has started, and the data about them. This module is used by all programs that own a bus and share it with other
-//! programs. A board whose state is in doubt is listed as started, because an additional stop does no harm.
+//! Boards that a session has started, and the data about them. All programs that own a bus and share the bus with other programs use this
+//! module. The list of started boards includes boards whose state is uncertain, because an additional stop does no harm.
 //!
-//! - [`Held`]: the state, which the session's [`Operator`](super::Operator) updates even during procedures.
-//! - [`Session`]: a driver with that state. Every start and stop of a board uses [`Session`].
+//! - [`Held`]: state of the session, which the session's [`Operator`](super::Operator) updates even during procedures.
+//! - [`Session`]: a driver with the state of the session. Every start and stop of a board uses [`Session`].
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,14 +24,14 @@ use crate::master::io::Snapshot;
 use crate::master::update::{UpdateOutcome, UpdateReport};
 use crate::master::{Event, InitReport};
 
-/// Boards that a session has started, and the data about them.
+/// Boards that a session has started, and the data about these boards.
 #[derive(Default)]
 pub struct Held {
     started: BTreeSet<u8>,
     running: BTreeSet<u8>,
     /// Boards whose control loops the session supervises.
     pub followed: Followed,
-    /// Last outputs of boards.
+    /// Last sensor outputs of boards.
     pub snapshots: BTreeMap<u8, Snapshot>,
     /// Names of the boards' signals.
     pub known: BTreeMap<u8, Arc<Known>>,
@@ -39,7 +39,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// Creates a state without started boards. `has_started` shows other threads whether there are started boards.
+    /// Creates the state of a session that has started no boards. `has_started` shows other threads whether there are started boards.
     pub fn new(has_started: Arc<AtomicBool>) -> Self {
         Self { has_started, ..Self::default() }
     }
@@ -54,7 +54,7 @@ impl Held {
         &self.running
     }
 
-    /// Handles an event of the bus: stores outputs, and returns the change of a supervised board.
+    /// Handles an event of the bus: stores outputs of boards, and returns the change of a supervised board.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         if let Event::Snapshot { board, snapshot } = event {
             self.snapshots.insert(*board, snapshot.clone());
@@ -62,7 +62,7 @@ impl Held {
         self.followed.see(event, now_us)
     }
 
-    /// Adds these boards to the started boards.
+    /// Adds these boards to the list of started boards.
     fn starts(&mut self, boards: &[u8]) {
         self.started.extend(boards);
         self.show();
@@ -93,20 +93,20 @@ impl Held {
     }
 }
 
-/// Session on a bus, with its state.
+/// Session on a bus, with the state of the boards that it has started.
 pub struct Session {
-    /// Driver: procedures and boards.
+    /// Driver that runs the procedures on the bus.
     pub driver: Driver,
-    /// Cache of names.
+    /// Cache of the signal names.
     pub cache: Cache,
-    /// Meanings of the words.
+    /// Meanings of the signals' words.
     pub signals: SignalTable,
     /// Started boards and data about them, shared with the operator of the driver.
     pub held: Rc<RefCell<Held>>,
 }
 
 impl Session {
-    /// Handles the frames of the bus for a short time. Waits at most `patience`.
+    /// Handles the frames of the bus for a short time. The function waits at most `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         self.driver.turn(patience)?;
         while let Some(event) = self.driver.master.take_event() {
@@ -115,8 +115,8 @@ impl Session {
         Ok(())
     }
 
-    /// Returns the boards that have left or re-entered their control loops since the last call. Reads the status of boards that send no
-    /// outputs.
+    /// Returns the boards that have left or re-entered their control loops since the last call. The function reads the status of boards
+    /// that send no outputs.
     pub fn look(&mut self) -> Vec<Notice> {
         let now_us = self.driver.now_us();
         self.held.borrow_mut().followed.look(&mut self.driver.master, now_us)
@@ -128,14 +128,14 @@ impl Session {
     }
 
     /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands` is `false`). If the heartbeats
-    /// continued, the boards of another PC would not become safe after the loss of that PC (D-50).
+    /// continued, the boards of another PC would not become safe after that PC was lost (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();
         }
     }
 
-    /// Returns the names and meanings of a board's values. Requests the names from the board if they are not known.
+    /// Returns the names and the meanings of a board's signals. The function requests the names from the board if they are not known.
     pub fn known(&mut self, board: u8) -> Result<Arc<Known>, SessionError> {
         let kept = self.held.borrow().known.get(&board).cloned();
         let info = self.driver.master.boards().get(board).and_then(|board| board.info);
@@ -158,7 +158,7 @@ impl Session {
         Ok(self.knows(known))
     }
 
-    /// Stores the names of a board, and begins to reassemble the board's outputs.
+    /// Stores the signal names of a board, and begins to reassemble the board's outputs.
     pub fn knows(&mut self, known: Known) -> Arc<Known> {
         let known = Arc::new(known);
         self.driver.master.watch(known.board, Some(known.names.dimensions().so), true);
@@ -166,8 +166,8 @@ impl Session {
         known
     }
 
-    /// Runs an action that uses names. If the cached names are not the names of the board, reads the names from the board and runs the
-    /// action once more.
+    /// Runs an action that uses the signal names of boards. If the cached names are not the names of the board, the function reads the
+    /// names from the board and runs the action once more.
     pub fn by_names<T>(
         &mut self,
         mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
@@ -177,14 +177,14 @@ impl Session {
     }
 
     /// Runs an action that starts or moves these boards. The boards are listed as started before any frame is sent, because the user may
-    /// end the action at any time. After a failure, a board is removed from the list if no frame was sent to it or if it answers that it is
-    /// stopped.
+    /// end the action at any time. If the action fails, a board is removed from the list if no frame was sent to it or if it answers that
+    /// it is stopped.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],
         act: impl FnOnce(&mut Self) -> Result<T, SessionError>,
     ) -> Result<T, SessionError> {
-        // If a board does not answer, no board gets a command.
+        // If a board does not answer this query, no board gets a command.
         for board in boards {
             self.driver.seen(*board)?;
         }
@@ -202,7 +202,8 @@ impl Session {
         done
     }
 
-    /// Returns `true` if the board answers that its application does not run. Sends the query even if the request was cancelled.
+    /// Returns `true` if the board answers that its application does not run. The function sends the query even if the request was
+    /// cancelled.
     fn is_stopped(&mut self, board: u8) -> bool {
         self.driver.seen_for_certain(board).is_ok_and(|seen| !seen.info.status.has(Status::MSTART))
     }
@@ -213,7 +214,7 @@ impl Session {
         self.held.borrow_mut().runs(boards, now_us);
     }
 
-    /// Removes this board, or all boards, from the started and running boards, together with their last outputs.
+    /// Removes this board, or all boards, from the lists of started and running boards, together with their last outputs.
     pub fn runs_no_more(&mut self, board: Option<u8>) {
         self.held.borrow_mut().runs_no_more(board);
     }
@@ -241,7 +242,8 @@ impl Session {
         self.held.borrow().started.iter().copied().collect()
     }
 
-    /// Stops the boards that this session has started. Returns the boards that may still run; they stay listed as started.
+    /// Stops the boards that this session has started. The function returns the boards that may still run; these boards stay listed as
+    /// started.
     pub fn leave(&mut self) -> Vec<u8> {
         self.quiet();
         let started = self.started();
@@ -255,11 +257,12 @@ impl Session {
         not_stopped
     }
 
-    /// Applies the result of an update. Boards that were written no longer run, unless the update has restarted them.
+    /// Updates the state of the session after an update of boards. Boards that were written no longer run, unless the update has restarted
+    /// them.
     pub fn updated(&mut self, report: &UpdateReport, start: bool) {
         for result in report.boards.iter().filter(|_| !report.dry_run) {
             match result.outcome {
-                // In these cases, the board may run as before the update.
+                // With these outcomes, the board may run as before the update.
                 UpdateOutcome::NotStarted
                 | UpdateOutcome::Cancelled
                 | UpdateOutcome::UpToDate
@@ -277,9 +280,9 @@ impl Session {
         }
     }
 
-    /// Handles new numbers of boards. Removes all stored names. After a complete init no board is listed as started. After an incomplete
-    /// init, boards that are not in the report stay listed, because they may run under their old numbers. Boards whose status shows a
-    /// started application are listed, because they may not have received the reset.
+    /// Updates the state of the session after boards got new numbers. The function removes all stored signal names. After a complete init,
+    /// no board is listed as started. After an incomplete init, boards that are not in the report stay listed, because they may run under
+    /// their old numbers. Boards whose status shows a started application are listed, because they may not have received the reset.
     pub fn renumbered(&mut self, report: Option<&InitReport>) {
         let mut held = self.held.borrow_mut();
         match report {

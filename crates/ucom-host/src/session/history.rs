@@ -1,5 +1,6 @@
-//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now. The protocol does not allow
-//! them to be read back, and a restart of the application, which this tool may not notice, resets the parameters (D-35).
+//! Values that this tool wrote to the parameters of a board, with times. The parameters of the board may have other values now. The
+//! protocol has no function that reads parameters back. A restart of the application resets the parameters, and this tool may not notice a
+//! restart (D-35).
 
 use std::collections::BTreeMap;
 
@@ -11,26 +12,26 @@ use super::cache::Cache;
 /// A value that was written to a parameter.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
 pub struct Written {
-    /// The word.
+    /// Value as a 16-bit word.
     pub word: u16,
-    /// Time of writing, in seconds since 1970.
+    /// Time at which the value was written, in seconds since 1970.
     pub at: u64,
 }
 
-/// Values last written to the parameters of one board, by index in the buffer.
+/// Values that were last written to the parameters of one board, by index in the buffer.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(default)]
 pub struct History {
     program_id: u16,
     date: u16,
     par: BTreeMap<u16, Written>,
-    /// Cache, and the name of the file in the cache.
+    /// Cache, and the name of the history file in the cache.
     #[serde(skip)]
     kept: (Cache, String),
 }
 
 impl History {
-    /// Returns the history of a board. The history is empty if the board has another program now.
+    /// Returns the history of a board's parameters. The history is empty if the board has another program now.
     pub fn of(cache: &Cache, info: &BoardInfo) -> Self {
         let file = format!("written-{:04X}.json", info.flash_number);
         let text = cache.read(&file);
@@ -40,7 +41,7 @@ impl History {
         Self { program_id: info.program_id, date: info.date, par, kept: (cache.clone(), file) }
     }
 
-    /// Records words that were written now. If the file cannot be written, the failure is ignored.
+    /// Records the words that were just written to parameters. If the history file cannot be written, the function ignores the failure.
     pub fn wrote(&mut self, words: impl Iterator<Item = (u16, u16)>) {
         let at = host_kit::unix_time().as_secs();
         self.par.extend(words.map(|(index, word)| (index, Written { word, at })));
@@ -57,7 +58,7 @@ impl History {
 }
 
 impl Written {
-    /// Returns the time in the form `2026-11-21 06:10 UTC`.
+    /// Returns the time of the write in the form `2026-11-21 06:10 UTC`.
     pub fn when(&self) -> String {
         // Subtracts the days from 1970-01-01 to 2000-01-01.
         let days = (self.at / 86_400).saturating_sub(10_957);
@@ -78,7 +79,7 @@ mod tests {
         assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
     }
 
-    /// Another program has other parameters, even at an equal index.
+    /// Another program has other parameters, even if their index is equal.
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Cached names of the boards' inputs, outputs and parameters (D-36), and the meaning of their words (D-11).
+//! Cached names of the boards' inputs, outputs and parameters (D-36), and the meaning of the signals' words (D-11).
 
 use ucom::{BoardInfo, Profile};
 
@@ -10,24 +10,24 @@ use crate::files::{BoardSignals, SignalTable};
 use crate::master::io::{DescriptionKey, IoDescription, Kind};
 use crate::master::{Outcome, Request, Setting};
 
-/// Board with its names and the meaning of its words.
+/// Board with the names of its signals and the meaning of their words.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Board number.
     pub board: u8,
-    /// Answer to PC_INFO.
+    /// Answer of the board to PC_INFO.
     pub info: BoardInfo,
-    /// Names.
+    /// Names of the board's signals.
     pub names: IoDescription,
-    /// Signal types, scales and units.
+    /// Types, scales and units of the board's signals.
     pub signals: BoardSignals,
-    /// Names in the signal table that the program does not have.
+    /// Names in the signal table that the program of the board does not have.
     strays: Vec<String>,
 }
 
 impl Cache {
-    /// Returns a board with its names from the cache. If the cache does not have the names, requests them from the running application. If
-    /// the cache cannot be written, this is ignored, and the names are read again next time.
+    /// Returns a board with the signal names from the cache. If the cache does not have the names, the function requests them from the
+    /// running application. If the cache cannot be written, the function ignores the failure, and the names are read again the next time.
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, SessionError> {
         let info = driver.seen(board)?.info;
         if let Some(names) = self.kept(driver, &info) {
@@ -36,8 +36,8 @@ impl Cache {
         self.described(driver, table, board)
     }
 
-    /// Like `known`, for a board whose application must run. The names are read from the board, because cached names may belong to another
-    /// application.
+    /// Like `known`, for a board whose application must run. The function reads the names from the board, because cached names may belong
+    /// to another application.
     pub fn described(
         &self,
         driver: &mut Driver,
@@ -55,10 +55,12 @@ impl Cache {
         Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver))
     }
 
-    /// Returns boards with their names. Boards in `must_run` are read as in [`Self::described`], others as in [`Self::known`].
+    /// Returns boards with their signal names. Boards in `must_run` are read as in [`Self::described`], and other boards as in
+    /// [`Self::known`].
     ///
     /// # Errors
-    /// [`SessionError::NoNames`] lists every board that failed, after all boards were asked. Errors of any other type are returned at once.
+    /// Returns [`SessionError::NoNames`], with every board that failed, after the function has sent queries to all boards. Errors of any
+    /// other type are returned at once.
     pub fn all(
         &self,
         driver: &mut Driver,
@@ -81,7 +83,7 @@ impl Cache {
         if failed.is_empty() { Ok(all) } else { Err(SessionError::NoNames { failed }) }
     }
 
-    /// Returns the cached names of a program, without a query to the board.
+    /// Returns the cached signal names of a program, without a query to the board.
     fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
         let key = DescriptionKey::of(info);
         if self.fresh || !info.has_application() {
@@ -97,27 +99,27 @@ impl Cache {
     }
 }
 
-/// Returns the file name for the names of a program.
+/// Returns the name of the cache file for the signal names of a program.
 fn file(key: DescriptionKey) -> String {
     let DescriptionKey { program_id, date, flash_number } = key;
     format!("io-{program_id:04X}-{date:04X}-{flash_number:04X}.json")
 }
 
 impl Known {
-    /// Returns a word in the form that the master uses: by name, or by index if the name means another signal.
+    /// Returns a word in the form that the master uses: by name, or by index if the name belongs to another signal.
     pub fn setting(&self, kind: Kind, word: &ParamsWord) -> Setting {
-        // The text of a signal may mean another signal, and an index may be the name of another signal.
+        // The text of a signal may be the name of another signal, and so may its index.
         let by_name = self.names.find(self.board, kind, &word.name) == Ok(word.index);
         let name = if by_name { word.name.clone() } else { format!("##{}", word.index) };
         Setting { name, value: word.word }
     }
 
-    /// Returns this board with the names that it has sent in the meantime.
+    /// Returns this board with the signal names that it has sent since it was read.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
 
-    /// Shows the names in the signal table that the program does not have.
+    /// Shows a note about names in the signal table that the program of the board does not have.
     fn with_notes(self, driver: &Driver) -> Self {
         for stray in &self.strays {
             driver.note(format!("signal table: {stray}"));
@@ -138,7 +140,7 @@ fn with_signals(
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
     let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
     let mut signals = BoardSignals::new(&names, program, &profile);
-    // The user has a table and therefore expects units. Without an entry for this program, values would be sent without a scale.
+    // A user who has a signal table expects units. Without an entry for this program in the table, values would be sent without a scale.
     if table.is_given() && program.is_none() && info.has_application() {
         strays.push(format!("the table does not contain {who}"));
         signals = signals.raw_only();

@@ -1,4 +1,4 @@
-//! Open bus, and the conversion between its frames and the frames of the protocol.
+//! Open CAN bus, and the conversion between its frames and the frames of the protocol.
 
 use std::time::{Duration, Instant};
 
@@ -14,10 +14,11 @@ use crate::files::recording::{FrameKind, RecordedFrame};
 const COARSE: Duration = Duration::from_millis(12);
 /// Interval at which the bus is polled during a wait that is timed precisely.
 const LOOK: Duration = Duration::from_micros(100);
-/// Largest delay at the end of a sleep. The thread does not sleep during this last part of a wait.
+/// Largest delay at the end of a sleep of the thread. The thread does not sleep during the last part of a wait,
+/// which has this length.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
-/// Open bus with its clock.
+/// Open CAN bus with its clock.
 pub struct Link {
     bus: Box<dyn CanBus + Send>,
     url: String,
@@ -26,16 +27,16 @@ pub struct Link {
 }
 
 impl Link {
-    /// Opens a bus.
+    /// Opens a CAN bus.
     ///
     /// # Errors
-    /// The URL is not valid, or the bus cannot be opened.
+    /// Returns an error if the URL is not valid or if the bus cannot be opened.
     pub fn open(url: &str) -> Result<Self, SessionError> {
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         Ok(Self::on(bus, url))
     }
 
-    /// Creates a link on an open bus. `url` is only displayed.
+    /// Creates a link on an open bus. `url` is only used for display.
     pub fn on(bus: Box<dyn CanBus + Send>, url: &str) -> Self {
         Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() }
     }
@@ -55,7 +56,7 @@ impl Link {
         self.bus.send(frame).map_err(SessionError::Bus)
     }
 
-    /// Returns the next frame of any protocol. Waits at most `timeout`.
+    /// Returns the next frame of any protocol. The function waits at most `timeout`.
     pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, SessionError> {
         if timeout > COARSE {
             return self.bus.receive(timeout - COARSE).map_err(SessionError::Bus);
@@ -78,7 +79,7 @@ impl Link {
         }
     }
 
-    /// Returns the state of the adapter.
+    /// Returns the state of the CAN adapter.
     pub fn state(&mut self) -> ControllerState {
         self.bus.state()
     }
@@ -116,13 +117,13 @@ pub fn to_wire(frame: &Frame) -> Result<CanFrame, SessionError> {
     made.map_err(SessionError::Frame)
 }
 
-/// Converts a frame of the bus to a frame of the protocol. If the frame is foreign, returns the reason (D-02).
+/// Converts a frame of the bus to a frame of the protocol. If the frame is foreign, the function returns the reason (D-02).
 pub fn from_wire(frame: &CanFrame) -> Result<Frame, Foreign> {
     let format = Format { extended: frame.is_extended(), remote: frame.is_remote(), fd: frame.is_fd() };
     Frame::received(frame.id().value(), format, frame.data())
 }
 
-/// Converts a frame of the bus for a recording.
+/// Converts a frame of the bus to a frame of a recording.
 pub fn recorded(frame: &CanFrame) -> RecordedFrame {
     let kind = if frame.is_remote() {
         FrameKind::Remote { length: frame.len() as u8 }
@@ -135,7 +136,7 @@ pub fn recorded(frame: &CanFrame) -> RecordedFrame {
     RecordedFrame { id, extended, kind, data: frame.data().to_vec(), dlc: None }
 }
 
-/// Converts a frame of a recording to a frame of the bus; `None` for error frames and invalid frames.
+/// Converts a frame of a recording to a frame of the bus; returns `None` for error frames and invalid frames.
 pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
     let id = if frame.extended { Id::extended(frame.id) } else { Id::standard(frame.id) }.ok()?;
     match frame.kind {
@@ -146,7 +147,7 @@ pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
     }
 }
 
-/// Converts a frame of a recording to a frame of the protocol. If the frame is foreign, returns the reason.
+/// Converts a frame of a recording to a frame of the protocol. If the frame is foreign, the function returns the reason.
 pub fn protocol_frame(frame: &RecordedFrame) -> Result<Frame, Foreign> {
     let format = Format {
         extended: frame.extended,

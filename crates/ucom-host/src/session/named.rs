@@ -1,4 +1,4 @@
-//! Values of boards by the names of their signals, as JSON.
+//! Returns the values of boards as JSON, with the names of the signals.
 
 use serde_json::{Map, Value, json};
 
@@ -7,8 +7,8 @@ use crate::files::Signal;
 use crate::master::io::{Kind, short};
 
 impl Known {
-    /// Returns the words of a buffer as a JSON object with signal names as keys. A value is in its unit if a signal table contains the
-    /// signal (D-11).
+    /// Returns the words of a buffer as a JSON object with signal names as keys. A value is in the signal's unit if a signal table contains
+    /// the signal (D-11).
     pub fn values(&self, kind: Kind, words: &[u16]) -> Value {
         named(self.names.names(kind), self.signals.all(kind), words)
     }
@@ -28,8 +28,8 @@ impl Known {
     }
 }
 
-/// Returns `count` keys. A key is the short name of its signal if that name is unique; otherwise the key is the complete name. If the
-/// complete name is not unique either, the key also contains the index.
+/// Returns `count` keys of a JSON object. A key is the short name of its signal if that name is unique; otherwise the key is the complete
+/// name. If the complete name is not unique either, the key also contains the index.
 fn keys(names: &[String], count: usize) -> Vec<String> {
     let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
     let key = |i: usize| match names.get(i) {

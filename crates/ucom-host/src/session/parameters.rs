@@ -1,4 +1,4 @@
-//! Parameters of boards: reads parameters from files, and writes parameters with a check that the boards received them.
+//! Parameters of boards: the PC reads parameters from files, and writes parameters with a check that the boards received them.
 
 use std::path::Path;
 
@@ -17,18 +17,18 @@ use crate::files::params::{
 use crate::master::io::Kind;
 use crate::master::{AdminChange, Error, Outcome, Request};
 
-/// Board, the words to write to it, and the words that were written before.
+/// Board, the words to write to the board, and the words that were written before.
 #[derive(Debug)]
 pub struct Parameters {
-    /// Board with its names.
+    /// Board with its signal names.
     pub known: Known,
-    /// Words to write.
+    /// Words to write to the parameters.
     pub words: Vec<Word>,
-    /// Words written before.
+    /// Words that were written to the parameters before.
     pub history: History,
 }
 
-/// Writes all words of all boards. No word is written until every board is ready.
+/// Writes all words of all boards. The function writes no word until every board is ready.
 pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), SessionError> {
     for board in all.iter().filter(|p| !p.words.is_empty()) {
         become_master(driver, board.known.board, force)?;
@@ -54,7 +54,8 @@ pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result
     Ok(())
 }
 
-/// Listens for another PC before any frame is sent (D-08). Returns `true` if the control loop runs.
+/// Makes this PC the master. Before it sends any frame, the function listens for another PC (D-08). The function returns `true` if the
+/// control loop of the board runs.
 pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, SessionError> {
     let change = AdminChange::default();
     match driver.run(Request::Admin { board, change, force })? {
@@ -63,8 +64,9 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
     }
 }
 
-/// Sends the queued frames, then checks that the application still runs and has therefore received them. The board does not confirm the
-/// inputs and parameters (D-35). Frames are sent in order, so the answer to a query shows that all frames before the query were sent.
+/// Sends the queued frames, and then checks that the application of the board still runs and has therefore received the frames. The check
+/// is necessary because the board does not confirm inputs and parameters (D-35). Frames are sent in order, so the answer to a query shows
+/// that all frames before the query were sent.
 pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
     match driver.seen(board) {
@@ -88,7 +90,7 @@ pub fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str>
     Some(board.name.as_str()).filter(|name| !name.is_empty())
 }
 
-/// Parameter file that is checked against the boards on the bus.
+/// Parameter file that is compared with the boards on the bus.
 #[derive(Debug)]
 pub struct ParameterFile {
     file: String,
@@ -100,7 +102,7 @@ pub struct ParameterFile {
 pub type FileWords = (Vec<Word>, Vec<Word>);
 
 impl ParameterFile {
-    /// Reads a file, and removes the boards that are not selected.
+    /// Reads a parameter file, and removes the boards that are not selected.
     pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, ValuesError> {
         let wrong = |message: String, hint| ValuesError::File { message, hint };
         let file =
@@ -117,19 +119,20 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
-    /// Removes the boards that are not selected. Used for a file that was read before the boards were known.
+    /// Removes the boards that are not selected from the parameter file. The function is used for a file that was read before the boards
+    /// were known.
     #[must_use]
     pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
         self.boards.retain(|board| meant(board.number));
         self
     }
 
-    /// Returns the boards of the file.
+    /// Returns the numbers of the boards in the parameter file.
     pub fn numbers(&self) -> Vec<u8> {
         self.boards.iter().map(|b| b.number).collect()
     }
 
-    /// Checks that the boards on the bus are the boards in the file. Sends only questions.
+    /// Checks that the boards on the bus are the boards in the file. The function sends only queries.
     pub fn identities(&self, driver: &mut Driver) -> Result<(), SessionError> {
         let mut problems = Vec::new();
         for board in &self.boards {
@@ -148,7 +151,7 @@ impl ParameterFile {
         Ok(self.verdict(problems)?)
     }
 
-    /// Returns the words for all boards. If there are errors, returns all of them.
+    /// Returns the words in the file for all boards. If the file has errors, the function returns all of them.
     pub fn words<'a>(
         &self,
         known: impl Fn(u8) -> Option<&'a Known>,

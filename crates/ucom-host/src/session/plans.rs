@@ -11,7 +11,7 @@ use super::values::{Prepared, Word, note_rounded, words};
 use crate::master::io::Kind;
 use crate::master::{RunBoard, Setting};
 
-/// Returns the values for each board: the values of the file, replaced or extended by `ci` and `par`.
+/// Returns the values for each board: the values of the parameter file, replaced or extended by `ci` and `par`.
 pub fn plans(
     driver: &Driver,
     prepared: &Prepared,

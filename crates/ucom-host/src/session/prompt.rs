@@ -1,10 +1,11 @@
-//! Bus with a short receive timeout. The owner of the bus can check for requests often, so that a stop does not need to wait for a frame.
+//! Bus with a short timeout for received frames. With the short timeout, the owner of the bus can check for requests often, so that a stop
+//! does not need to wait for a frame.
 
 use std::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, ControllerState};
 
-/// Longest wait for a frame.
+/// Longest wait for a received frame.
 const WAIT: Duration = Duration::from_millis(5);
 
 /// Wrapper of a bus with a receive timeout of at most 5 ms.

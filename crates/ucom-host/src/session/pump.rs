@@ -1,5 +1,5 @@
-//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout
-//! can end. Sending and receiving cannot block each other.
+//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered to the master before
+//! a timeout can end. Sending frames and receiving frames cannot block each other.
 
 use std::time::Duration;
 
@@ -8,36 +8,37 @@ use ucom::{Foreign, Frame};
 use super::error::SessionError;
 use crate::master::Master;
 
-/// Longest wait. Ctrl-C is checked at this interval.
+/// Longest wait for a frame. The loop checks for Ctrl-C at this interval.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Limits of the number of delivered frames, and of the time, before the due frames are sent. With these limits, heartbeats continue on a
-/// flooded bus.
+/// Limit of the frames that are delivered to the master before the due frames are sent. The time of the delivery is limited too. With these
+/// limits, the PC continues to send heartbeats on a flooded bus.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
-/// Limit of frames that are sent before received frames are handled.
+/// Limit of the frames that the PC sends before it handles received frames.
 const MOST_SENT: usize = 64;
-/// Age in µs above which frames are assumed to be delivered, on a bus that is flooded permanently.
+/// Age in µs above which frames are assumed to be delivered, if the bus is flooded permanently.
 const BEHIND_US: u64 = 1_000_000;
 
-/// Bus with a clock.
+/// Interface to a bus with a clock.
 pub trait Line {
     /// Returns the time in µs since an arbitrary start.
     fn now_us(&self) -> u64;
     /// Sends a frame.
     fn send(&mut self, frame: &Frame) -> Result<(), SessionError>;
-    /// Returns the next frame. Waits at most `timeout`; does not wait if `timeout` is zero.
+    /// Returns the next received frame. The function waits at most `timeout`; it does not wait if `timeout` is zero.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError>;
 }
 
-/// State of the loop.
+/// State of the loop that moves frames.
 #[derive(Debug, Default)]
 pub struct Pump {
-    /// Time up to which all received frames have been delivered, µs.
+    /// Time up to which all received frames have been delivered to the master, µs.
     received_us: u64,
 }
 
 impl Pump {
-    /// Waits for a frame until the next action is due, at most `patience`. Delivers all received frames, then sends the due frames.
+    /// Waits for a frame until the next action of the master is due, at most `patience`. The function delivers all received frames, and
+    /// then sends the due frames.
     pub fn turn(
         &mut self,
         master: &mut Master,
@@ -73,7 +74,7 @@ impl Pump {
                         break;
                     }
                 }
-                // No further frame had arrived at that time.
+                // No further frame had arrived at the time `asked`.
                 None if wait.is_zero() => {
                     self.received_us = asked;
                     return Ok(());
@@ -86,7 +87,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Sends due frames. Returns `true` if more frames may be waiting.
+    /// Sends the frames that are due. The function returns `true` if more frames may be waiting.
     fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, SessionError> {
         for _ in 0..MOST_SENT {
             let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
@@ -108,11 +109,11 @@ mod tests {
     /// Simulated bus with board 1, which answers PC_INFO within a millisecond. The process of the PC side sometimes loses the CPU.
     struct Bench {
         now: u64,
-        /// Frames on their way to the PC, sorted by time.
+        /// Frames that will arrive at the PC, sorted by time.
         coming: VecDeque<(u64, Frame)>,
-        /// Times in µs for which the process loses the CPU, before and after each access to the bus. Each entry is used once.
+        /// Times in µs for which the process loses the CPU, before and after each access to the bus. Each of these times is used once.
         lost: VecDeque<u64>,
-        /// Period of frames from another member of the bus, µs.
+        /// Period of the frames that another node of the bus sends, µs.
         flood_us: Option<u64>,
         flooded_up_to: u64,
         sent: Vec<(u64, Frame)>,
@@ -141,7 +142,7 @@ mod tests {
             self.sent.iter().filter(|(_, f)| *f == frame(text)).map(|(at, _)| *at).collect()
         }
 
-        /// Runs a request until it ends.
+        /// Runs a request until the procedure ends.
         fn run(&mut self, master: &mut Master, request: Request) -> Result<Outcome, crate::master::Error> {
             let mut pump = Pump::default();
             let id = master.start(self.now, request).unwrap();
@@ -193,7 +194,7 @@ mod tests {
         }
     }
 
-    /// splitmix64.
+    /// Returns a pseudo-random number of the generator splitmix64.
     fn random(seed: &mut u64) -> u64 {
         *seed = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let z = (*seed ^ (*seed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -220,7 +221,7 @@ mod tests {
         }
     }
 
-    /// D-50: heartbeats and timeouts continue on a bus that carries more frames than can be delivered.
+    /// D-50: heartbeats and timeouts continue on a bus that carries more frames than the PC can deliver to the master.
     #[test]
     fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);

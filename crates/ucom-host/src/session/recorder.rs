@@ -17,10 +17,10 @@ enum Sink {
     Stream(CandumpWriter<Box<dyn Write>>),
 }
 
-/// Recording in progress. The recording contains a master that only listens, to learn the numbers of the boards.
+/// Recording of a bus that is in progress. The recorder contains a master that only listens, so that the numbers of the boards are known.
 pub struct Recorder {
     sink: Sink,
-    /// `true` if the format cannot represent frames of other protocols.
+    /// `true` if the file format cannot represent frames of other protocols.
     only_protocol: bool,
     channel: String,
     decoder: Decoder,
@@ -30,10 +30,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates a recording as a file. The profile is stored in the file or next to it; `channel` is the name of the bus in the recording.
+    /// Creates a recording as a file. The profile is stored in the file or next to the file; `channel` is the name of the bus in the
+    /// recording.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn file(
         path: &Path,
         format: RecordingFormat,
@@ -45,7 +46,7 @@ impl Recorder {
         Ok(Self { only_protocol, ..Self::new(sink, profile, channel) })
     }
 
-    /// Creates a recording as a stream of lines in candump's form.
+    /// Creates a recording as a stream of lines in the format of candump.
     pub fn stream(out: impl Write + 'static, profile: Profile, channel: &str) -> Self {
         Self::new(Sink::Stream(CandumpWriter::new(Box::new(out))), profile, channel)
     }
@@ -55,10 +56,10 @@ impl Recorder {
         Self { sink, only_protocol: false, channel: channel.into(), decoder, master, frames: 0, left_out: 0 }
     }
 
-    /// Writes a frame. The frame was received at the session time `now_us`, and at `time_ns` since 1970.
+    /// Writes a frame to the recording. The frame was received at the session time `now_us`, and at the time `time_ns` since 1970.
     ///
     /// # Errors
-    /// The frame cannot be written.
+    /// Returns an error if the frame cannot be written.
     pub fn take(&mut self, now_us: u64, time_ns: u64, frame: &CanFrame) -> Result<(), RecordingError> {
         let frame = recorded(frame);
         self.master.handle(now_us, protocol_frame(&frame));
@@ -80,11 +81,11 @@ impl Recorder {
     /// Writes all data to the file, so that they are not lost if the recorder is killed afterwards.
     ///
     /// # Errors
-    /// The data cannot be written.
+    /// Returns an error if the data cannot be written.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match &mut self.sink {
             Sink::File(writer) => writer.flush(),
-            // A stream is already written line by line, so no data remain to be written.
+            // The recorder already writes a stream line by line, so no data remain to be written.
             Sink::Stream(_) => Ok(()),
         }
     }
@@ -94,7 +95,7 @@ impl Recorder {
         self.frames
     }
 
-    /// Returns the number of frames of other protocols that the format cannot represent.
+    /// Returns the number of frames of other protocols that the file format cannot represent.
     pub fn left_out(&self) -> u64 {
         self.left_out
     }
@@ -107,7 +108,7 @@ impl Recorder {
     /// Ends the recording.
     ///
     /// # Errors
-    /// The end of the file cannot be written.
+    /// Returns an error if the end of the file cannot be written.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self.sink {
             Sink::File(writer) => writer.finish(),

@@ -7,11 +7,11 @@ use super::error::SessionError;
 use super::link::{Link, protocol_frame, replayed};
 use crate::files::recording::{Record, RecordedFrame};
 
-/// Sends the frames of a recording at their times, `speed` times as fast as recorded, until the operator requests an end. Calls `done`
-/// after each frame. Returns the number of frames sent.
+/// Sends the frames of a recording at their times, `speed` times as fast as recorded, until the operator requests an end. The function
+/// calls `done` after each frame. The function returns the number of frames that it sent.
 ///
 /// # Errors
-/// The bus failed.
+/// Returns an error if the bus failed.
 pub fn replay(
     records: &[&Record],
     speed: f64,
@@ -30,7 +30,7 @@ pub fn replay(
             if rest.is_zero() {
                 break;
             }
-            // Discards received frames so that they do not fill the memory.
+            // The replay discards received frames so that they do not fill the memory.
             bus.receive(rest.min(Duration::from_millis(100)))?;
             bus.news().into_iter().for_each(|news| operator.note(news));
         }

@@ -1,18 +1,18 @@
-//! Selection of boards, and values for signals, in the form that users write.
+//! Selection of boards, and values for signals, in the form in which users write them.
 
 use std::str::FromStr;
 
 use super::error::ValuesError;
 use crate::files::SignalValue;
 
-/// Selection of boards: numbers, a list, ranges, or all boards.
+/// Selection of boards by a user: numbers, a list, ranges, or all boards.
 #[derive(Clone, Debug, Eq, PartialEq)]
 pub enum Boards {
-    /// Every board that answers.
+    /// The selection is every board that answers.
     All,
-    /// No board.
+    /// The selection contains no board.
     None,
-    /// Listed boards, in ascending order and without duplicates.
+    /// The selection contains the listed boards, in ascending order and without duplicates.
     Some(Vec<u8>),
 }
 
@@ -54,14 +54,14 @@ impl FromStr for Boards {
     }
 }
 
-/// `NAME=VALUE` or `BOARD.NAME=VALUE`.
+/// Value for a signal in the form `NAME=VALUE` or `BOARD.NAME=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {
-    /// Board for the value; `None` for every selected board.
+    /// Number of the board that gets the value; `None` for every selected board.
     pub board: Option<u8>,
-    /// Name or index.
+    /// Name or index of the signal.
     pub name: String,
-    /// Value. The word for the value depends on the signal.
+    /// Value that the user gave. The word that is sent for the value depends on the signal.
     pub value: SignalValue,
 }
 
@@ -83,7 +83,7 @@ impl FromStr for Assignment {
     }
 }
 
-/// Returns the values for this board, including the values without a board.
+/// Returns the values for this board, including the values that are not for a particular board.
 pub fn for_board(values: &[Assignment], board: u8) -> Vec<Assignment> {
     values.iter().filter(|a| a.board.is_none_or(|b| b == board)).cloned().collect()
 }

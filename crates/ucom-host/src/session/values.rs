@@ -1,4 +1,4 @@
-//! Conversion of values to words of the boards. Names and ranges are checked before any frame is sent.
+//! Converts values to words of the boards. The names and the ranges of values are checked before any frame is sent.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use crate::master::{Error, Outcome, Request, SignalError, StopLevel};
 /// Word for a signal.
 pub type Word = ParamsWord;
 
-/// Converts the assignments for a board to words.
+/// Converts the assignments of values for a board to words.
 pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Word>, SessionError> {
     let board = known.board;
     let word = |a: &Assignment| {
@@ -42,7 +42,7 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     Ok(all)
 }
 
-/// Shows values that lie between two words, because the nearer word is sent instead.
+/// Shows a note about values that lie between two words, because the nearer word is sent instead.
 pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     for word in words {
         if let Some(rounded) = &word.rounded {
@@ -51,7 +51,8 @@ pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     }
 }
 
-/// Runs an action with cached names. If a board has other names, reads the names from the boards and runs the action once more.
+/// Runs an action with the cached signal names. If a board has other names, the function reads the names from the boards and runs the
+/// action once more.
 pub fn with_names<T>(
     cache: &Cache,
     mut act: impl FnMut(&Cache) -> Result<T, SessionError>,
@@ -64,16 +65,17 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their names. The procedure started the applications only of boards that could not send their names otherwise.
+/// Boards with their signal names. The procedure started the applications only of boards that could not send their names otherwise.
 #[derive(Default)]
 pub struct Prepared {
-    /// Boards by number.
+    /// Boards with their signal names, by board number.
     pub known: BTreeMap<u8, Known>,
     started: RefCell<Vec<u8>>,
 }
 
 impl Prepared {
-    /// Reads the names of a board. Starts its application only if necessary; this does not move an axis.
+    /// Reads the signal names of a board. The function starts the application of the board only if necessary; this start does not move an
+    /// axis.
     pub fn add(
         &mut self,
         driver: &mut Driver,
@@ -84,10 +86,10 @@ impl Prepared {
     ) -> Result<(), SessionError> {
         let known = match cache.known(driver, table, board) {
             Err(SessionError::Procedure(Error::Signal(SignalError::NoApplication { .. }))) => {
-                // The board is recorded before the command is sent, because a cancelled start may still have reached it.
+                // The board is recorded before the start command is sent, because a cancelled start may still have reached the board.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
-                    // If the request was refused, no frame was sent. A stop would then be a command on the bus of another PC.
+                    // If the start was refused, no frame was sent. A stop would then be a command on a bus whose master is another PC.
                     if e.kind() == ErrorKind::Refused {
                         self.started.borrow_mut().pop();
                     }
@@ -103,8 +105,8 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops the applications that were started only to read names. If the action is refused, the boards are then in their previous state.
-    /// A second call has no effect. Failures are shown to the operator.
+    /// Stops the applications that were started only to read signal names. If the action is refused, the boards are then in their previous
+    /// state. A second call of this function has no effect. Failures of a stop are shown to the operator.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

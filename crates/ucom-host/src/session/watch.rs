@@ -15,26 +15,26 @@ pub type CompetingMaster = (Function, u8);
 
 /// Length of the bus load curve in seconds.
 pub const HISTORY: usize = 120;
-/// Largest number of lines in the log.
+/// Largest number of lines in the log of events.
 pub const LOG: usize = 200;
 
-/// Content of the view without the boards.
+/// Content of the live view without the boards.
 pub struct Watch {
-    /// The bus.
+    /// URL of the bus.
     pub url: String,
     /// Bus load in percent, one value per second.
     pub load: VecDeque<f64>,
-    /// Events as time in s and text, oldest first.
+    /// Log of events, each as time in s and text, oldest first.
     pub log: VecDeque<(f64, String)>,
-    /// Last frame of another PC that is a master. If this field is set, no query is sent.
+    /// Last frame of another PC that is a master. If this field is set, the view sends no query.
     pub competing_master: Option<CompetingMaster>,
-    /// `true` if no frame may be sent.
+    /// `true` if the view must not send any frame.
     pub listen_only: bool,
-    /// `true` to request the identity of the boards.
+    /// `true` to send queries for the identity of the boards.
     pub ask: bool,
     /// Profile of the boards.
     pub profile: Profile,
-    /// Message about the last request, until the next request.
+    /// Message about the last request; the message is kept until the next request.
     pub message: String,
     loaded: Instant,
 }
@@ -43,7 +43,7 @@ pub struct Watch {
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
-    /// Creates the view of a bus. With `listen_only`, the view never sends a frame.
+    /// Creates the live view of a bus. With `listen_only`, the view never sends a frame.
     pub fn new(url: String, listen_only: bool, profile: Profile) -> Self {
         Self {
             url,
@@ -97,7 +97,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Stops the control loops of all boards. This PC does not need to be the master.
+    /// Stops the control loops of all boards. For this stop, the PC does not need to be the master.
     pub fn stop(&mut self, driver: &mut Driver) {
         if self.listen_only {
             self.message =
@@ -127,33 +127,33 @@ impl Watch {
     }
 
     /// Sends queries to the boards once, and again if the user requests it. Permanent queries would look like a second master to other PCs
-    /// (D-08), and changes are received without queries.
+    /// (D-08), and the view receives changes of boards without queries.
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;
-            // No other procedure runs, so the start cannot fail because of a conflict.
+            // No other procedure runs, so the start of the scan cannot fail because of a conflict.
             let _ = driver.master.start(driver.now_us(), Request::Scan);
         }
     }
 }
 
-/// Content of the view at one time.
+/// Content of the live view at one time.
 pub struct Picture<'a> {
-    /// Boards as last seen.
+    /// Last known states of the boards.
     pub boards: &'a Boards,
-    /// Data traffic on the bus.
+    /// Counters of the frames on the bus.
     pub statistics: &'a Statistics,
     /// Numbers that two boards share, as text.
     pub shared: &'a [String],
     /// State of the CAN adapter, if the adapter reports it.
     pub controller: Option<Controller>,
-    /// Time, µs.
+    /// Time to which the content belongs, µs.
     pub now: u64,
-    /// Content of the view without the boards.
+    /// Content of the live view without the boards.
     pub watch: &'a Watch,
 }
 
-/// Problems with the next command.
+/// Problems on the bus, with the next command.
 #[derive(Clone, Debug, Default)]
 pub struct Problems {
     /// Problems that prevent the operation of boards.
@@ -184,7 +184,7 @@ impl Picture<'_> {
             next.push("ucom doctor".into());
         }
         let all = findings(&seen).into_iter();
-        // Silence of boards is reported below, because the text depends on whether queries were sent to the boards.
+        // The view reports the silence of boards below, because the text depends on whether it has sent queries to the boards.
         for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
             let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
             let text = format!("{}{why}", finding.what);
@@ -194,7 +194,7 @@ impl Picture<'_> {
                 &mut problems.warnings
             };
             list.push(text);
-            // If a hint refers to this view itself, the hint is replaced.
+            // A hint that refers to this view itself is replaced.
             let helps = finding.next.to_string();
             let own = helps.is_empty() || helps.contains("ucom monitor");
             next.push(if own { "ucom doctor".into() } else { helps });

@@ -1,10 +1,11 @@
-//! Bus member that answers by a rule. Each test defines its own rule.
+//! Simulated bus member that answers frames by a rule. Each test defines its own rule for the answers.
 
 use ucom::Frame;
 
 use super::bench::{Member, frame};
 
-/// Answers a frame by a rule. The first answer is due 300 µs after the frame. Each further answer is due 1 µs after the previous answer.
+/// Bus member that answers a frame by a rule. The first answer is due 300 µs after the frame that it answers. Each further answer is due 1
+/// µs after the previous answer.
 pub(super) struct Answering<A> {
     answers: A,
     out: Vec<(u64, Frame)>,

@@ -1,5 +1,5 @@
-//! A bus in memory and in virtual time. The master is on one side, and boards or a script are on the other side. Faults can be set for the
-//! frames between the two sides.
+//! Test bus in memory and in virtual time. The master is on one side of the bus, and boards or a script are on the other side. A test can
+//! set faults for the frames between the two sides.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Frame, Profile};
@@ -12,7 +12,7 @@ pub(super) use super::script::Script;
 /// Microseconds in a millisecond.
 pub(super) const MS: u64 = 1000;
 
-/// Participant on the bus other than the master.
+/// Simulated bus member other than the master.
 pub(super) trait Member {
     fn poll(&mut self, now: u64) -> Option<Frame>;
     fn sent(&mut self, now: u64, frame: &Frame);
@@ -48,7 +48,7 @@ pub(super) fn frame(text: &str) -> Frame {
     text.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
-/// Fault of one frame during transmission.
+/// Fault of one frame during its transmission on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     Lost,
@@ -57,11 +57,11 @@ pub(super) enum Fault {
     Swapped,
     /// The frame is delayed by the given time in milliseconds.
     Delayed(u64),
-    /// A bit of the data is wrong, or a bit of the identifier if the frame has no data.
+    /// A data bit of the frame is wrong, or a bit of the identifier if the frame has no data.
     Corrupted(u8),
 }
 
-/// Sender of a frame.
+/// Sender of a frame on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum From {
     Master,
@@ -72,21 +72,21 @@ pub(super) struct Bench {
     pub master: Master,
     pub members: Vec<Box<dyn Member>>,
     pub now: u64,
-    /// Every frame that was put on the bus, with the time at which it was complete.
+    /// Every frame that was put on the bus, with the time at which its transmission was complete.
     pub log: Vec<(u64, From, Frame)>,
     pub events: Vec<(u64, Event)>,
-    /// Number of the frame that has a fault, and the fault.
+    /// Number of the frame that has a fault, and the kind of the fault.
     pub fault: Option<(usize, Fault)>,
-    /// Beginnings of frames that are lost, and the number of frames to lose for each beginning. `<` marks a frame of the master, and `>`
-    /// marks a frame of a board.
+    /// Beginnings of the texts of lost frames, and the number of frames to lose for each text. In these texts, `<` marks a frame of the
+    /// master, and `>` marks a frame of a board.
     pub lose: Vec<(&'static str, u32)>,
-    /// Members that are disconnected. No frame reaches them, and none of their frames arrives.
+    /// Bus members that are disconnected. A disconnected member receives no frames, and none of its frames arrives.
     pub cut: Vec<usize>,
     pending_master: Option<Frame>,
     pending: Vec<Option<Frame>>,
     held: Option<(From, Frame)>,
     delayed: Vec<(u64, From, Frame)>,
-    /// The driver does nothing, as after a kill of the tool.
+    /// `true` if the driver of the master does nothing, as after the tool was killed.
     pub dead: bool,
 }
 
@@ -110,7 +110,7 @@ impl Bench {
         }
     }
 
-    /// Adds a member to the bus.
+    /// Adds a member to the test bus.
     pub(super) fn join(&mut self, member: Box<dyn Member>) {
         self.members.push(member);
         self.pending.push(None);
@@ -120,7 +120,7 @@ impl Bench {
         Self::new(Profile::default(), vec![Box::new(script)])
     }
 
-    /// Creates a chain of real boards, each with an application.
+    /// Creates a bus with a chain of boards of the crate `ucom`, each with an application.
     pub(super) fn chain(flash_ids: &[u16]) -> Self {
         Self::chain_with(flash_ids, Profile::default())
     }
@@ -224,20 +224,20 @@ impl Bench {
         }
     }
 
-    /// Lets time pass.
+    /// Advances the virtual time by `ms` milliseconds.
     pub(super) fn run(&mut self, ms: u64) {
         let until = self.now + ms * MS;
         while self.now < until && self.step(until) {}
     }
 
-    /// Advances the time until `done` returns `true`.
+    /// Advances the virtual time until `done` returns `true`.
     pub(super) fn until(&mut self, done: impl Fn(&Self) -> bool) {
         while !done(self) {
             self.run(1);
         }
     }
 
-    /// Starts a procedure and waits for its end. Panics if the procedure takes more than `limit_s` of virtual time.
+    /// Starts a procedure and waits until it ends. The function panics if the procedure takes more than `limit_s` of virtual time.
     pub(super) fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
         let id = self.master.start(self.now, request).expect("nothing else is under way");
         self.wait(id, limit_s)
@@ -266,12 +266,12 @@ impl Bench {
         }
     }
 
-    /// Frames that the master sent, as text.
+    /// Returns the frames that the master sent, as text.
     pub(super) fn sent(&self) -> Vec<String> {
         self.log.iter().filter(|(_, from, _)| *from == From::Master).map(|(.., f)| f.to_string()).collect()
     }
 
-    /// Times at which the master sent this frame.
+    /// Returns the times at which the master sent this frame.
     pub(super) fn times_of(&self, text: &str) -> Vec<u64> {
         let wanted = frame(text);
         self.log
@@ -295,7 +295,7 @@ impl Bench {
     }
 }
 
-/// Returns the frame with one wrong bit. A gateway that computes a new checksum forwards such a frame.
+/// Returns the frame with one wrong bit. A gateway that computes a new checksum forwards a frame with a wrong bit.
 fn corrupted(frame: &Frame, bit: u8) -> Frame {
     if frame.dlc() == 0 {
         return Frame::new(frame.id() ^ 1 << (bit % 11), &[]).unwrap();
@@ -311,7 +311,7 @@ pub(super) const CI: [&str; 2] = ["target velocity", "current limit"];
 pub(super) const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
 pub(super) const PAR: [&str; 3] = ["P", "I", "D"];
 
-/// Program ID and date of the program on every board of the bench.
+/// Program ID and date of the program on every board of the test bus.
 pub(super) const OLD: (u16, u16) = (0x1234, 0x386E);
 
 pub(super) fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {

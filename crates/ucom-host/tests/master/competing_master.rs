@@ -1,4 +1,4 @@
-//! Heartbeats of a competing master for single boards (D-08), and resets of single boards.
+//! Tests of heartbeats that a competing master sends to single boards (D-08), and of resets of single boards.
 
 use super::bench::Exit;
 use ucom::Profile;
@@ -15,9 +15,8 @@ fn has_competing_master(bench: &Bench) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::CompetingMaster { .. }))
 }
 
-/// D-08: a heartbeat with a board's number arrives before the first intrusive command. If the board is started, the
-/// heartbeat comes from this board; otherwise it comes from another PC. If the board does not answer, the command is
-/// not refused.
+/// D-08: a heartbeat with a board's number arrives before the first intrusive command. If the board is started, the heartbeat comes from
+/// this board; otherwise it comes from another PC. If the board does not answer, the master does not refuse the command.
 #[test]
 fn d08_whose_heartbeat_is_it() {
     for (status, refused) in [(Some("8B"), false), (Some("AB"), false), (Some("1B"), true), (None, false)] {
@@ -37,9 +36,9 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: this PC is master, and another PC sends heartbeats for a board that is not started. The master reports these heartbeats and
-/// does not expect further heartbeats. If this PC has started a board, the master does not attribute the heartbeats of that board to
-/// another PC.
+/// D-08, D-51: this PC is the master, and another PC sends heartbeats with the number of a board that is not started. The master reports
+/// these heartbeats and does not expect further heartbeats of the board. If this PC has started a board, the master does not attribute the
+/// heartbeats of that board to another PC.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -80,8 +79,8 @@ fn reset(board: u8) -> Request {
     Request::Reset { board: Some(board), force: false }
 }
 
-/// Resets a single board. The board must answer before the reset, and must not have a number after the reset. The master does not send a
-/// reset to a board that does not answer.
+/// The test resets a single board. The board must answer before the reset, and must not have a number after the reset. The master does not
+/// send a reset to a board that does not answer.
 #[test]
 fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -113,7 +112,7 @@ fn a_single_reset_is_checked() {
         }
         assert_eq!((bench.board(0).phase(), bench.board(2).phase()), (Phase::Idle, Phase::Idle), "{what}");
     }
-    // The board has executed the reset, but none of its later frames arrives.
+    // The board has executed the reset, but none of its later frames arrives at the master.
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();
@@ -123,7 +122,8 @@ fn a_single_reset_is_checked() {
     );
 }
 
-/// The driver delivers frames late. A frame that is still in the driver does not count as silence, and the master still sends heartbeats.
+/// D-50: the driver delivers frames to the master late. A frame that is still in the driver does not count as silence, and the master still
+/// sends heartbeats.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());
@@ -139,7 +139,7 @@ fn d50_a_driver_that_is_behind() {
     assert_eq!((alive, asked), (6, 1), "the question is not repeated");
     master.handle(3_000 * MS, Ok(frame("141#2100011B34126E38")));
     master.handle(3_000 * MS, Ok(frame("141#0000")));
-    // The query is not repeated before its timeout.
+    // The master does not repeat the query before its timeout.
     for ms in 3_000..3_200 {
         while let Some(sent) = master.poll(ms * MS) {
             assert_ne!(sent, frame("201#"), "the question is not repeated");

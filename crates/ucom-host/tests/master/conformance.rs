@@ -1,4 +1,5 @@
-//! The conformance tests. Boards of this crate pass all conformance tests, and each faulty board fails the test for its fault.
+//! Tests of the conformance tests. Boards of the crate `ucom` pass all conformance tests, and each faulty board fails the conformance test
+//! for its fault.
 
 use super::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,7 +15,7 @@ use ucom_sim::memory::WirePins;
 
 use super::bench::{Bench, From, Member, TestNode, frame, image, node};
 
-/// Options that allow everything.
+/// Returns options that allow every conformance test.
 pub(super) fn all() -> ConformanceOptions {
     let program = ConformanceProgram {
         board: 1,
@@ -42,7 +43,7 @@ fn failed(report: &ConformanceReport) -> Vec<String> {
     failed.map(|t| format!("{} {:?} {:?}", t.id, t.board, t.verdict)).collect()
 }
 
-/// Runs every test in both byte orders. The run omits only tests that need a special bus.
+/// Runs every conformance test in both byte orders. The run omits only conformance tests that need a special bus.
 #[test]
 fn boards_of_this_crate_pass_every_test() {
     for endian in [Endian::Little, Endian::Big] {
@@ -52,7 +53,7 @@ fn boards_of_this_crate_pass_every_test() {
         assert!(failed(&report).is_empty(), "{endian}: {:?}", failed(&report));
         let skipped: Vec<&str> =
             report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Skipped(_))).map(|t| t.id).collect();
-        // No application runs at this point, so these tests of queries are skipped.
+        // No application runs at this point, so the conformance tests that need an application are skipped.
         assert_eq!(
             skipped,
             ["D-T10", "D-T11", "D-T10", "D-T11", "D-T10", "D-T11", "D-T19", "D-T20", "D-T21"]
@@ -68,7 +69,7 @@ fn boards_of_this_crate_pass_every_test() {
     }
 }
 
-/// Without options, the run performs no action that needs permission. The test checks the frames of this run.
+/// Without options, the run performs no action that needs a permission. The test checks the frames that the master sends in this run.
 #[test]
 fn without_options_only_harmless_frames_leave() {
     let mut bench = numbered(Bench::chain(&[0x21, 0x42]));
@@ -79,8 +80,8 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // Allowed are PC_INFO, PC_REPORT, a number that the board already has, and dumps. Heartbeats are also sent, because `start` has
-        // begun them.
+        // Without options, the run may send PC_INFO, PC_REPORT, PC_INIT with a number that the board already has, and dump requests. The
+        // master also sends heartbeats, because the start of the application has begun them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
             // PC_INIT is sent only to a board that has just reported this number.
@@ -109,7 +110,7 @@ fn running_boards_are_left_alone() {
     assert_eq!(refused.exit(), 4, "{refused}");
 }
 
-/// Board with a fault, which changes the frames that the board receives and sends.
+/// Board with a fault that changes the frames that the board receives and sends.
 struct Flawed {
     inner: TestNode,
     mistake: Mistake,
@@ -172,7 +173,7 @@ impl Member for Flawed {
     }
 }
 
-/// Two boards; the first board has the fault.
+/// Returns a bus with two boards; the first board has the fault.
 fn with(mistake: Mistake) -> Bench {
     let mut pins = WirePins::chain(2);
     let profile = Profile::default();
@@ -187,21 +188,21 @@ fn with(mistake: Mistake) -> Bench {
     Bench::new(profile, vec![Box::new(first), Box::new(second)])
 }
 
-/// Each fault is detected by the test for it.
+/// The conformance test for each fault detects the fault.
 #[test]
 fn each_mistake_is_found_by_its_test() {
     let mistakes: [(&str, Mistake); 17] = [
         ("D-T1", sends(|_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] })),
-        // Every second report is missing.
+        // The faulty board omits every second report.
         ("D-T2", sends(|_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] })),
-        // A request without a number is answered with an error.
+        // The faulty board answers a request with a report even though it has no number.
         (
             "D-T3",
             receives(|b, f| {
                 if b.number().is_none() && f.id() == 0x2C1 { vec![*f, frame("240#")] } else { vec![*f] }
             }),
         ),
-        // The pin does not follow the value in PC_SETSTATUS.
+        // The outgoing pin of the faulty board does not follow the value in PC_SETSTATUS.
         (
             "D-T4",
             receives(|_, f| {
@@ -212,14 +213,14 @@ fn each_mistake_is_found_by_its_test() {
             }),
         ),
         ("D-T5", receives(|b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] })),
-        // The board masks the value.
+        // The faulty board masks the value in PC_SETSTATUS.
         ("D-T6", receives(|_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] })),
-        // MSTART follows EXLRUN.
+        // If PC_SETSTATUS clears EXLRUN, the faulty board sets ASTART.
         (
             "D-T7",
             receives(|_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] }),
         ),
-        // PROG stays 0.
+        // The status bit PROG of the faulty board stays 0.
         ("D-T8", receives(|_, f| if f.id() == 0x041 { vec![*f, frame("1C1#0400")] } else { vec![*f] })),
         ("D-T9", sends(|_, f, _| if f.id() == 0x501 { vec![] } else { vec![*f] })),
         ("D-T10", receives(|_, f| if f.to_string() == "581#00" { vec![frame("581#")] } else { vec![*f] })),
@@ -228,7 +229,7 @@ fn each_mistake_is_found_by_its_test() {
             sends(|_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] }),
         ),
         ("D-T12", sends(|_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] })),
-        // A heartbeat is enough to start the loop again.
+        // For the faulty board, a heartbeat is enough to start the control loop again.
         (
             "D-T13",
             receives(|b, f| {
@@ -236,7 +237,7 @@ fn each_mistake_is_found_by_its_test() {
                 if ready { vec![*f, frame("541#")] } else { vec![*f] }
             }),
         ),
-        // Heartbeats stop it.
+        // A heartbeat stops the control loop of the faulty board.
         (
             "D-T14",
             receives(|b, f| {
@@ -260,7 +261,7 @@ fn each_mistake_is_found_by_its_test() {
     ];
     for (id, mistake) in mistakes {
         let mut bench = with(mistake);
-        // `init` must assign a number to each of the two boards.
+        // The init must assign a number to each of the two boards.
         if bench.go(Request::Init(InitOptions::default()), 60).is_err() {
             panic!("{id}: no numbers");
         }
@@ -270,7 +271,7 @@ fn each_mistake_is_found_by_its_test() {
         let options = ConformanceOptions { only: vec![id.into()], ..all() };
         let report = judged(&mut bench, options);
         assert!(report.failed() > 0, "{id}: {report:?}");
-        // Boards without a fault pass this test.
+        // Boards without a fault pass this conformance test.
         let mut bench = numbered(with(NONE));
         if ["D-T10", "D-T11"].contains(&id) {
             bench.go(Request::Start { board: 1, force: false }, 20).unwrap();

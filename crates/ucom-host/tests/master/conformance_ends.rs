@@ -1,5 +1,5 @@
 //! The conformance tests restore the state of the boards at their end, after a cancel, and when a board disconnects. This file also tests
-//! the requests that the conformance tests refuse.
+//! the requests for conformance tests that the master refuses.
 
 use super::bench::Exit;
 use ucom::{Function, Status};
@@ -22,7 +22,8 @@ fn info(bench: &mut Bench, board: u8) -> BoardSeen {
     }
 }
 
-/// Three boards with numbers. The second board is started. The third board starts by itself, but its application does not run yet.
+/// Returns a chain of three boards with numbers. The application of the second board is started. The third board starts its application by
+/// itself, but this application does not run yet.
 fn chain() -> Bench {
     let mut bench = Bench::chain(&FLASH);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
@@ -32,7 +33,7 @@ fn chain() -> Bench {
     bench
 }
 
-/// Returns the state that must not change: a board's flash number and its bits ASTART, MSTART, MCARUN and PROG.
+/// Returns the state of a board that must not change: its flash number and its bits ASTART, MSTART, MCARUN and PROG.
 fn state(bench: &mut Bench, board: u8) -> (u16, Status) {
     let seen = info(bench, board).info;
     let bits = Status::ASTART | Status::MSTART | Status::MCARUN | Status::PROG;
@@ -47,7 +48,7 @@ fn done(bench: &Bench, id: ProcedureId) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::Done { id: which, .. } if *which == id))
 }
 
-/// Runs until `frames` frames were on the bus or the procedure has ended.
+/// Advances the time until `frames` frames were on the bus or the procedure has ended.
 fn until(bench: &mut Bench, id: ProcedureId, frames: usize) {
     while bench.log.len() < frames && !done(bench, id) {
         bench.run(1);
@@ -65,8 +66,8 @@ fn report(bench: &mut Bench, id: ProcedureId) -> ConformanceReport {
     }
 }
 
-/// Cancels the tests at many different moments. ASTART, MSTART, MCARUN, PROG and the numbers must be as before. The report is complete and
-/// lists a board that was erased.
+/// Cancels the conformance tests at many different moments. After the cancel, ASTART, MSTART, MCARUN, PROG and the numbers must be as
+/// before the tests. The report of the tests is complete and lists a board that was erased.
 #[test]
 fn cancelled_tests_leave_the_boards_as_they_were() {
     let mut bench = chain();
@@ -87,7 +88,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let result = bench.wait(id, 200);
         let report = match result {
             Ok(Outcome::Conformance(report)) => report,
-            // No board was changed before the first test.
+            // No board was changed before the first conformance test.
             Err(Error::Master(MasterError::Cancelled)) => {
                 assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment}");
                 continue;
@@ -110,8 +111,8 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
     }
 }
 
-/// A board disconnects during the tests. The exit code is 3, the remaining tests are skipped with the reason, and the state of the other
-/// boards does not change.
+/// A board disconnects during the conformance tests. The exit code is 3, the remaining conformance tests are skipped with the reason, and
+/// the state of the other boards does not change.
 #[test]
 fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     let mut bench = chain();
@@ -135,8 +136,8 @@ fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     assert_eq!(states(&mut bench, &[1, 3]), before);
 }
 
-/// A board has no number. After a new address assignment another board could have the number of the tested board, so
-/// the request is refused.
+/// A board of the chain has no number. After a new address assignment, another board could have the number of the tested board, so the
+/// master refuses the request.
 #[test]
 fn address_assignment_is_refused_when_a_board_has_no_number() {
     let mut bench = chain();
@@ -151,7 +152,8 @@ fn address_assignment_is_refused_when_a_board_has_no_number() {
     assert!(!bench.log[from..].iter().any(|(_, who, f)| *who == From::Master && changes(f)));
 }
 
-/// Programs only the selected board. The header contains the flash number of this board and the address of the image.
+/// The conformance tests program only the selected board. The header of the image contains the flash number of this board and the address
+/// of the image.
 #[test]
 fn programs_the_board_that_is_named_alone() {
     let mut bench = chain();
@@ -179,7 +181,7 @@ fn programs_the_board_that_is_named_alone() {
         }
     }
     assert_eq!((&header[8..12], &header[20..22]), (&[0x40, 0, 1, 0][..], &[0x21, 0][..]));
-    // U-2: the test is refused if any board runs, even if the test does not cover this board.
+    // U-2: the master refuses the test if any board runs, even if the test does not cover this board.
     let run = RunOptions { boards: vec![RunBoard { board: 2, ..Default::default() }], ..Default::default() };
     bench.go(Request::Run(run), 20).unwrap();
     let tested = ConformanceOptions { boards: vec![1], ..options(0x21) };

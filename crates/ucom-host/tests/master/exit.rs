@@ -4,7 +4,7 @@ use ucom_host::master::conformance::ConformanceReport;
 use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{Diagnose, Error, ErrorKind, InitReport};
 
-/// Exit code of the command, as its documentation defines it.
+/// Exit code of the command `ucom`, as the documentation of the command defines it.
 pub(super) trait Exit {
     fn exit(&self) -> u8;
 }

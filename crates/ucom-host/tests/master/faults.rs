@@ -1,5 +1,5 @@
-//! Tests with a fault on every single frame of scan, init and process data. The result is success or a specific error, never a wrong number
-//! or an endless wait. Every wait is limited in virtual time.
+//! Tests with a fault on every single frame of scan, init and process data. The result of each test is success or a specific error, never a
+//! wrong number or an endless wait. Every wait of the master is limited in virtual time.
 
 use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting};
 
@@ -8,7 +8,7 @@ use super::chain::initialised;
 
 const IDS: [u16; 3] = [0x21, 0x42, 0x63];
 
-/// Every kind of fault for frame `at`. The number of the frame determines the damaged bit.
+/// Returns every kind of fault for the frame with the index `at`. The index of the frame determines which bit is damaged.
 pub(super) fn kinds(at: usize) -> [Fault; 6] {
     let bit = (at * 7 + 3) as u8;
     [
@@ -83,14 +83,16 @@ fn every_frame_of_a_scan_disturbed() {
             if !matches!(fault, Fault::Corrupted(_)) {
                 assert_eq!(report.boards.len(), 3, "{what}");
             } else if report.boards.len() < 3 {
-                // The fault changed a request into a reset, so the boards have no numbers. The scan reports this.
+                // The fault changed a request into a reset, so the boards have no numbers. The scan reports that the boards have no
+                // numbers.
                 assert!(!report.findings.is_empty(), "{what}");
             }
         }
     }
 }
 
-/// Tests with a fault on every frame from the exloader to running outputs. A description is correct or is rejected.
+/// The test applies a fault to every frame of a run, from the exloader to enabled outputs. The master either receives the correct
+/// description or rejects the description.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

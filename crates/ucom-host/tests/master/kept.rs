@@ -1,4 +1,4 @@
-//! Inputs that the fuzzers found or that the repository stores, run with the stable toolchain.
+//! Runs the fuzz targets with inputs that the fuzzers found or that the repository stores, with the stable toolchain.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ fn kept(target: &str, body: fn(&[u8])) {
         for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let bytes = std::fs::read(file.path()).unwrap();
             body(&bytes);
-            // The texts are short, so the test tries each prefix, and each text without one of its bytes.
+            // The stored texts are short, so the test tries each prefix, and each text without one of its bytes.
             for at in 0..bytes.len().min(600) {
                 body(&bytes[..at]);
                 body(&[&bytes[..at], &bytes[at + 1..]].concat());
             }
         }
     }
-    // The random bytes are the same in every run.
+    // The random bytes are the same in every run of the test.
     let mut state = 0x2545_F491_u32;
     let mut next = || {
         state ^= state << 13;

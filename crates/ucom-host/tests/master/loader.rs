@@ -1,26 +1,27 @@
-//! Simulated board that accepts program data, as a table of frames.
+//! Simulated board that accepts program data and answers by a table of frames.
 
 use ucom::Frame;
 
 use super::bench::{Bench, MS, Member};
 
-/// Board that is a table of frames. The board accepts every block; the last rule defines the end of the update.
+/// Simulated board that answers by a table of frames. The board accepts every block; the last rule of the table defines the end of the
+/// update.
 pub(super) struct Loader {
     /// Program ID and date in `DSP_INFO` before and after the update.
     pub info: [&'static str; 2],
-    /// Flash number that the board sends. The arguments are the number of resets so far, and `true` if the transfer was cancelled after the
-    /// last reset.
+    /// Function that returns the flash number that the board sends. The arguments of the function are the number of resets so far, and
+    /// `true` if the transfer was cancelled after the last reset.
     pub flash: fn(usize, bool) -> &'static str,
-    /// Status of the board after all blocks.
+    /// Status of the board after it has received all blocks.
     pub done_status: u8,
     pub blocks: usize,
     pub cancelled: bool,
-    /// Number of PC_PROG frames so far in this attempt.
+    /// Number of PC_PROG frames that the board received in this attempt.
     pub frames: usize,
     pub resets: usize,
-    /// Delay of READY for each block, in milliseconds.
+    /// Delay of DSP_READY for each block, in milliseconds.
     pub delay: fn(usize) -> u64,
-    /// Answer to a block instead of READY; an empty text means no answer.
+    /// Answer to a block instead of DSP_READY; an empty text means no answer.
     pub special: fn(usize, usize) -> Option<&'static str>,
     /// Number of frames after which the board sends an error at once and accepts no further frames.
     pub refuses_at: Option<usize>,

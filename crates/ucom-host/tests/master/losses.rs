@@ -1,4 +1,4 @@
-//! Losses of several chosen frames together. Tests with a single fault do not cover these losses.
+//! Tests in which several chosen frames are lost together. Tests with a single fault do not cover such losses.
 
 use ucom::Profile;
 use ucom::node::Phase;
@@ -16,9 +16,8 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show
-/// that a board has accepted it. Without this conclusion, boards that switch on their pin by themselves would get the
-/// same number twice.
+/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show that a board has accepted
+/// the number. Without this conclusion, boards that switch on their outgoing pin by themselves would get the same number twice.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     let profile = Profile { chain_auto_opinit: true, ..Profile::default() };
@@ -29,7 +28,7 @@ fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     assert_eq!(numbers, [Some(1), Some(2), Some(3)], "{result:?}");
 }
 
-/// D-46, U-4: PC_XRESET is never answered. If the command is lost, the application still runs, and the master sends the command again.
+/// D-46, U-4: a board never answers PC_XRESET. If PC_XRESET is lost, the application still runs, and the master sends the command again.
 #[test]
 fn d46_a_lost_xreset_is_repeated() {
     let mut bench = initialised(&[0x21]);
@@ -40,7 +39,7 @@ fn d46_a_lost_xreset_is_repeated() {
     assert_eq!(report.boards[0].attempts, 1);
 }
 
-/// A board stops even if its answers do not arrive.
+/// A stop command stops the board even if the board's answers do not arrive.
 #[test]
 fn a_stop_does_not_depend_on_answers() {
     for lost in ["> 141#", "> 601#"] {

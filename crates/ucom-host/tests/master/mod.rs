@@ -1,5 +1,5 @@
-//! Tests of the master on a bus in memory, in virtual time. Tests run the master against tables of frames (rows P-1 to P-21 of the
-//! acceptance tests). With faults on every single frame, tests also run the master against the boards of this crate.
+//! Tests of the master on a bus in memory, in virtual time. In some tests, the master runs against tables of frames (rows P-1 to P-21 of
+//! the acceptance tests). In other tests, the master runs against the boards of the crate `ucom`, with faults on every single frame.
 
 mod answering;
 mod bench;

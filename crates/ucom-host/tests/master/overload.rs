@@ -1,5 +1,5 @@
-//! Boards that were started with `force` on a bus that cannot carry all inputs. Heartbeats are still sent in time,
-//! and inputs are up to date.
+//! Tests of boards that were started with `force` on a bus that cannot carry all inputs. The master still sends heartbeats in time, and the
+//! inputs that it sends are up to date.
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ use super::bench::{Bench, CI, MS, frame};
 
 const BOARDS: u8 = 8;
 
-/// Eight running boards whose inputs alone would need 108 % of the bus time.
+/// Returns a bus with eight running boards whose inputs alone would need 108 % of the bus time.
 fn overloaded() -> Bench {
     let profile = Profile { ci_period: 1, so_period: 1000, ..Profile::default() };
     let ids: Vec<u16> = (1..=BOARDS.into()).collect();
@@ -22,8 +22,8 @@ fn overloaded() -> Bench {
     bench
 }
 
-/// D-34, D-50: while a board's inputs wait, they are not queued again. Therefore a change reaches its board soon, even after a long
-/// overload, and heartbeats are sent in time.
+/// D-34, D-50: while inputs of a board wait for the bus, the master does not queue them again. Therefore a change of an input reaches the
+/// board soon, even after a long overload, and heartbeats are sent in time.
 #[test]
 fn d34_d50_inputs_that_wait_are_never_stale() {
     let mut bench = overloaded();
@@ -39,7 +39,7 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     let steps: Vec<u64> = alive.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(steps.iter().all(|step| (450 * MS..=550 * MS).contains(step)), "{steps:?}");
     assert!((0..BOARDS.into()).all(|i| bench.board(i).application.running));
-    // The inputs of every board are repeated, including boards after the first one.
+    // The master repeats the inputs of every board, not only of the first board.
     for board in 1..=u16::from(BOARDS) {
         let since = bench.now - 2_000 * MS;
         let repeated = bench.log.iter().filter(|(at, _, f)| *at > since && f.id() == 0x340 + board).count();
@@ -47,8 +47,8 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     }
 }
 
-/// D-50: between the master and the bus there are more queues, for example the queue of a socket. The master puts only as many inputs into
-/// these queues as the bus can carry. With more inputs, heartbeats would wait in these queues after the inputs.
+/// D-50: between the master and the bus there are other queues, for example the queue of a socket. The master puts only as many inputs into
+/// the queues of the driver as the bus can carry. With more inputs, heartbeats would wait in these queues after the inputs.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();
@@ -64,7 +64,7 @@ fn d50_no_more_inputs_than_the_bus_carries() {
         while let Some(frame) = master.poll(now) {
             queue.push_back((now, frame));
         }
-        // At 1 Mbit/s. The time in which the bus is idle is not carried over.
+        // The bus carries 1 Mbit/s. The test does not add the time in which the bus is idle to the later bus time.
         spare += MS;
         while let Some((since, next)) = queue.front()
             && spare >= frame_bits(next.dlc())
@@ -85,8 +85,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
     assert!(longest <= 200 * MS, "a heartbeat waited {longest} µs");
 }
 
-/// D-34: the driver sends only one frame every 20 ms. Then at most one package of each board's inputs waits, and this package has the
-/// latest values.
+/// D-34: the driver sends only one frame every 20 ms. Then at most one package of each board's inputs waits in the queue, and this package
+/// has the latest values.
 #[test]
 fn d34_a_slow_driver_has_a_short_queue() {
     let mut bench = overloaded();

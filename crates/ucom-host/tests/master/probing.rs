@@ -1,4 +1,4 @@
-//! Probe and doctor.
+//! Tests of the probe and of the doctor.
 
 use ucom::profile::{AliveMode, Endian, ReportMode};
 use ucom::{Checksum, Profile, Status};
@@ -14,7 +14,7 @@ use super::bench::{Bench, image};
 use super::chain::initialised;
 use super::update::options;
 
-/// P-20: the answers of boards with other profiles show these profiles, and the probe derives the correct profile.
+/// P-20: the answers of boards show that the boards use other profiles, and the probe derives the correct profile.
 #[test]
 fn p20_probe_finds_the_profile() {
     let others = [
@@ -39,7 +39,7 @@ fn p20_probe_finds_the_profile() {
     ];
     for profile in others {
         let mut bench = Bench::chain_with(&[0x21, 0x42, 0x63], profile);
-        // The tool starts with the default profile.
+        // The master of this PC starts with the default profile.
         bench.master = ucom_host::master::Master::new(Profile::default());
         let probe = Request::Probe(ProbeOptions { init: true, ..Default::default() });
         let Ok(Outcome::Probe(report)) = bench.go(probe, 120) else { panic!() };
@@ -48,8 +48,8 @@ fn p20_probe_finds_the_profile() {
     }
 }
 
-/// D-10: if the byte order is wrong, the error mentions the byte order and `probe`. The error does not mention the wire, the load or the
-/// flash numbers.
+/// D-10: if the byte order is wrong, the error mentions the byte order and the command `probe`. The error about the byte order does not
+/// mention the wire, the load or the flash numbers.
 #[test]
 fn d10_a_wrong_byte_order_is_named() {
     for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
@@ -74,7 +74,8 @@ fn d10_a_wrong_byte_order_is_named() {
             problems[0].what.contains("byte order") && problems[0].next.to_string().contains("ucom probe"),
             "{problems:?}"
         );
-        // `update` is refused while the board has its old program. `info` shows the numbers and reports that these numbers are wrong.
+        // The master refuses `update` while the board has its old program. `info` shows the numbers of the board and reports that these
+        // numbers are wrong.
         let before = bench.log.len();
         let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
         let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
@@ -87,7 +88,7 @@ fn d10_a_wrong_byte_order_is_named() {
         bench.go(Request::Info { board: 1 }, 60).unwrap();
         let noted = |(_, event): &(_, Event)| matches!(event, Event::Note { text, .. } if text.contains("wrong byte order"));
         assert!(bench.events[received..].iter().any(noted));
-        // `io`: the board sends its description only if an application runs.
+        // The test of `io` starts the application, because a board sends its description only if an application runs.
         bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
         assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
@@ -129,7 +130,7 @@ fn probe_of_checksum_and_heartbeats() {
     assert!(!bench.board(0).application.running);
 }
 
-/// After any end of a probe, the session uses its previous profile. Boards that did not run before do not run.
+/// After a probe has ended for any reason, the session uses its previous profile, and boards that did not run before do not run.
 #[test]
 fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
@@ -146,11 +147,11 @@ fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     assert_eq!(report.profile.prog_checksum, Checksum::Sum16, "{}", report.table());
     assert_eq!(bench.master.profile(), Profile::default());
     assert!(!bench.board(0).application.running && !bench.board(0).status().has(Status::MSTART));
-    // A board whose application was started stays started.
+    // A board whose application was started before the probe stays started.
     bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
     bench.go(Request::Probe(alive.clone()), 120).unwrap();
     assert!(!bench.board(0).application.running && bench.board(0).status().has(Status::MSTART));
-    // The probe is cancelled while it reads all frames in raw form, and while a control loop runs with other heartbeats.
+    // The test cancels the probe while it reads all frames in raw form, and while a control loop runs with other heartbeats.
     for until in ["<201#", "<541#"] {
         let mut bench = numbered();
         let id = bench.master.start(bench.now, Request::Probe(alive.clone())).unwrap();
@@ -167,7 +168,7 @@ fn sent(from: super::bench::From, frame: &ucom::Frame) -> String {
     format!("{}{frame}", if from == super::bench::From::Master { '<' } else { '>' })
 }
 
-/// A probe that would end a running control loop is refused unless `force` is set.
+/// The master refuses a probe that would end a running control loop unless `force` is set.
 #[test]
 fn a_probe_that_would_end_control_loops_is_refused() {
     for asked in [

@@ -1,4 +1,4 @@
-//! Repair of one board's number (5.4). After any losses, the repair never succeeds while two boards have the same number.
+//! Tests of the repair of one board's number (5.4). For any lost frames, the repair never succeeds while two boards have the same number.
 
 use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
@@ -9,7 +9,7 @@ use super::update::{options, recorded, update};
 
 const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 
-/// A chain of four boards. The given boards have rebooted; the pins of the other boards are still on.
+/// Returns a chain of four boards. The given boards have rebooted; the outgoing pins of the other boards are still on.
 fn rebooted(boards: &[u8]) -> Bench {
     let mut bench = initialised(&FLASH);
     for board in boards {
@@ -38,21 +38,20 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // The board did not receive the number, or the pin of its neighbour is still on. An error of these kinds does not say which boards
-        // have numbers.
+        // The board did not receive the number, or the outgoing pin of its neighbour is still on. An error of this kind does not say which
+        // boards have numbers.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
 
-/// D-21: boards 2 and 4 have no number, and the pins of the boards before them are on. Only the selected board takes
-/// the number.
+/// D-21: boards 2 and 4 have no number, and the outgoing pins of the boards before them are on. Only the selected board takes the number.
 #[test]
 fn d21_a_number_goes_to_one_board_only() {
     let mut bench = rebooted(&[2, 4]);
     let result = repair(&mut bench, 2);
     assert!(matches!(&result, Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42), "{result:?}");
     is_sound(&mut bench, &result, "nothing lost");
-    // The pins are on again, so the other board gets its number. A board that has its number gets only queries.
+    // The outgoing pins are on again, so the other board gets its number. In a repair, a board that has its number gets only queries.
     assert!(repair(&mut bench, 4).is_ok());
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
     let before = (bench.count("281#"), bench.count("1C1#0200"));
@@ -60,8 +59,8 @@ fn d21_a_number_goes_to_one_board_only() {
     assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
 }
 
-/// The first board's incoming pin is always active. As long as this board has no number, it would take any number that is assigned to
-/// another board.
+/// The incoming pin of the first board is always active. As long as the first board has no number, it would take any number that is
+/// assigned to another board.
 #[test]
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
@@ -93,8 +92,8 @@ fn d21_no_single_fault_gives_a_number_twice() {
     }
 }
 
-/// Several frames are lost together: frames that switch off the pin before the other board, the answers of that board, and the answers of
-/// the selected board.
+/// Several frames are lost together: frames that switch off the pin before another board, the answers of that board, and the answers of the
+/// selected board.
 #[test]
 fn d21_no_losses_give_a_number_twice() {
     let mut shared = 0;
@@ -123,7 +122,7 @@ fn d21_no_losses_give_a_number_twice() {
     assert!(shared > 0, "a pin that stays on silently is found out by its consequence");
 }
 
-/// U-4: the repair during an update consists of these steps too.
+/// U-4: an update repairs a number with the same steps.
 #[test]
 fn u4_an_update_gives_a_number_to_one_board_only() {
     let mut bench = rebooted(&[4]);

@@ -1,4 +1,4 @@
-//! Random frames on the bus, and boards with other profiles.
+//! Tests with random frames on the bus, and with boards that use other profiles.
 
 use proptest::prelude::*;
 use ucom::profile::{AliveMode, Endian};
@@ -10,14 +10,15 @@ use super::bench::{Bench, CI, PAR, SO};
 use super::update::{check_program, options, update};
 
 proptest! {
-    /// Random frames at any time during any procedure. The master never panics and never waits endlessly, and each procedure ends exactly
-    /// once.
+    /// The test sends random frames at any time during any procedure. The master never panics and never waits endlessly, and each procedure
+    /// ends exactly once.
     #[test]
     fn any_frames_into_any_procedure(data in prop::collection::vec(any::<u8>(), 0..400)) {
         ucom_host::master::fuzzing::frames(&data);
     }
 
-    /// Like the previous test, but with identifiers of boards 1 to 3 and valid lengths, so that the master accepts more of the frames.
+    /// This test is like the previous test, but uses identifiers of boards 1 to 3 and valid lengths, so that the master accepts more of the
+    /// frames.
     #[test]
     fn likely_frames_into_any_procedure(
         choice: u8,
@@ -33,7 +34,8 @@ proptest! {
     }
 }
 
-/// Init, update and run with boards that have other profiles. The tests change only the master's profile.
+/// The test performs init, update and run with boards that have other profiles. In each case, the boards and the master use the same
+/// profile.
 #[test]
 fn other_profiles() {
     let profiles = [

@@ -23,7 +23,7 @@ fn running(flash_ids: &[u16], boards: &[u8]) -> Bench {
     bench
 }
 
-/// Vector 13.2: the start of board 1 without other boards, frame by frame.
+/// Vector 13.2: the master starts board 1 without other boards; the test compares each frame.
 #[test]
 fn start_order() {
     let mut bench = initialised(&[0x21]);
@@ -47,7 +47,7 @@ fn start_order() {
         .filter(|t| !repeated.contains(&t.as_str()))
         .collect();
     assert_eq!(sent.join(" "), "301# 581# 5C1# 3C1#00007800 541# 601#01000000 601#01010000");
-    // Inputs are sent before the loop starts, and every 20 ms after that.
+    // The master sends inputs before the control loop starts, and every 20 ms after that.
     let inputs = bench.times_of("341#0000DC0509000000");
     assert!(inputs[0] < bench.times_of("541#")[0]);
     bench.run(1000);
@@ -57,7 +57,8 @@ fn start_order() {
     assert_eq!((board.application.latched_ci.as_slice(), board.application.par[0]), (&[1500, 9][..], 120));
 }
 
-/// D-34: a change is sent at once. D-35: the shadow contains assumed values. After a restart, the values are unknown.
+/// D-34: the master sends a changed input at once. D-35: the shadow contains values that the master assumes. After a restart of the
+/// application, the values are unknown.
 #[test]
 fn d34_d35_inputs_and_parameters() {
     let mut bench = running(&[0x21], &[1]);
@@ -76,7 +77,8 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown; 3]);
 }
 
-/// D-36: the description of each board is read once after its application has started. P-14: heartbeats continue during this time.
+/// D-36: the description of each board is read once after its application has started. P-14: heartbeats continue while the master reads the
+/// descriptions.
 #[test]
 fn d36_p14_descriptions_are_cached() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -99,14 +101,14 @@ fn d36_p14_descriptions_are_cached() {
     assert_eq!(bench.count("582#"), 2);
     let alive = bench.times_of("680#");
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))));
-    // If a board has no running application, the request is refused, and the error suggests the command that helps.
+    // If a board has no running application, the master refuses the request, and the error suggests the command that helps.
     let mut bench = initialised(&[0x21]);
     let error = bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::NoApplication { board: 1, valid: true }));
     assert!(error.hint().contains("ucom start 1"));
 }
 
-/// D-36: the stored names for a board's program belong to another application. The master detects this before the
+/// D-36: the names that are stored for a board's program belong to another application. The master detects the wrong names before the
 /// control loop runs.
 #[test]
 fn d36_kept_names_of_another_application_start_nothing() {
@@ -124,11 +126,11 @@ fn d36_kept_names_of_another_application_start_nothing() {
     let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::StaleNames { board: 1 }));
     assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
-    // Now the stored names belong to the board.
+    // At this point, the stored names belong to the board.
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
-/// D-14: a dump with incorrect totals is read again, at most three times.
+/// D-14: the master reads a dump with incorrect totals again, at most three times.
 #[test]
 fn d14_dump_is_accepted_only_if_the_totals_fit() {
     let good = ["581#010000000000", "581#0100", "581#6865616420", "581#0100", "581#737065656400"];
@@ -158,7 +160,7 @@ fn d14_dump_is_accepted_only_if_the_totals_fit() {
     assert!(matches!(read(&[]), (Err(Error::Exchange(ExchangeError::NoAnswer { tries: 3, .. })), 3)));
 }
 
-/// P-6: board 2 sends a dump. At the same time, ten other boards send SO at full rate, and board 3 sends DSP_INFO.
+/// P-6: board 2 sends a dump. While board 2 sends the dump, ten other boards send SO at full rate, and board 3 sends DSP_INFO.
 #[test]
 fn p6_nothing_is_mixed_up() {
     let dump = [
@@ -197,7 +199,7 @@ fn p6_nothing_is_mixed_up() {
     );
 }
 
-/// D-37: flags are changed by read-modify-write, and outputs are never active without the loop.
+/// D-37: the master changes flags by read-modify-write, and outputs are never active without the control loop.
 #[test]
 fn d37_flags() {
     let mut bench = running(&[0x21], &[1]);
@@ -216,8 +218,8 @@ fn d37_flags() {
     assert!(!bench.board(0).application.running);
 }
 
-/// A stop performs its steps in the order outputs, loop, application, which is the reverse of a start. The status changes from 0xAB to 0x8B
-/// to 0x1B.
+/// A stop performs its steps in the order outputs, loop, application, which is the reverse of a start. During the stop, the status changes
+/// from 0xAB to 0x8B to 0x1B.
 #[test]
 fn stop_in_reverse() {
     let mut bench = running(&[0x21], &[1]);
@@ -236,8 +238,8 @@ fn stop_in_reverse() {
     assert!(!lost, "an application that was stopped on purpose is not lost");
 }
 
-/// P-15, D-51: a lost board is reported within 3.1 s of its last heartbeat. The frames that `on_lost` requires are
-/// sent within 100 ms.
+/// P-15, D-51: the master reports a lost board within 3.1 s of the board's last heartbeat. The master sends the frames that `on_lost`
+/// requires within 100 ms.
 #[test]
 fn p15_d51_lost_boards() {
     for (on_lost, frame) in [
@@ -262,7 +264,7 @@ fn p15_d51_lost_boards() {
         assert!((3_000 * MS..=3_100 * MS).contains(&(lost - last)), "{}", lost - last);
         for text in ["600#00000000", "602#00000000"] {
             let times = bench.times_of(text);
-            // The frame is sent three times, because a single frame can be lost.
+            // The master sends the stop frame three times, because a single frame can be lost.
             assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
@@ -289,7 +291,7 @@ fn only_a_master_stops_boards() {
     assert!(bench.sent().is_empty());
 }
 
-/// D-26: if a board reboots while it runs, the other boards are also stopped.
+/// D-26: if a board reboots while it runs, the master also stops the other boards.
 #[test]
 fn d26_reboot_of_a_running_board() {
     let mut bench = running(&[0x21, 0x42], &[1, 2]);
@@ -300,7 +302,7 @@ fn d26_reboot_of_a_running_board() {
     assert!(bench.events.iter().any(|(_, e)| *e == Event::Supervision { board: 2, change }));
     assert!(!bench.board(0).application.running);
     assert_eq!(bench.count("600#00000000"), 3);
-    // A repair assigns the number to the board again.
+    // A repair assigns the number to the rebooted board again.
     let repair = Request::Repair { board: 2, flash_number: 0x42, force: false };
     assert!(matches!(bench.go(repair, 10), Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42));
     let repair = Request::Repair { board: 2, flash_number: 0x63, force: false };
@@ -314,7 +316,7 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
-    // The session starts at a heartbeat.
+    // The session starts at the time of a heartbeat.
     let alive = bench.count("680#");
     bench.until(|b| b.count("680#") != alive);
     bench.master.end_session();
@@ -326,7 +328,7 @@ fn d50_end_of_session() {
     assert_eq!(bench.sent().len(), sent);
 }
 
-/// P-19: if the predicted load is above the limit, the start is refused before any control loop starts.
+/// P-19: if the predicted bus load is above the limit, the master refuses the start before any control loop starts.
 #[test]
 fn p19_load_forecast() {
     let profile = Profile { so_period: 1, load_limit: 70, ..Profile::default() };
@@ -343,7 +345,7 @@ fn p19_load_forecast() {
     assert!(bench.board(2).application.running);
 }
 
-/// D-33: the master returns snapshots of a running board with the words of the board.
+/// D-33: the master returns snapshots of a running board with the values that the board sent.
 #[test]
 fn d33_snapshots() {
     let mut bench = running(&[0x21], &[1]);
@@ -359,7 +361,7 @@ fn d33_snapshots() {
     assert!((9..=11).contains(&(snapshots.count() + 1)));
 }
 
-/// Only one procedure at a time may work with a board. At the same time, a procedure for another board may run.
+/// Only one procedure at a time may work with a board. A procedure for another board may run at the same time.
 #[test]
 fn one_procedure_a_board() {
     let mut bench = initialised(&[0x21, 0x42]);

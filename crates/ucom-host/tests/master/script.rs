@@ -1,4 +1,4 @@
-//! Bus member that answers by a table of frames.
+//! Simulated bus member that answers by a table of frames.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::bench::{MS, Member, frame};
 /// Bus member that consists of a table of frames.
 #[derive(Default)]
 pub(super) struct Script {
-    /// Rules: answers and their delays in milliseconds.
+    /// Rules of the table: answers and their delays in milliseconds.
     rules: Vec<Rule>,
     due: BTreeMap<(u64, u64), Frame>,
     serial: u64,
@@ -18,9 +18,9 @@ pub(super) struct Script {
 
 struct Rule {
     ask: Frame,
-    /// Remaining uses of the rule.
+    /// Number of times that the rule can still be used.
     uses: u32,
-    /// Number of requests before the rule applies.
+    /// Number of requests that the member skips before the rule applies.
     skip: u32,
     answers: Vec<(u64, Frame)>,
 }
@@ -31,7 +31,7 @@ impl Script {
         self.rule(ask, 0, u32::MAX, answers)
     }
 
-    /// Like [`Self::on`], for the first request only.
+    /// Like [`Self::on`], but the rule applies to the first request only.
     pub(super) fn once(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, 1, answers)
     }
@@ -45,7 +45,7 @@ impl Script {
         self
     }
 
-    /// Sends a frame without a request at a time in milliseconds.
+    /// Adds a frame that the member sends without a request at a time in milliseconds.
     pub(super) fn at(mut self, ms: u64, text: &str) -> Self {
         self.serial += 1;
         self.due.insert((ms * MS, self.serial), frame(text));

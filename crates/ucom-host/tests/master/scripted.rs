@@ -7,13 +7,13 @@ use ucom_host::master::{
 
 use super::bench::{Bench, Script};
 
-/// Boards 1 to n of the golden chain, as a table of frames.
+/// Returns boards 1 to n of the golden chain, as a table of frames.
 fn golden(boards: usize) -> Script {
     let reports = &["441#21", "482#42", "4C3#63"][..boards];
     let mut script = Script::default().on("000#", reports).on("240#", reports);
     for (i, flash) in [0x21, 0x42, 0x63].into_iter().enumerate().take(boards) {
         let n = i + 1;
-        // The status is 0x19 first, and 0x1B after OPINIT has been set.
+        // The status of the board is 0x19 first, and 0x1B after OPINIT has been set.
         let answer = |status: &str| {
             let numbers = format!("14{n}#{flash:02X}000{n}{status}34126E38");
             [numbers, format!("14{n}#0200"), format!("14{n}#55436F4D32206865"), format!("14{n}#61642070616E")]
@@ -53,7 +53,7 @@ fn p1_scan_is_harmless() {
     }
 }
 
-/// P-2, vector 13.1: the golden chain frame by frame. The master detects the end of the chain within one second.
+/// P-2, vector 13.1: the test compares the golden chain frame by frame. The master detects the end of the chain within one second.
 #[test]
 fn p2_init_of_the_golden_chain() {
     let mut bench = Bench::script(golden(3));
@@ -68,7 +68,7 @@ fn p2_init_of_the_golden_chain() {
     assert!(end <= 1_000_000, "{end} us");
 }
 
-/// P-2: no board answers.
+/// P-2: an init on a bus without boards.
 #[test]
 fn p2_init_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -78,7 +78,7 @@ fn p2_init_of_nobody() {
     assert_eq!(report.exit(), 3);
 }
 
-/// P-3: INITACK is lost. The master sends PC_INFO before it repeats PC_INIT.
+/// P-3: the INITACK of a board is lost. The master sends PC_INFO before it repeats PC_INIT.
 #[test]
 fn p3_lost_ack_asks_info_first() {
     let script = Script::default()
@@ -96,7 +96,8 @@ fn p3_lost_ack_asks_info_first() {
     assert_eq!(sent, ["282#", "202#", "282#", "202#", "282#", "202#"]);
 }
 
-/// P-4, D-24: identifier and data of INITACK differ. The number is refused: the master does not choose between the two values.
+/// P-4, D-24: identifier and data of INITACK contain different numbers. The master refuses the number and does not choose between the two
+/// values.
 #[test]
 fn p4_d24_ack_mismatch_is_refused() {
     for ack in ["0C1#02", "0C2#01"] {
@@ -116,7 +117,7 @@ fn p4_d24_ack_mismatch_is_refused() {
     }
 }
 
-/// P-16, D-26: a report without a request shows a reboot; a requested report does not.
+/// P-16, D-26: a report without a request shows a reboot of the board; a requested report does not.
 #[test]
 fn p16_spontaneous_report() {
     let mut bench = Bench::script(golden(1).at(9_000, "441#21"));
@@ -136,8 +137,8 @@ fn p16_spontaneous_report() {
     assert_eq!(*event, expected);
 }
 
-/// P-17, D-08: if another master sends frames, the command is refused unless `force` is set. Heartbeats of a running board are not
-/// interpreted as frames of another master.
+/// P-17, D-08: if another master sends frames, this master refuses the command unless `force` is set. The master does not interpret
+/// heartbeats of a running board as frames of another master.
 #[test]
 fn p17_d08_second_master() {
     for foreign in ["680#", "341#0000000000000000", "240#", "581#"] {
@@ -156,11 +157,11 @@ fn p17_d08_second_master() {
     let mut bench =
         Bench::script(golden(1).at(100, "683#").at(110, "601#01010000").at(120, "381#0000640065006600"));
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 10), Ok(Outcome::Init(r)) if r.is_ok()));
-    // The master listens for 600 ms before its first frame.
+    // The master listens to the bus for 600 ms before its first frame.
     assert!(bench.log.iter().find(|(_, f, _)| *f == super::bench::From::Master).unwrap().0 >= 600_000);
 }
 
-/// P-18: an unknown error code is reported as its number.
+/// P-18: the master reports an unknown error code as a number.
 #[test]
 fn p18_unknown_error_code() {
     let mut bench = Bench::script(Script::default().at(10, "081#2A"));
@@ -171,7 +172,7 @@ fn p18_unknown_error_code() {
     assert_eq!(code.number(), 0x2A);
 }
 
-/// D-T21: the reports of two boards are equal. The scan counts more boards than reports.
+/// D-T21: two boards send equal reports. The scan counts more boards than different reports.
 #[test]
 fn dt21_two_boards_with_one_flash_id() {
     let info = |n: u8, status: &str| vec![format!("14{n}#21000{n}{status}34126E38"), format!("14{n}#0000")];
@@ -205,7 +206,7 @@ fn init_names_a_broken_wire() {
     assert!(report.findings[0].to_string().contains("0x42 after position 1"));
 }
 
-/// D-07: reports in other modes are identified by their data byte.
+/// D-07: the master identifies reports in other modes by their data byte.
 #[test]
 fn d07_reports_by_data_byte() {
     let script = Script::default().on("240#", &["401#21", "441#21", "481#21", "4C1#21"]);
@@ -217,8 +218,8 @@ fn d07_reports_by_data_byte() {
     assert!(report.findings.contains(&ScanFinding::Disagrees { ucom_id: 0x21 }));
 }
 
-/// D-14: before the master repeats a request, it waits until the truncated answer has ended. Without this wait, old and new packages would
-/// mix.
+/// D-14: before the master repeats a request, it waits until the incomplete answer has ended. Without this wait, packages of the old and
+/// the new answer would mix.
 #[test]
 fn d14_a_truncated_answer_runs_dry() {
     let info = "141#2100011B34126E38";

@@ -1,4 +1,5 @@
-//! Two boards with the same number (D-24). Every request to this number fails with a specific error before any board is changed.
+//! Tests with two boards that have the same number (D-24). Every request to a shared number fails with a specific error before any board is
+//! changed.
 
 use super::bench::Exit;
 use ucom::{Profile, Status};
@@ -13,15 +14,15 @@ use ucom_sim::memory::WirePins;
 
 use super::bench::{Bench, From, Member, Script, image, node};
 
-/// Two boards whose wiring is that of the first board in the chain.
+/// Returns a bus with two boards that are both wired like the first board of the chain.
 fn strapped(flash: [u16; 2]) -> Bench {
     let board =
         |flash| Box::new(node(flash, WirePins::chain(1).remove(0), Profile::default())) as Box<dyn Member>;
     Bench::new(Profile::default(), flash.map(board).into_iter().collect())
 }
 
-/// Two boards with number 1, which another PC assigned before it disconnected. `more` contains further frames of that PC by time in
-/// milliseconds.
+/// Returns a bus with two boards that have the number 1. Another PC assigned this number before it disconnected. `more` contains further
+/// frames of the other PC by time in milliseconds.
 fn sharing(flash: [u16; 2], more: &[(u64, &str)]) -> Bench {
     let mut bench = strapped(flash);
     let script =
@@ -40,7 +41,7 @@ fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
     *error == shared && error.exit() == 4 && error.code() == "number-shared"
 }
 
-/// Requests for board 1, or requests that change all boards.
+/// Returns requests for board 1, and requests that change all boards.
 fn requests() -> Vec<Request> {
     let (board, force) = (1, false);
     let target = UpdateTarget { board, flash_number: Some(0x21) };
@@ -70,7 +71,7 @@ fn requests() -> Vec<Request> {
     ]
 }
 
-/// Returns `true` for queries and heartbeats.
+/// Returns `true` if the frame is a query or a heartbeat.
 fn changes_nothing(frame: &str) -> bool {
     let id = u16::from_str_radix(&frame[..3], 16).unwrap();
     matches!(id >> 6, 8 | 9 | 22 | 23) || frame == "680#"
@@ -113,7 +114,7 @@ fn d24_nothing_is_done_to_two_boards_that_cannot_be_told_apart() {
     refuses([0x21, 0x21]);
 }
 
-/// The answer of the second board comes late, after the answer of the first board has ended.
+/// The answer of the second board arrives late, after the answer of the first board has ended.
 #[test]
 fn d24_the_second_answer_may_come_late() {
     let answers = |ms: u64| {
@@ -134,8 +135,8 @@ fn d24_the_second_answer_may_come_late() {
     }
 }
 
-/// The second board answers only when the board is read back. The error still reports the shared number, and the started application is
-/// stopped.
+/// The second board answers only when the PC reads the board back. The error still reports the shared number, and the started application
+/// is stopped.
 #[test]
 fn d24_it_is_named_when_it_shows_on_the_way() {
     let one = |flash: &str, status: &str| {
@@ -158,7 +159,7 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
 }
 
 /// A second board takes the number at any step while the first board is programmed. The second board either sends an error about program
-/// data, or is flashed together with the first board. In both cases, the report contains the reason and no success, and no board stays in
+/// data, or is written together with the first board. In both cases, the report contains the reason and no success, and no board stays in
 /// programming mode.
 #[test]
 fn d24_it_is_named_when_it_shows_in_an_update() {
@@ -203,7 +204,8 @@ fn program_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).count()
 }
 
-/// A stop is not delayed or refused. Both boards stop, and the shared number is reported.
+/// A number that two boards share does not delay a stop, and the master does not refuse the stop. Both boards stop, and the master reports
+/// the shared number.
 #[test]
 fn d24_a_stop_stops_both() {
     let mut bench =
@@ -231,7 +233,7 @@ fn d24_outputs_are_turned_off_on_both() {
     assert!((0..2).all(|i| !bench.board(i).application.running));
 }
 
-/// An init that assigns the same number to two boards removes the number from both boards and reports this.
+/// An init that assigns the same number to two boards removes the number from both boards and reports the shared number.
 #[test]
 fn d24_an_init_leaves_no_number_to_two_boards() {
     let mut bench = strapped([0x21, 0x42]);
@@ -240,7 +242,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
         Error::Identity(IdentityError::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true });
     assert_eq!(error, wanted);
     assert!((0..2).all(|i| bench.board(i).number().is_none()));
-    // A chain was numbered wrongly before the test, and the master detects the shared number.
+    // The chain was numbered wrongly before the test, and the master detects the shared number.
     let mut bench = Bench::chain(&[0x21, 0x42]);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
     bench.members[1] = Box::new(node(0x42, WirePins::chain(1).remove(0), Profile::default()));
@@ -260,7 +262,7 @@ fn d24_a_scan_names_both() {
     assert!(shared.to_string().contains("flash numbers 0x0021 and 0x0042"), "{shared}");
 }
 
-/// A frame that a gateway doubles, or one frame that it corrupts, does not count as a second board.
+/// The master does not mistake a frame that a gateway doubles, or one frame that it corrupts, for a second board.
 #[test]
 fn d24_a_doubled_frame_is_no_board() {
     let whole = {

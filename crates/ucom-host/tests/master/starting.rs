@@ -1,4 +1,4 @@
-//! If a run fails to start, it returns every board to its previous state.
+//! Tests of runs that fail to start: the master returns every board to its previous state.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -13,7 +13,7 @@ use super::bench::{Bench, MS};
 use super::chain::initialised;
 
 const IDS: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
-/// Phase of the boards of [`found`] before the run, and `true` if their outputs are active, in the order of the boards.
+/// Phase of each board of [`found`] before the run, and `true` if its outputs are active, in the order of the boards.
 const FOUND: [(Phase, bool); 4] =
     [(Phase::Idle, false), (Phase::Ready, false), (Phase::Running, false), (Phase::Running, true)];
 
@@ -22,7 +22,7 @@ fn run(boards: &[u8], active: bool, force: bool) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active, force })
 }
 
-/// Four boards: idle, started, running with safe outputs, running with active outputs.
+/// Returns a bus with four boards: idle, started, running with safe outputs, running with active outputs.
 fn found(profile: Profile) -> Bench {
     let mut bench = Bench::chain_with(&IDS, profile);
     bench.go(Request::Init(InitOptions::default()), 20).unwrap();
@@ -37,15 +37,15 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
     [0, 1, 2, 3].map(|i| (bench.board(i).phase(), bench.board(i).application.active))
 }
 
-/// P-19: a start that would cause too much bus load is refused. Boards that were idle before are idle afterwards. If the master knows the
-/// descriptions, it refuses the request before it starts a board.
+/// P-19: the master refuses a start that would cause too much bus load. Boards that were idle before the request are idle afterwards. If
+/// the master knows the descriptions, it refuses the request before it starts a board.
 #[test]
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
     assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
-    // All boards have the same program, and its description is known.
+    // All boards have the same program, and the master knows its description.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
 
     let mut bench = initialised(&IDS);
@@ -58,12 +58,13 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
         assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
-        // Board 4 has the names of board 1. The names are known after board 1 has been read.
+        // Board 4 has the same names as board 1. The names of board 4 are known after board 1 has been read.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
     }
 }
 
-/// For every board and step, the board does not answer to this step. Afterwards the other boards are in their previous state.
+/// The test repeats the run for every board and every step; each time, the board does not answer this step. After the failed run, the
+/// other boards are in their previous state.
 #[test]
 fn a_run_that_fails_is_undone() {
     let steps = [("> 14", "PC_INFO"), ("> 60", "flags"), ("> 6C", "initial inputs")];
@@ -78,13 +79,14 @@ fn a_run_that_fails_is_undone() {
             for board in (0..4).filter(|board| *board != silent) {
                 assert_eq!(after[board], FOUND[board], "board {} {what} of {} lost", board + 1, silent + 1);
             }
-            // The state of the silent board could not be read. The outputs of this board are never left active if they were safe before.
+            // The master could not read the state of the silent board. The outputs of the silent board are never left active if they were
+            // safe before.
             assert!(!after[silent].1 || FOUND[silent].1, "{what}: {after:?}");
         }
     }
 }
 
-/// The user presses Ctrl-C at any moment of a start.
+/// The user presses Ctrl-C at any moment during the start of a run.
 #[test]
 fn a_run_that_is_cancelled_is_undone() {
     let mut bench = found(Profile::default());
@@ -109,8 +111,8 @@ fn a_run_that_is_cancelled_is_undone() {
     }
 }
 
-/// D-51: a board is lost while other boards are still being started. With `StopAll`, no further loop is started; with `Report`, the start
-/// continues. In both cases, boards that were idle before are idle again.
+/// D-51: a board is lost while other boards are still being started. With `StopAll`, the master starts no further control loop; with
+/// `Report`, the start continues. In both cases, boards that were idle before the run are idle again.
 #[test]
 fn d51_a_board_lost_while_others_start() {
     for on_lost in [OnLost::StopAll, OnLost::Report] {
@@ -133,7 +135,7 @@ fn d51_a_board_lost_while_others_start() {
                 assert_eq!(result, Err(Error::Running(RunningError::Lost { board: 1 })));
                 assert_eq!(started, [0; 3]);
             }
-            // The run ends with an error of board 1, which does not answer.
+            // The run ends with an error about board 1, which does not answer.
             _ => {
                 assert!(
                     matches!(result, Err(Error::Exchange(ExchangeError::NoAnswer { board: 1, .. }))),
@@ -148,7 +150,7 @@ fn d51_a_board_lost_while_others_start() {
     }
 }
 
-/// After a failed run, none of its procedures is still active, so the boards accept new requests.
+/// After a failed run, no procedure of the run is still active, so the boards accept new requests.
 #[test]
 fn after_a_failed_run_boards_are_free() {
     let mut bench = initialised(&IDS);

@@ -1,5 +1,5 @@
-//! A stop works on a bus that loses frames and reports errors. The stop also works for a board that has received a start command but does
-//! not run yet.
+//! Tests of stops on a bus that loses frames and whose boards report errors. A stop also works for a board that has received a start
+//! command but does not run yet.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -17,14 +17,13 @@ fn run(boards: &[u8]) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active: true, force: false })
 }
 
-/// From now on, board 1 sends error 7 (CAN_RECEIVE) repeatedly, as on a bad bus.
+/// Makes board 1 send error 7 (CAN_RECEIVE) repeatedly, as on a bad bus.
 fn bad_bus(bench: &mut Bench) {
     let from = bench.now / MS;
     bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
 }
 
-/// Section 9 (codes 6 to 8 are only logged): the master still repeats a stop if an error report arrives and
-/// ADMIN_DATA is lost.
+/// Section 9 (codes 6 to 8 are only logged): the master still repeats a stop if an error report arrives and ADMIN_DATA is lost.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     for lost in ["< 601#00000000", "< 601#01000000"] {
@@ -36,7 +35,7 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
         assert!(result.is_ok(), "{lost}: {result:?}");
         assert!(!bench.board(0).application.running, "{lost}");
     }
-    // When all attempts have failed, the error is reported.
+    // After all attempts to stop the board have failed, the error of the board is reported.
     let mut bench = initialised(&[0x21]);
     bench.go(run(&[1]), 30).unwrap();
     bad_bus(&mut bench);
@@ -49,8 +48,8 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     assert_eq!(bench.count("601#00000000"), 3);
 }
 
-/// Section 9, D-30: a start still waits for its board if the board reports errors of the bus. Error 11 ends the start
-/// at once.
+/// Section 9, D-30: the master still waits for the start of a board if the board reports errors of the bus. Error 11 of a board ends the
+/// start at once.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_start() {
     let mut bench = initialised(&[0x21]);
@@ -68,13 +67,13 @@ fn an_error_of_a_bad_bus_does_not_end_a_start() {
     assert_eq!(bench.count("301#"), 1);
 }
 
-/// If a board is silent, the stop is repeated at every level.
+/// If a board is silent, the master repeats the stop at every level.
 #[test]
 fn a_silent_board_gets_the_stop_more_than_once() {
     for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {
         let mut bench = initialised(&[0x21]);
         bench.go(run(&[1]), 30).unwrap();
-        // The first three stop frames `601#` and all status answers are lost.
+        // The first three stop frames `601#` and all answers with the status are lost.
         bench.lose = vec![("> 141#", 1000), ("< 601#", 3)];
         let result = bench.go(Request::Stop { board: 1, level, force: true }, 30);
         assert!(result.is_err(), "{level:?}");
@@ -83,17 +82,19 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     }
 }
 
-/// The user presses Ctrl-C while a board starts and its status does not show the start yet. The board must not be reported as stopped.
+/// The user presses Ctrl-C while a board starts and its status does not show the start yet. The master must not report this board as
+/// stopped.
 #[test]
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // The status of the board shows the start one second after the command. The board stops if it receives a stop after that time.
+        // The status of the board shows the start one second after the start command. Therefore the board must receive a stop command after
+        // that time.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();
         let was_run = matches!(request, Request::Run(_));
-        // Three queries come before the status changes: before the start, at the stop, and when the stop is read back.
+        // The master sends three queries before the status changes: before the start, at the stop, and when it reads the stop back.
         let script = Script::default().rule("201#", 0, 3, &idle).on("201#", &started);
         let mut bench = Bench::script(script.on("601#00000000", &["601#00000000"]));
         bench.run(2_000);
@@ -105,7 +106,7 @@ fn a_board_that_is_still_starting_is_stopped() {
         let result = bench.wait(id, 60);
         assert_eq!(result, Err(Error::Master(MasterError::Cancelled)));
         if !was_run {
-            // After a cancelled start request, the caller must stop the board.
+            // After the start request was cancelled, the caller must stop the board.
             bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: true }, 60).unwrap_err();
         }
         let stops = bench.times_of("1C1#8000");
@@ -134,7 +135,8 @@ fn slow_boards_are_idle_after_a_cancelled_run() {
     }
 }
 
-/// A stop of all boards begins with a broadcast, which is sent three times. A stop of some boards is sent only to these boards.
+/// A stop of all boards begins with a broadcast, which the master sends three times. The master sends a stop of some boards only to these
+/// boards.
 #[test]
 fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -159,8 +161,8 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 
-/// U-2: the master sends two queries to determine if a board runs, because one answer can be lost. The outputs of the board can also be
-/// lost.
+/// U-2: the master sends two queries to determine if a board runs, because one answer can be lost. The sensor outputs, which also show that
+/// the board runs, can be lost too.
 #[test]
 fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     let mut bench = initialised(&[0x21, 0x42]);

@@ -29,7 +29,7 @@ pub(super) fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport 
     }
 }
 
-/// Returns the options with the flash records of an update with the same image.
+/// Returns the options of an update, extended by the flash records of an earlier update with the same image.
 pub(super) fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions {
     let image = &options.image;
     let record = |info: &BoardInfo| FlashRecord::new(&image.bytes, image.address_words, info);
@@ -65,7 +65,7 @@ fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }
 
-/// Vector 13.4: the update with the golden image frame by frame, and the read-back.
+/// Vector 13.4: the test compares the update with the golden image, and the read-back, frame by frame.
 #[test]
 fn golden_update() {
     let mut bench = initialised(&[0x21]);
@@ -80,7 +80,7 @@ fn golden_update() {
         ["2C1#4355010001000000", "2C1#00000000F4010000", "2C1#3F4BC13AFFFFFFFF", "2C1#FFFFFFFFFFFFFFFF"];
     assert_eq!(prog[..4], first);
     assert_eq!((prog[7].as_str(), prog[8].as_str()), ("2C1#FFFFFFFFFFFFDC22", "2C1#0B30557A9FC4E90E"));
-    // OPINIT does not change: the status is 0x1B before and after.
+    // OPINIT does not change: the status is 0x1B before and after the update.
     assert_eq!(sent.iter().rfind(|t| t.starts_with("141#2100")).unwrap(), "141#2100011B3F4BC13A");
     assert_eq!(sent.iter().filter(|t| *t == "041#").count(), 1);
     assert_eq!(check_program(&mut bench, 0, 1000), (0x4B3F, DATE));
@@ -93,8 +93,8 @@ fn golden_update() {
     assert!(master.map(|(.., f)| f.to_string()).all(|t| silent.contains(&t.as_str())));
 }
 
-/// P-7: the first frame of a block is sent only after READY of the previous block. P-14: heartbeats are sent every 500 ±50 ms during this
-/// time.
+/// P-7: the master sends the first frame of a block only after DSP_READY for the previous block. P-14: the master sends heartbeats every
+/// 500 ±50 ms during the update.
 #[test]
 fn p7_p14_flow_control_and_heartbeats() {
     let mut bench = initialised(&[0x21]);
@@ -118,7 +118,7 @@ fn p7_p14_flow_control_and_heartbeats() {
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))), "{alive:?}");
 }
 
-/// P-8: READY takes 0.9 s, and the erase takes 8 s. No timeout is reported.
+/// P-8: the board sends DSP_READY after 0.9 s, and its erase takes 8 s. The master does not report a timeout.
 #[test]
 fn p8_slow_boards_are_waited_for() {
     let mut bench =
@@ -131,7 +131,7 @@ fn p8_slow_boards_are_waited_for() {
     );
 }
 
-/// P-9, U-9: DSP_PROGFINISHED is lost. The answer to PC_INFO shows that the update is done.
+/// P-9, U-9: DSP_PROGFINISHED of the board is lost. The answer to PC_INFO shows that the update is done.
 #[test]
 fn p9_lost_finished_is_a_success() {
     let mut bench = loader(Loader { special: |_, block| (block == 33).then_some(""), ..Loader::new(34) });
@@ -144,7 +144,7 @@ fn p9_lost_finished_is_a_success() {
     assert_eq!(bench.count("041#"), 1);
 }
 
-/// P-10, U-10: the board reports success but has the old program. The result is a failure.
+/// P-10, U-10: the board reports success but still has the old program. The result of the update is a failure.
 #[test]
 fn p10_success_must_be_read_back() {
     let mut bench = loader(Loader { info: ["34126E38"; 2], ..Loader::new(34) });
@@ -154,8 +154,8 @@ fn p10_success_must_be_read_back() {
     assert_eq!(report.exit(), 5);
 }
 
-/// P-11, U-7: errors 2 and 5 end the update after one attempt, other errors after three. Each attempt begins with
-/// XRESET.
+/// P-11, U-7: errors 2 and 5 end the update after one attempt, and other errors end it after three attempts. Each attempt to update the
+/// board begins with XRESET.
 #[test]
 fn p11_attempts_by_error() {
     type Case = (fn(usize, usize) -> Option<&'static str>, usize, u8);
@@ -180,14 +180,14 @@ fn p11_attempts_by_error() {
             "case {i}"
         );
     }
-    // The second attempt succeeds.
+    // The second attempt to update the board succeeds.
     let special = |reset, block| (reset == 1 && block == 16).then_some("081#01");
     let mut bench = loader(Loader { special, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 2));
 }
 
-/// An error in the middle of a block is an answer to this block: the master does not wait for READY and does not make another attempt.
+/// An error in the middle of a block is an answer to this block: the master does not wait for DSP_READY and does not make another attempt.
 #[test]
 fn errors_in_the_middle_of_a_block_count() {
     let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
@@ -197,7 +197,7 @@ fn errors_in_the_middle_of_a_block_count() {
     assert!(report.boards[0].failure.as_ref().is_some_and(code));
 }
 
-/// After an overrun, the pause between frames is longer in the next attempt.
+/// After an overrun on the board, the pause between frames is longer in the next attempt.
 #[test]
 fn overrun_widens_the_gap() {
     let special = |reset, block| (reset == 1 && block == 2).then_some("081#04");
@@ -212,8 +212,8 @@ fn overrun_widens_the_gap() {
     assert!(first.iter().all(|gap| *gap >= 200));
 }
 
-/// P-5, U-1: the update is refused before XRESET if the flash number differs from the requested one, or if the answer
-/// has another board number.
+/// P-5, U-1: the master refuses the update before XRESET if the flash number differs from the requested number, or if the answer contains
+/// another board number.
 #[test]
 fn p5_the_board_must_be_the_one_that_is_meant() {
     let mut bench = loader(Loader::new(34));
@@ -230,7 +230,7 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
-/// No board answers. The exit code is 3, and no frame that changes a board was sent.
+/// No board answers the queries of the update. The exit code is 3, and the master sent no frame that changes a board.
 #[test]
 fn update_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -246,10 +246,10 @@ fn update_of_nobody() {
     );
 }
 
-/// P-12: a cancel in the middle of a block ends the transfer. The board can be used, and the report shows its state.
+/// P-12: a cancel in the middle of a block ends the transfer. The board can still be used, and the report contains its state.
 #[test]
 fn p12_cancel() {
-    // Number of PC_PROG frames after which the user cancels: two cases in cycle 1, one in cycle 2.
+    // Number of PC_PROG frames after which the user cancels the update: two cases in cycle 1, one case in cycle 2.
     for (frames, erased) in [(3, false), (12, false), (3 * 8 + 11, true)] {
         let mut bench = initialised(&[0x21]);
         let id = bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
@@ -266,7 +266,7 @@ fn p12_cancel() {
     }
 }
 
-/// P-13: the tool is killed after any frame of an update; the next run recovers.
+/// P-13: the tool is killed after any frame of an update; the next update succeeds.
 #[test]
 fn p13_killed_tool() {
     let total = {
@@ -289,7 +289,7 @@ fn p13_killed_tool() {
     }
 }
 
-/// U-2: an update is refused while a board runs, unless `force` is set.
+/// U-2: the master refuses an update while a board runs, unless `force` is set.
 #[test]
 fn u2_running_boards() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -315,7 +315,7 @@ fn update_session_skips_and_starts() {
     assert_eq!(report.exit(), 0);
 }
 
-/// Group update by broadcast: the selected boards get the program, and the other board keeps its program.
+/// Group update by broadcast: the selected boards get the new program, and the other board keeps its program.
 #[test]
 fn group_update() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -328,7 +328,7 @@ fn group_update() {
     assert_eq!(prog.count(), 48);
 }
 
-/// A dry run reads the boards and does not change them.
+/// A dry run of an update reads the boards and does not change them.
 #[test]
 fn dry_run() {
     let mut bench = Bench::chain(&[0x21]);
@@ -341,7 +341,7 @@ fn dry_run() {
     assert!(sent.map(|(.., f)| f.to_string()).all(|t| ["201#", "200#", "680#"].contains(&t.as_str())));
 }
 
-/// U-6: progress counts the bytes of both cycles up to their total.
+/// U-6: the progress of an update counts the bytes of both cycles up to their total.
 #[test]
 fn progress_is_of_both_cycles() {
     let mut bench = initialised(&[0x21]);
@@ -392,11 +392,11 @@ fn every_frame_of_an_update_disturbed() {
                     if result.outcome == UpdateOutcome::NotStarted {
                         assert_eq!(holds, OLD, "{at} {fault:?}: {report:?}");
                     }
-                    // The next run recovers.
+                    // The next update of the board succeeds.
                     bench.fault = None;
                     let mut again = update(&mut bench, options(&[2], 128));
                     if again.exit() == 3 {
-                        // The board has lost its number.
+                        // At this point, the board has lost its number.
                         bench.go(Request::Init(InitOptions::default()), 60).unwrap();
                         again = update(&mut bench, options(&[2], 128));
                     }

@@ -1,4 +1,5 @@
-//! Updates that are not completed, because the bus fails, the user cancels, or another board answers instead of the selected board.
+//! Tests of updates that are not completed, because the bus fails, the user cancels, or another board answers instead of the selected
+//! board.
 
 use super::bench::Exit;
 use ucom::{Frame, Status};
@@ -15,7 +16,7 @@ use super::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
-/// Starts an update and continues it until `stop` returns `true`. Then `end` ends the update, and the report comes at once.
+/// Starts an update and continues it until `stop` returns `true`. Then `end` ends the update, and the report must be available at once.
 fn ended(
     bench: &mut Bench,
     options: UpdateOptions,
@@ -39,8 +40,8 @@ fn unplugged(bench: &mut Bench, id: ucom_host::master::ProcedureId) {
     bench.master.abandon(id, "the adapter is gone");
 }
 
-/// D-46: the bus fails at any frame of an update of two boards. The report comes at once and shows the true state of each board. The exit
-/// code is 5 if memory was erased.
+/// D-46: the bus fails at any frame of an update of two boards. The report is available at once and contains the true state of each board.
+/// The exit code is 5 if memory of a board was erased.
 #[test]
 fn d46_a_bus_that_fails_leaves_a_report() {
     let (from, to) = {
@@ -90,7 +91,7 @@ fn d46_a_bus_that_fails_leaves_a_report() {
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);
 }
 
-/// A procedure whose bus has disconnected sends no further frame, even if it was being cancelled at that moment.
+/// A procedure whose bus has failed sends no further frame, even if it was being cancelled at that moment.
 #[test]
 fn an_abandoned_update_sends_nothing() {
     for cancel_first in [false, true] {
@@ -108,7 +109,7 @@ fn an_abandoned_update_sends_nothing() {
         assert!(bench.sent()[sent..].iter().all(|t| t == "680#"), "{:?}", &bench.sent()[sent..]);
         assert!(!bench.master.is_busy());
     }
-    // Every other procedure ends with this error.
+    // A procedure other than an update or conformance tests ends with this error.
     let mut bench = initialised(&[0x21]);
     let id = bench.master.start(bench.now, Request::Scan).unwrap();
     bench.master.abandon(id, "the adapter is gone");
@@ -117,8 +118,8 @@ fn an_abandoned_update_sends_nothing() {
     assert!(error.to_string().contains("the adapter is gone"));
 }
 
-/// P-12: an update session that is cancelled before the erase ends with exit code 4. Boards that are done keep the new program; the other
-/// boards keep the old program.
+/// P-12: an update session that is cancelled before the erase ends with exit code 4. Boards whose update is done keep the new program; the
+/// other boards keep the old program.
 #[test]
 fn p12_a_cancelled_update_session() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -129,7 +130,7 @@ fn p12_a_cancelled_update_session() {
     assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
 }
 
-/// The user cancels while the new application starts. The board is verified, and the report shows this.
+/// The user cancels the update while the new application starts. The board is verified, and the report contains this.
 #[test]
 fn p12_cancelled_while_it_starts() {
     let mut bench = initialised(&[0x21]);
@@ -139,7 +140,7 @@ fn p12_cancelled_while_it_starts() {
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
     assert_eq!((report.boards[0].outcome, report.exit()), (left, 5));
     assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
-    // The application has been stopped again. If the board's answers are lost, its state is unknown, and the report states this.
+    // The update has stopped the application again. If the answers of the board are lost, its state is unknown, and the report states this.
     assert!(!bench.board(0).status().has(ucom::Status::MSTART));
     let mut bench = initialised(&[0x21]);
     let start = UpdateOptions { start: true, ..options(&[1], 128) };
@@ -180,7 +181,7 @@ fn a_board_that_is_up_to_date_is_started() {
     assert_eq!((update(&mut bench, all).exit(), bench.beginning("301#")), (0, sent));
 }
 
-/// A board that answers but does not enable programming is not reported as silent. The exit code is 1.
+/// The report does not call a board silent if the board answers but does not enable programming. The exit code of this update is 1.
 #[test]
 fn a_board_that_does_not_enable_programming_answers() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -191,7 +192,8 @@ fn a_board_that_does_not_enable_programming_answers() {
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::NotStarted, 1));
 }
 
-/// U-1 is checked before every attempt: a board that was replaced since the last attempt does not get XRESET or program data.
+/// U-1: the master checks the board before every attempt. A board that was replaced since the last attempt does not get XRESET or program
+/// data.
 #[test]
 fn u1_a_board_that_is_swapped_between_attempts() {
     let swapped = |resets, cancelled| if resets == 1 && cancelled { "4200" } else { "2100" };
@@ -201,14 +203,15 @@ fn u1_a_board_that_is_swapped_between_attempts() {
     let wrong = Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x21, found: 0x42 });
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::After(Box::new(wrong.clone()))));
     assert_eq!((bench.count("041#"), report.exit()), (1, 5), "{report:?}");
-    // The board is replaced at the moment of XRESET. The update is refused, the board leaves programming mode, and no memory is written.
+    // The board is replaced by another board at the moment of XRESET. The master refuses the update, the other board leaves programming
+    // mode, and no memory is written.
     let mut bench = loader(Loader { flash: |n, _| if n == 0 { "2100" } else { "4200" }, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
     assert_eq!((bench.beginning("2C1#"), bench.count("1C1#0400"), report.exit()), (0, 1, 4));
 }
 
-/// A single corrupted answer is not reported as another board.
+/// The master does not report a single corrupted answer as another board.
 #[test]
 fn one_damaged_answer_is_no_swapped_board() {
     let mut bench = initialised(&[0x21]);
@@ -227,7 +230,7 @@ fn one_damaged_answer_is_no_swapped_board() {
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
 }
 
-/// A board that becomes silent at XRESET. Another board takes the number when the master assigns the number again (5.4).
+/// Returns a board that becomes silent at XRESET. Another board takes the number when the master assigns the number again (5.4).
 fn impostor() -> impl Member {
     let (mut silent, mut other) = (false, false);
     Answering::new(move |frame| match frame {
@@ -249,7 +252,8 @@ fn impostor() -> impl Member {
     })
 }
 
-/// 5.4: another board took the number. The update is refused with exit code 4, no memory is written, and that board loses the number again.
+/// 5.4: another board took the number of the selected board. The master refuses the update with exit code 4, no memory is written, and the
+/// other board loses the number again.
 #[test]
 fn u4_repair_that_finds_another_board_is_refused() {
     let mut bench = Bench::new(Default::default(), vec![Box::new(impostor())]);
@@ -259,7 +263,7 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert_eq!((report.exit(), bench.beginning("2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
     assert_eq!(bench.count("1C1#0800"), 3);
-    // The pin is switched off before the number is assigned again (5.4).
+    // The master switches off the outgoing pin before it assigns the number again (5.4).
     let sent = bench.sent();
     let place = |text: &str| sent.iter().position(|t| t == text).unwrap();
     assert!(place("1C1#0200") < place("281#"));
@@ -280,14 +284,14 @@ fn d08_a_dry_run_looks_for_another_pc() {
     assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());
-    // Without another PC the dry run succeeds and does not send heartbeats.
+    // Without another PC on the bus, the dry run succeeds and does not send heartbeats.
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
     assert_eq!(update(&mut bench, dry).exit(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
 }
 
-/// A board already has the image, but is still in programming mode, for example after an update tool was killed. An update ends this mode.
-/// A dry run does not change any board.
+/// A board already has the image, but is still in programming mode, for example after an update tool was killed. An update ends the
+/// programming mode of this board. A dry run of the update does not change any board.
 #[test]
 fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let left = || {
@@ -310,7 +314,7 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..again });
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::UpToDate, 0));
     assert!(bench.board(0).status().has(Status::PROG));
-    // The board does not leave this mode, and the report contains the failure.
+    // The board does not leave programming mode, and the report contains this failure.
     let (mut bench, again) = left();
     bench.lose = vec![("< 1C1#", u32::MAX)];
     let report = update(&mut bench, again);
@@ -319,8 +323,8 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     assert_ne!(report.exit(), 0);
 }
 
-/// P-12: the update is cancelled, or the bus fails, at any time while such boards are read and their programming mode is ended. The report
-/// lists each board that is up to date but stays in programming mode.
+/// P-12: the update is cancelled, or the bus fails, at any time while the master reads boards in programming mode and ends this mode. The
+/// report lists each board that is up to date but stays in programming mode.
 #[test]
 fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
     let left = || {
@@ -352,7 +356,7 @@ fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
                     assert_eq!(code, Some("still-programming"), "after {after} µs: {result:?}");
                     named += 1;
                 } else {
-                    // The master had not read this board yet.
+                    // The master had not read this board before the update ended.
                     assert!(matches!(code, Some("cancelled" | "bus")), "after {after} µs: {result:?}");
                 }
             }

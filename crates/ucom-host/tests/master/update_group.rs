@@ -1,4 +1,4 @@
-//! Updates of several boards at once. The tests cover boards that take part, boards that must not take part, and the report of boards that
+//! Tests of updates of several boards at once. The tests cover boards of the group, boards outside the group, and the report of boards that
 //! missed a block.
 
 use super::bench::Exit;
@@ -17,7 +17,7 @@ fn group(boards: &[u8]) -> UpdateOptions {
     UpdateOptions { mode: UpdateMode::Group, keep_going: true, ..options(boards, 128) }
 }
 
-/// Returns the number of broadcast frames of PC_PROG.
+/// Returns the number of PC_PROG frames that were sent by broadcast.
 fn broadcasts(bench: &Bench) -> usize {
     bench.beginning("2C0#")
 }
@@ -46,12 +46,12 @@ fn d46_a_group_leaves_other_boards_alone() {
     }
 }
 
-/// A board that always keeps PROG = 1 and does not answer broadcast queries.
+/// Returns a board that always keeps PROG = 1 and does not answer broadcast queries.
 fn stubborn() -> impl Member {
     Answering::new(|frame| if frame == "209#" { &["149#7700091F34126E38", "149#0000"] } else { &[] })
 }
 
-/// D-46: a board outside the group stays in programming mode. The update is refused before any frame is sent to the group.
+/// D-46: a board outside the group stays in programming mode. The master refuses the update before it sends any frame to the group.
 #[test]
 fn d46_a_group_is_refused_while_another_board_listens() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -65,7 +65,7 @@ fn d46_a_group_is_refused_while_another_board_listens() {
     assert_eq!((check_program(&mut bench, 0, 128), check_program(&mut bench, 1, 128)), (OLD, OLD));
 }
 
-/// D-42: the first frame of a block is sent only after every selected board has answered the previous block.
+/// D-42: the master sends the first frame of a block only after every selected board has answered the previous block.
 #[test]
 fn d42_a_group_waits_for_every_board() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -106,10 +106,11 @@ fn a_silent_board_that_may_listen_ends_the_broadcast() {
     assert_eq!(check_program(&mut bench, 2, 128), OLD);
 }
 
-/// A board whose READY is lost is removed from the group. The master then reads the board to determine if it accepted the later blocks.
+/// A board whose DSP_READY is lost is removed from the group. The master then reads the board to determine if the board accepted the later
+/// blocks.
 #[test]
 fn a_board_that_fell_behind_is_asked() {
-    // In cycles 1 and 2, the board accepted the blocks like the other boards and is done, so no block is sent again.
+    // In cycles 1 and 2, the board accepted the blocks like the other boards, so its update is done and no block is sent again.
     for block in [0, 2, 3, 5] {
         let mut bench = initialised(&[0x21, 0x42]);
         let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
@@ -121,8 +122,8 @@ fn a_board_that_fell_behind_is_asked() {
     }
 }
 
-/// A board was removed from the group before the erase, and has been silent since then. The board may be erased, so its outcome is
-/// `unknown` and the exit code is 5.
+/// A board was removed from the group before the erase, and has been silent since then. The memory of this board may be erased, so its
+/// outcome is `unknown` and the exit code is 5.
 #[test]
 fn a_board_that_was_lost_in_a_group_may_be_erased() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -150,9 +151,9 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     assert_eq!(check_program(&mut bench, 1, 128), OLD);
 }
 
-/// D-43: after an error code of its CAN controller or of its start, or after an unknown code, a board still accepts
-/// blocks. The board is erased together with the other boards. If the answers of the board are lost, the report states this. If the answers
-/// arrive, the master reads the board, which shows the program.
+/// D-43: after an error code of its CAN controller or of its start, or after an unknown code, a board still accepts blocks. The memory of
+/// this board is erased together with the memory of the other boards. If the answers of the board are lost, the report states this. If the
+/// answers of the board arrive, the master reads the board, which reports the program.
 #[test]
 fn d43_not_every_error_ends_a_transfer() {
     for code in ["06", "08", "09", "0B", "2A"] {
@@ -173,8 +174,8 @@ fn d43_not_every_error_ends_a_transfer() {
     }
 }
 
-/// U-3 with `force`: a board that was removed from the group already had this program before. Therefore the answer of the board does not
-/// prove that the program was written.
+/// U-3 with `force`: a board that was removed from the group already had this program before. Therefore the answer of this board does not
+/// prove that the update wrote the program.
 #[test]
 fn u3_what_was_there_before_proves_nothing() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -202,8 +203,8 @@ fn p12_a_cancel_reaches_every_board_of_the_group() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
     bench.until(|b| b.count("043#") > 0);
-    // Board 3 accepts blocks but does not send frames. Therefore the master sends no broadcast and updates the boards one by one. Board 2
-    // waits with PROG = 1.
+    // Board 3 accepts blocks, but its answers to PC_INFO do not arrive. Therefore the master sends no broadcast and updates the boards one
+    // by one. Board 2 waits for its update with PROG = 1.
     bench.lose = vec![("> 143#", u32::MAX)];
     bench.until(|b| b.beginning("2C1#") >= 4);
     assert!(bench.board(1).status().has(ucom::Status::PROG));
@@ -213,7 +214,7 @@ fn p12_a_cancel_reaches_every_board_of_the_group() {
     assert!(!bench.board(1).status().has(ucom::Status::PROG), "{report:?}");
 }
 
-/// Without a broadcast number a group is updated one by one.
+/// Without a broadcast number, the master updates a group one by one.
 #[test]
 fn d04_no_broadcast_no_group() {
     let profile = Profile { addr_broadcast: ucom::profile::Broadcast::None, ..Profile::default() };

@@ -1,5 +1,5 @@
-//! Conditions under which a board is up to date (D-62, U-3): the board's answer together with the flash record, and cases that neither of
-//! the two covers.
+//! Tests of the conditions under which a board is up to date (D-62, U-3). These conditions depend on the board's answer together with the
+//! flash record. Some tests cover cases for which the answer and the record are not enough.
 
 use super::bench::{Bench, Exit};
 use super::chain::initialised;
@@ -9,12 +9,12 @@ use ucom::{Memory, Profile, Status};
 use ucom_host::master::update::{UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
 use ucom_host::master::{Event, InitOptions, Request};
 
-/// Returns the number of frames of program data, to one board or to all boards.
+/// Returns the number of frames with program data, to one board or to all boards.
 fn data_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| matches!(f.to_string().get(..3), Some("2C0" | "2C1" | "2C2"))).count()
 }
 
-/// Returns a chain of two boards that have the image of `options`, and the options with the records of these boards.
+/// Returns a chain of two boards that have the image of `options`, and the options with the flash records of these boards.
 fn written() -> (Bench, UpdateOptions) {
     let mut bench = initialised(&[0x21, 0x42]);
     let options = UpdateOptions { keep_going: true, ..options(&[1, 2], 128) };
@@ -23,7 +23,7 @@ fn written() -> (Bench, UpdateOptions) {
     (bench, recorded(options, &report))
 }
 
-/// Returns the outcome and the verification of each board, the exit code, and `true` if program data were sent.
+/// Runs the update again. Returns the outcome and the verification of each board, the exit code, and `true` if program data were sent.
 fn again(bench: &mut Bench, options: UpdateOptions) -> (Vec<(&'static str, bool)>, u8, bool) {
     let before = data_frames(bench);
     let report = update(bench, options);
@@ -35,8 +35,8 @@ fn both(outcome: &'static str, verified: bool) -> Vec<(&'static str, bool)> {
     vec![(outcome, verified); 2]
 }
 
-/// D-62: the board's answer is not enough; the flash record is also needed. Tests ten differences between record and image, one by one and
-/// as a group.
+/// D-62: the board's answer is not enough; the flash record is also needed. The test covers ten cases in which a board is not up to date,
+/// with updates one by one and as a group.
 #[test]
 fn d62_the_flash_record_decides() {
     type Change = fn(&mut UpdateOptions);
@@ -70,21 +70,21 @@ fn d62_the_flash_record_decides() {
             let expected = if is_sent { both("verified", true) } else { both("program-up-to-date", false) };
             assert_eq!((boards, code), (expected, if is_sent { 0 } else { 4 }), "{name} {mode:?}");
         }
-        // If image and address are equal to those in the record, the board is up to date.
+        // If image and address are equal to the image and address in the flash record, the board is up to date.
         let (mut bench, mut options) = written();
         options.mode = mode;
         assert_eq!(again(&mut bench, options), (both("up-to-date", true), 0, false), "{mode:?}");
     }
 }
 
-/// D-62: a program that was never verified is not reported as verified, even if the user accepts it.
+/// D-62: the report does not call a program verified if it was never verified, even if the user accepts the program.
 #[test]
 fn d62_an_accepted_program_is_not_verified() {
     let (mut bench, options) = written();
     let unknown = UpdateOptions { records: Default::default(), ..options };
     let accepted = UpdateOptions { accept_unverified: true, ..unknown.clone() };
     assert_eq!(again(&mut bench, accepted.clone()), (both("program-up-to-date", false), 0, false));
-    // The application is started only if the user accepts the program.
+    // The master starts the application only if the user accepts the program.
     let start = UpdateOptions { start: true, ..unknown };
     assert_eq!(again(&mut bench, start), (both("program-up-to-date", false), 4, false));
     assert!(!bench.board(0).status().has(Status::MSTART));
@@ -100,7 +100,8 @@ fn d62_an_accepted_program_is_not_verified() {
     assert_eq!((boards, code), (vec![("program-up-to-date", false)], 5));
 }
 
-/// D-62: the Program ID covers program memory only. Another image for data memory is written in each update, even if records exist.
+/// D-62: the Program ID of a board covers program memory only. Every update writes a second image, for data memory, again, even if flash
+/// records exist.
 #[test]
 fn d62_data_memory_is_written_each_time() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };
@@ -129,7 +130,7 @@ fn u3_another_date_is_up_to_date() {
     let words = report.outcome_words(&report.boards[0], &Profile::default());
     assert_eq!(words, "up-to-date (flashed 2009-06-01)");
     assert_eq!(again(&mut bench, today(options.clone())), (both("up-to-date", true), 0, false));
-    // Without a record, a matching date does not prove the image.
+    // Without a flash record, a matching date does not prove the image.
     let unknown = UpdateOptions { records: Default::default(), ..today(options.clone()) };
     assert_eq!(again(&mut bench, unknown.clone()), (both("program-up-to-date", false), 4, false));
     let report = update(&mut bench, unknown);
@@ -138,14 +139,13 @@ fn u3_another_date_is_up_to_date() {
         words.as_deref(),
         Some("same Program ID, flashed 2009-06-01; content and address not verified")
     );
-    // The program with the required date is written.
+    // The update writes the program with the date that the user requires.
     let asked = UpdateOptions { any_date: false, ..today(options) };
     assert_eq!(again(&mut bench, asked), (both("verified", true), 0, true));
     assert_eq!(bench.board(0).record().map(|r| r.date), Some(DATE + 1));
 }
 
-/// D-62: the record is removed before a board is reset for programming, and stored again after the board has been
-/// read back.
+/// D-62: the flash record is removed before a board is reset for programming, and stored again after the board has been read back.
 #[test]
 fn d62_the_record_ends_before_anything_is_erased() {
     let mut bench = initialised(&[0x21]);

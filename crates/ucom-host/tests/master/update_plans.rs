@@ -1,5 +1,5 @@
-//! Updates with unusual plans and headers. The tests cover the memories that each cycle may erase, the updates that can be verified, and
-//! the report of other updates.
+//! Tests of updates with unusual plans and headers. The tests cover the memories that each cycle may erase, the updates that can be
+//! verified, and the report of updates that cannot be verified.
 
 use super::bench::Exit;
 use ucom::profile::{HeaderForm, Plan};
@@ -17,15 +17,15 @@ fn with_plan(prog_plan: Plan) -> Profile {
     Profile { prog_plan, ..Profile::default() }
 }
 
-/// An image of 16 data blocks, and a second image of 64 bytes if the plan requires a second image.
+/// Returns options with an image of 16 data blocks, and with a second image of 64 bytes if the plan requires it.
 fn two(plan: Plan) -> UpdateOptions {
     let second = UpdateImage { bytes: [9; 64].into(), address_words: 0x20 };
     let second = (plan != Plan::VerifyWrite).then_some(second);
     UpdateOptions { second, ..options(&[1], 1000) }
 }
 
-/// Exit codes of each plan: 1 or 3 before an erase, 5 after an erase. Only `verify-write` and `exloader-app` do not change flash in their
-/// first cycle.
+/// The test compares the exit codes of each plan: 1 or 3 before an erase, 5 after an erase. Only the plans `verify-write` and
+/// `exloader-app` do not change flash in their first cycle.
 #[test]
 fn d40_what_the_first_cycle_may_have_erased() {
     let cases = [
@@ -49,8 +49,8 @@ fn d40_what_the_first_cycle_may_have_erased() {
             assert_eq!(report.exit(), if erased { 5 } else { before }, "{plan}: {report:?}");
             assert_eq!(report.boards[0].outcome, left, "{plan}: {report:?}");
         }
-        // Error 3 comes after block 16 of the attempt, counted from 0. With `verify-write` this is the last block of cycle 1; with the
-        // other plans it is after an erase.
+        // The board sends error 3 after block 16 of the attempt, counted from 0. With `verify-write`, block 16 is the last block of cycle
+        // 1; with the other plans, it comes after an erase.
         let board = Loader { special: |_, block| (block == 16).then_some("081#03"), ..Loader::new(blocks) };
         let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
         let expected = if plan == Plan::VerifyWrite { 1 } else { 5 };
@@ -58,7 +58,7 @@ fn d40_what_the_first_cycle_may_have_erased() {
     }
 }
 
-/// Each of the two images is written to its memory. The report contains address, length and Program ID of each image.
+/// The update writes each of the two images to its memory. The report contains address, length and Program ID of each image.
 #[test]
 fn d40_two_images_reach_two_memories() {
     for (plan, memory) in [(Plan::ExloaderApp, Memory::Ram), (Plan::PmemXmem, Memory::Data)] {
@@ -79,28 +79,28 @@ fn d40_two_images_reach_two_memories() {
     }
 }
 
-/// Runs an update with the plan `raw`. At the end, the board reports `after` and `done_status`.
+/// Runs an update with the plan `raw`. At the end of the update, the board reports `after` and `done_status`.
 fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> UpdateReport {
     let board = Loader { info: ["34126E38", after], done_status, ..Loader::new(32) };
     let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);
     update(&mut bench, UpdateOptions { expect_program_id, ..options(&[1], 1000) })
 }
 
-/// U-10: with this plan the image's Program ID is unknown. The outcome is never `verified`, and the update is done
-/// only when the board reports an application. The report contains the reason, a method to verify the program, and the board's answers
-/// before and after the update.
+/// U-10: with the plan `raw`, the image's Program ID is unknown. The outcome is never `verified`, and the update is done only when the
+/// board reports an application. The report contains the reason, a method to verify the program, and the board's answers before and after
+/// the update.
 #[test]
 fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
     let board = &report.boards[0];
     assert_eq!((board.outcome, &board.failure, report.exit()), (UpdateOutcome::Written, &None, 5));
-    // For a user who accepts unverified programs, the exit code is 0.
+    // If the user accepts unverified programs, the exit code is 0.
     assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit(), 0);
     assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
     let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
     assert_eq!(shown, [Some(OLD), Some((0x4B3F, 0x3AC1))]);
-    // The board's report is not enough if the board has no application, or if an application runs.
+    // The final message of the board is not enough if the board has no application, or if an application runs.
     for (after, status) in [("FFFFFFFF", 0x1B), ("3F4BC13A", 0x8B)] {
         let report = raw(after, status, None);
         let failure = report.boards[0].failure.clone();
@@ -109,7 +109,8 @@ fn u10_what_cannot_be_verified_says_so() {
     }
 }
 
-/// U-10: the user gives a Program ID. The board is verified with this Program ID, and an image with another Program ID is refused.
+/// U-10: the user gives a Program ID for the image. The update verifies the board with this Program ID, and refuses an image with another
+/// Program ID.
 #[test]
 fn u10_a_named_program_id_is_verified() {
     let report = raw("3F4BC13A", 0x1B, Some(0x4B3F));
@@ -121,7 +122,7 @@ fn u10_a_named_program_id_is_verified() {
         Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
     ));
     assert_eq!(report.exit(), 5);
-    // The board already has the program (U-3). Only its answer shows this (D-62).
+    // The board already has the program of the image (U-3). Only the answer of the board shows this (D-62).
     let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::ProgramUpToDate, 0));
     // If the Program ID of an image is known, it must equal the Program ID that the user gives.
@@ -134,7 +135,8 @@ fn u10_a_named_program_id_is_verified() {
     assert_eq!(update(&mut bench, same).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-9 needs an expected Program ID. Without this ID, an update with a lost DSP_PROGFINISHED is not reported as a success.
+/// U-9: a lost DSP_PROGFINISHED can be replaced only if the expected Program ID is known. Without an expected Program ID, an update with a
+/// lost DSP_PROGFINISHED is not reported as a success.
 #[test]
 fn u9_not_where_nothing_is_expected() {
     let board = Loader { special: |_, block| (block == 31).then_some(""), ..Loader::new(32) };
@@ -143,7 +145,7 @@ fn u9_not_where_nothing_is_expected() {
     assert_eq!((report.exit(), report.boards[0].attempts), (5, 3), "{report:?}");
 }
 
-/// Boards of this crate that have no checksums or no headers are written and started, and are reported as unverified.
+/// Boards of the crate `ucom` that use no checksums or no headers are written and started, and the report calls them unverified.
 #[test]
 fn boards_without_checksum_or_header() {
     let none = Profile { prog_checksum: Checksum::None, ..Profile::default() };

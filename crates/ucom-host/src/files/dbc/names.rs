@@ -1,4 +1,4 @@
-//! Names of signals: unique C identifiers of at most 32 characters, which are made from free texts.
+//! Names of signals in a DBC file: unique C identifiers of at most 32 characters, which are made from free texts.
 
 use std::collections::BTreeSet;
 /// Maximum length of a name that all readers of DBC files accept.
@@ -12,7 +12,7 @@ const RESERVED: [&str; 44] = [
     "BU_", "CM_", "BA_", "VAL_", "EV_", "NS_", "BS_", "VERSION", "inline", "restrict",
 ];
 
-/// Set of names, which assigns a unique name to each text.
+/// Set of names that assigns a unique name to each text.
 #[derive(Default)]
 pub(super) struct Names {
     used: BTreeSet<String>,
@@ -24,7 +24,7 @@ impl Names {
         Self { used: taken.iter().map(|name| name.to_ascii_lowercase()).collect() }
     }
 
-    /// Returns the name for a text. If the text has no letter or digit, the name is made from `fallback`.
+    /// Returns the unique name for a text. If the text has no letter or digit, the name is made from `fallback`.
     pub(super) fn name(&mut self, text: &str, fallback: &str) -> String {
         let mut base = identifier(text);
         if base.is_empty() {
@@ -33,7 +33,7 @@ impl Names {
         base.truncate(MAX);
         let mut name = base.clone();
         let mut number = 2_u32;
-        // Readers may ignore letter case, so names must differ by more than letter case.
+        // Some readers ignore the letter case, so two names must differ by more than the letter case.
         while !self.used.insert(name.to_ascii_lowercase()) {
             let suffix = format!("_{number}");
             name = base.chars().take(MAX - suffix.len()).collect::<String>() + &suffix;
@@ -43,7 +43,7 @@ impl Names {
     }
 }
 
-/// Returns the text reduced to letters, digits and underscores; an umlaut becomes two letters. The result can be empty.
+/// Reduces a text to letters, digits and underscores; an umlaut becomes two letters. The resulting identifier can be empty.
 fn identifier(text: &str) -> String {
     let mut name = String::new();
     for c in text.chars() {

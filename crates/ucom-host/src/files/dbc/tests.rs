@@ -1,4 +1,5 @@
-//! Tests with the crate `can-dbc`. The crate reads the DBC files, and the tests decode frames with the parsed files.
+//! Tests of the DBC files with the crate `can-dbc`. The crate `can-dbc` reads the DBC files, and the tests decode frames with the parsed
+//! files.
 
 use can_dbc::{ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, ValueType};
 use std::panic;
@@ -45,7 +46,7 @@ fn value(signal: &Signal, data: &[u8]) -> i64 {
     raw
 }
 
-/// Returns the decoded signals of a frame. Multiplexed signals are included only if the frame contains them.
+/// Returns the decoded signals in a frame. The result contains a multiplexed signal only if the frame contains the signal.
 fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     let message = message(dbc, frame.id());
     let data = frame.payload().padded();
@@ -60,7 +61,7 @@ fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     message.signals.iter().filter(applies).map(|s| (s.name.clone(), value(s, &data))).collect()
 }
 
-/// P-21: process data have the names in the description. The values are equal in both byte orders.
+/// P-21: process data in a DBC file have the names in the board's description. The decoded values are equal in both byte orders.
 #[test]
 fn p21_so_frames_decode_by_name() {
     let numbers = [100_i16, -20, 32767, -32768, 5];
@@ -107,7 +108,7 @@ fn d11_signals_carry_scale_offset_and_unit() {
     assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
-/// Limits are written without the digits that floating-point arithmetic adds.
+/// The file contains limits without the digits that floating-point arithmetic adds.
 #[test]
 fn d11_ranges_of_signals_are_short() {
     let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\
@@ -152,7 +153,8 @@ fn every_message_has_a_name_and_an_identifier_of_its_own() {
     ids.sort_by_key(|id| id.raw());
     ids.dedup();
     assert_eq!((names.len(), ids.len()), (count, count));
-    // Number of messages: 24 functions for each of two boards, 128 reports, and 11 for the broadcasts and the error without a board number.
+    // Expected number of messages: 24 functions for each of two boards, 128 reports, and 11 for the broadcasts and the error without a
+    // board number.
     assert_eq!(count, 2 * 24 + 128 + 11);
 }
 

@@ -1,16 +1,17 @@
-//! Detects the format of a file if no format option is set. Intel HEX and S-records are detected by their first line; other content is
-//! accepted as raw bytes only if it cannot be text.
+//! Detects the format of an image file if no format option is set. Intel HEX and S-records are detected by their first line; other content
+//! is accepted as raw bytes only if it cannot be text.
 //!
-//! If the reader accepted a text as raw bytes, the text would be flashed and reported as verified, and the board would no longer have a program.
-//! Therefore raw bytes are only read from a `.bin` file without printable text. With the option for raw bytes, the reader also accepts
-//! files with other names, and text in a `.bin` file. Records are never read as raw bytes, even if they are damaged.
+//! If the reader accepted a text as raw bytes, an update would write the text to the board and report it as verified. The board would then
+//! have no program. Therefore the reader reads raw bytes only from a `.bin` file without printable text. With the option for raw bytes, the
+//! reader also accepts files with other names, and text in a `.bin` file. The reader never reads records as raw bytes, even if the records
+//! are damaged.
 
 use super::{Format, ImageError, segments::lines};
 use std::path::Path;
 
-/// Minimum percentage of printable bytes in a text.
+/// Minimum percentage of printable bytes in content that is treated as a text.
 const TEXT_PERCENT: usize = 90;
-/// Minimum percentage of hexadecimal digits in a line that is treated as a complete or damaged record.
+/// Minimum percentage of hexadecimal digits in a line that the reader considers to be a complete or damaged record.
 const HEX_PERCENT: usize = 80;
 const MARKED_PERCENT: usize = 50;
 /// Number of characters of a text that an error message shows.
@@ -21,12 +22,13 @@ const MARKS: [(&[u8], &str); 3] =
     [(b"\xEF\xBB\xBF", "UTF-8"), (b"\xFF\xFE", "UTF-16"), (b"\xFE\xFF", "UTF-16")];
 
 impl Format {
-    /// Detects the format by content. The first line that is a record determines the format; content without records is raw bytes.
+    /// Detects the format of an image file by its content. The first line that is a record determines the format; content without records
+    /// is raw bytes.
     pub fn detect(content: &[u8]) -> Self {
         record_form(content).unwrap_or(Self::Bin)
     }
 
-    /// Returns the format of a file if no option sets it. Only a `.bin` file can be raw bytes; a text is never raw bytes.
+    /// Returns the format of a file if no option sets it. Only the content of a `.bin` file can be raw bytes; a text is never raw bytes.
     pub(super) fn of(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         let by_name = extension(name);
         let expected = by_name.as_deref().and_then(Self::by_extension);
@@ -54,7 +56,8 @@ impl Format {
         }
     }
 
-    /// Checks a file that an option declares as raw bytes. Executables and records are refused; text is accepted only from a `.bin` file.
+    /// Checks a file that an option declares as raw bytes. The check refuses executables and records, and accepts a text only from a `.bin`
+    /// file.
     pub(super) fn raw(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         if content.starts_with(b"\x7fELF") {
             return Err(ImageError::Elf);
@@ -74,7 +77,7 @@ impl Format {
         }
     }
 
-    /// Returns the format of files with this extension.
+    /// Returns the format of image files with this extension.
     fn by_extension(extension: &str) -> Option<Self> {
         match extension {
             "hex" | "ihex" | "ihx" | "h86" => Some(Self::IntelHex),
@@ -89,7 +92,7 @@ fn extension(name: Option<&Path>) -> Option<String> {
 }
 
 /// Returns the line number, as text, of the first complete or damaged record. The content may be a text in any encoding, with missing or
-/// damaged characters. Returns `None` if the content is not a text, or has no such line.
+/// damaged characters. The function returns `None` if the content is not a text, or if it has no such line.
 fn record_place(content: &[u8]) -> Option<String> {
     // Removes bytes that are not letters: zeros of two-byte encodings, padding, and end marks of old systems.
     let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
@@ -102,7 +105,7 @@ fn record_place(content: &[u8]) -> Option<String> {
 }
 
 /// Returns `true` if the line has at least 8 hexadecimal digits, as the shortest records do, and hardly any other characters. If the line
-/// starts with the mark of a record, it is enough if half of the characters are hexadecimal digits.
+/// starts with the mark of a record, it is enough if half of its characters are hexadecimal digits.
 fn was_record(line: &[u8]) -> bool {
     let digits = line.iter().filter(|b| b.is_ascii_hexdigit()).count();
     let percent = match line {
@@ -112,7 +115,7 @@ fn was_record(line: &[u8]) -> bool {
     digits >= 8 && digits * 100 >= line.len() * percent
 }
 
-/// Returns the format of the first line that is a record. Lines before this record are ignored.
+/// Returns the record format of the first line that is a record. The function ignores the lines before this record.
 fn record_form(content: &[u8]) -> Option<Format> {
     let hex = |digits: &[u8]| digits.len() >= 8 && digits.iter().all(u8::is_ascii_hexdigit);
     let line = |line: &[u8]| {
@@ -133,7 +136,7 @@ fn is_text(content: &[u8]) -> bool {
     if share(content.iter().filter(printed).count(), content.len()) {
         return true;
     }
-    // In UTF-8, letters beyond ASCII are allowed; control characters are not.
+    // In UTF-8, letters beyond ASCII are allowed, but control characters are not.
     let odd = |c: char| c.is_control() && !c.is_ascii_whitespace();
     if core::str::from_utf8(content).is_ok_and(|text| !text.is_empty() && !text.contains(odd)) {
         return true;
@@ -146,7 +149,7 @@ fn is_text(content: &[u8]) -> bool {
     content.len() >= 8 && (wide(0) || wide(1))
 }
 
-/// Returns the beginning of a text.
+/// Returns the beginning of a text, for an error message.
 fn start(content: &[u8]) -> String {
     let text = String::from_utf8_lossy(content);
     let shown: String = text.chars().filter(|c| !c.is_control() || *c == ' ').take(SHOWN).collect();

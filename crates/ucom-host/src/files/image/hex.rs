@@ -1,10 +1,10 @@
-//! Intel HEX. A record is `:`, length, address, type, data, checksum.
+//! Reads Intel HEX files. A record of Intel HEX consists of `:`, length, address, type, data and checksum.
 use super::segments::{Segments, hex_bytes, lines};
 use super::{Format, ImageError, LineProblem};
 
 pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageError> {
     let mut base = 0_u64;
-    // With 8086 segment addresses, the offset wraps at 64 KiB. With linear addresses, it does not wrap.
+    // With 8086 segment addresses, the offset wraps at 64 KiB. With linear addresses, the offset does not wrap.
     let mut wraps = false;
     let mut ended = false;
     let mut last = 0;
@@ -43,7 +43,7 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             (1, []) => ended = true,
             (2, [high, low]) => (base, wraps) = (u64::from(u16::from_be_bytes([*high, *low])) << 4, true),
             (4, [high, low]) => (base, wraps) = (u64::from(u16::from_be_bytes([*high, *low])) << 16, false),
-            // Start addresses are ignored, because the loader uses its own start address.
+            // The reader ignores start addresses, because the loader uses its own start address.
             (3 | 5, [_, _, _, _]) => {}
             (1..=5, data) => {
                 let declared = match kind {

@@ -1,9 +1,9 @@
-//! Data of records, sorted by address.
+//! Collects the data of records, sorted by address.
 
 use super::{AddressUnit, Gaps, ImageError, ImageNote, LineProblem};
 use std::collections::BTreeMap;
 
-/// Segments of bytes, sorted by byte address. Bytes that are added directly after a segment extend it.
+/// Segments of bytes, sorted by byte address. If bytes are added directly after a segment, they extend this segment.
 pub(super) struct Segments {
     unit: AddressUnit,
     limit: usize,
@@ -16,7 +16,7 @@ impl Segments {
         Self { unit, limit, runs: BTreeMap::new(), records: 0 }
     }
 
-    /// Adds the data of one record; `address` is in the file's unit.
+    /// Adds the data of one record; `address` is in the unit of the file's addresses.
     pub(super) fn add(&mut self, address: u64, data: &[u8]) -> Result<(), LineProblem> {
         if data.is_empty() {
             return Ok(());
@@ -35,7 +35,7 @@ impl Segments {
         }
         let mut rest = data;
         let mut at = start;
-        // Data that overlap earlier data must be equal to the earlier data.
+        // Data that overlap earlier data must have the same values as the earlier data.
         let covering: Vec<u64> = self.covering(start, end);
         for run_start in covering {
             let Some(run) = self.runs.get(&run_start) else { continue };
@@ -60,12 +60,12 @@ impl Segments {
         Ok(())
     }
 
-    /// Returns the number of records with data so far.
+    /// Returns the number of records with data that were added so far.
     pub(super) fn records(&self) -> usize {
         self.records
     }
 
-    /// Returns the starts of the segments that overlap `start..end`.
+    /// Returns the start addresses of the segments that overlap `start..end`.
     fn covering(&self, start: u64, end: u64) -> Vec<u64> {
         let before = self.runs.range(..start).next_back();
         let before = before.filter(|(a, run)| *a + run.len() as u64 > start).map(|(a, _)| *a);
@@ -86,7 +86,7 @@ impl Segments {
         self.runs.insert(at, bytes.to_vec());
     }
 
-    /// Joins all segments. Returns the load address and the bytes.
+    /// Joins all segments to one image. The function returns the load address and the bytes of the image.
     pub(super) fn join(self, gaps: Gaps, notes: &mut Vec<ImageNote>) -> Result<(u32, Vec<u8>), ImageError> {
         let Some((&first, _)) = self.runs.first_key_value() else { return Err(ImageError::Empty) };
         let words = |byte: u64| u32::try_from(byte / 2);
@@ -113,7 +113,7 @@ impl Segments {
     }
 }
 
-/// Reads two hexadecimal digits per byte. An error contains the column of the digit, counted from 0.
+/// Converts pairs of hexadecimal digits to bytes. The error contains the column of the invalid or missing digit, counted from 0.
 pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> {
     if let Some(i) = digits.iter().position(|d| !d.is_ascii_hexdigit()) {
         return Err((i, LineProblem::Digit));
@@ -125,7 +125,8 @@ pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> 
     Ok(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
 }
 
-/// Returns the lines with their numbers from 1, without line ends and surrounding blanks. Empty lines are omitted.
+/// Returns the lines of a text with their numbers from 1, without line ends and surrounding blanks. The result does not contain empty
+/// lines.
 pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
     let lines = content.split(|b| *b == b'\n').enumerate();
     lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())

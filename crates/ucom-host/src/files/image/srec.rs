@@ -1,8 +1,9 @@
-//! Motorola S-records. A record is `S`, type, length, address, data, checksum.
+//! Reads Motorola S-record files. An S-record consists of `S`, type, length, address, data and checksum.
 use super::segments::{Segments, hex_bytes, lines};
 use super::{Format, ImageError, ImageNote, LineProblem};
 
-/// Reads the records. Some tools do not write an end record. In this case, a count record at the end shows that the file is complete.
+/// Reads the S-records of a file. Some tools do not write an end record. Without an end record, a count record at the end shows that the
+/// file is complete.
 pub(super) fn read(
     content: &[u8],
     segments: &mut Segments,
@@ -22,7 +23,7 @@ pub(super) fn read(
         }
         let kind = kind - b'0';
         let bytes = hex_bytes(digits).map_err(|(column, problem)| at(column + 2, problem))?;
-        // The declared length includes address, data and checksum.
+        // The declared length of a record includes address, data and checksum.
         let (declared, has) = (usize::from(*bytes.first().unwrap_or(&0)), bytes.len().saturating_sub(1));
         if declared != has || has == 0 {
             return Err(at(2, LineProblem::Length { declared, has }));

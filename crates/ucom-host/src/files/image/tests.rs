@@ -1,4 +1,4 @@
-//! Tests with records from the published examples of the formats, and with encoders that this file implements from the rules of the
+//! Tests with records from the published examples of the file formats, and with encoders that this file implements from the rules of the
 //! formats.
 
 use proptest::prelude::*;
@@ -40,7 +40,7 @@ fn s_line(kind: u8, width: usize, address: u32, data: &[u8]) -> String {
 
 #[test]
 fn intel_hex_as_published() {
-    // The example on the format's Wikipedia page. The addresses in this example count bytes.
+    // The text is the example on the format's Wikipedia page. The addresses in this example count bytes.
     let text = ":10010000214601360121470136007EFE09D2190140\n\
                 :100110002146017E17C20001FF5F16002148011928\n\
                 :10012000194E79234623965778239EDA3F01B2CAA7\n\
@@ -54,8 +54,8 @@ fn intel_hex_as_published() {
 
 #[test]
 fn s_records_as_published_count_words_here() {
-    // The example on the format's manual page, completed. The records have no gap if their addresses count bytes, and one gap if they count
-    // words.
+    // The text is the completed example on the format's manual page. The records of the example have no gap if their addresses count bytes,
+    // and one gap if they count words.
     let text = "S00F000068656C6C6F202020202000003C\n\
                 S11F00007C0802A6900100049421FFF07C6C1B787C8C23783C6000003863000026\n\
                 S11F001C4BFFFFE5398000007D83637880010014382100107C0803A64E800020E9\n\
@@ -75,8 +75,8 @@ fn s_records_as_published_count_words_here() {
     );
 }
 
-/// Records that follow one another in only one unit show the unit of the addresses. A file with only one or two records does not show the
-/// unit.
+/// Records that follow one another in only one unit show which unit the addresses have. A file with only one or two records does not show
+/// the unit of its addresses.
 #[test]
 fn the_unit_of_addresses_is_taken_from_the_records() {
     let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
@@ -95,15 +95,15 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
     let in_bytes = read(&file(4, 16, 16)).unwrap();
     let note = ImageNote::AddressesCount(AddressUnit::Byte);
     assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
-    // The gap may be intended, or the unit may differ. The reader does not guess.
+    // The gap between the records may be intended, or the addresses may have another unit. The reader does not guess.
     let other = |text: &str| match read(text) {
         Err(ImageError::OtherUnit { error, unit: AddressUnit::Byte }) => error.to_string(),
         other => panic!("{other:?}"),
     };
     assert_eq!(other(&file(2, 16, 16)), "no record contains the 16 bytes at word address 0x108");
-    // A table of vectors: two words, then a gap of two words.
+    // The file is a table of interrupt vectors: two words, then a gap of two words.
     assert_eq!(other(&file(16, 4, 4)), "no record contains the 4 bytes at word address 0x102");
-    // Intel HEX file with addresses that count words. If the reader interprets these addresses as byte addresses, the data overlap.
+    // The addresses of this Intel HEX file count words. If the reader interprets these addresses as byte addresses, the data overlap.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";
     let note = ImageNote::AddressesCount(AddressUnit::Word);
@@ -150,12 +150,12 @@ fn raw_bytes_are_whole_words() {
     assert_eq!((image.bytes(), image.address_words()), (&[2, 1, 4, 3][..], 7));
     let options = ImageOptions { load_address_words: Some(u32::MAX), ..Default::default() };
     assert!(matches!(Image::parse(&[1, 2], &options), Err(ImageError::AddressRange { .. })));
-    // Records are not read as raw bytes, even on request.
+    // The reader does not read records as raw bytes, even on request.
     let forced = ImageOptions { format: Some(Format::Bin), ..Default::default() };
     assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
-/// A text with any name is never read as raw bytes. The error contains the position of the record.
+/// Without a format option, the reader refuses a text in a file with any name. An error in a record contains the position of the record.
 #[test]
 fn a_text_is_no_image() {
     let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
@@ -191,7 +191,7 @@ fn a_text_is_no_image() {
             assert!(read(name, text).is_err(), "{name}: {text:?}");
         }
     }
-    // The name belongs to an S-record file, so the first error in its records is reported.
+    // The file name belongs to an S-record file, so the reader reports the first error in the records.
     assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
     assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
     let bytes: Vec<u8> = (0..=255).collect();
@@ -201,7 +201,7 @@ fn a_text_is_no_image() {
     }
 }
 
-/// A count record ends a file of S-records if its number is correct and it is the last record.
+/// A count record ends a file of S-records if its number of data records is correct and no record follows it.
 #[test]
 fn a_count_record_ends_a_file() {
     let data: Vec<String> = (0..4).map(|i| s_line(1, 2, i * 8, &[i as u8 + 1; 16])).collect();
@@ -217,7 +217,7 @@ fn a_count_record_ends_a_file() {
             let problem = problem(&(whole.clone() + &count(kind, wrong))).2;
             assert_eq!(problem, LineProblem::Count { declared: wrong, has: 4 });
         }
-        // If a record follows the count record, and the end record is missing, the file is not complete.
+        // If a record follows the count record and the end record is missing, the file is not complete.
         for more in [s_line(1, 2, 32, &[9; 16]), s_line(0, 2, 0, b"name")] {
             let cut = parse(&(whole.clone() + &count(kind, 4) + &more));
             assert!(matches!(cut, Err(ImageError::NoEnd { lines: 6, .. })), "{cut:?}");
@@ -226,8 +226,8 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// Damaged Intel HEX and S-record files. The reader refuses each of these files because of its content, with and without the option for raw
-/// bytes, and with any name. The advice never bypasses a check.
+/// The test uses damaged Intel HEX and S-record files. The reader refuses each of these files because of its content, with and without the
+/// option for raw bytes, and with any name. The remedy of the error never bypasses a check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
@@ -298,7 +298,8 @@ fn characters_of_records_are_never_an_image() {
     }
 }
 
-/// On request, a file with any name is read as raw bytes, except Intel HEX and S-record files. A text is accepted only from a `.bin` file.
+/// On request, the reader reads a file with any name as raw bytes, except Intel HEX and S-record files. Even on request, the reader accepts
+/// a text only from a `.bin` file.
 #[test]
 fn raw_bytes_on_request_are_looked_at() {
     let dir = tempfile::tempdir().unwrap();

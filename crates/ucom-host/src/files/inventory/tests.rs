@@ -1,4 +1,4 @@
-//! Tests of inventories: accepted and refused files, and flash records.
+//! Tests of inventories: accepted files, refused files, and flash records.
 use proptest::prelude::*;
 
 use super::*;
@@ -35,7 +35,7 @@ fn record(flash_number: u16) -> FlashRecord {
     FlashRecord { flash_number, sha256: [0xA5; 32], address: 0x200, program_id: 0x4B3F, date: 0x3AC1 }
 }
 
-/// D-62: a record is set and removed in the text of the file, and nothing else changes.
+/// D-62: a flash record is set and removed in the text of the file, and nothing else in the file changes.
 #[test]
 fn d62_a_record_changes_one_key_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -51,7 +51,7 @@ fn d62_a_record_changes_one_key_of_the_file() {
         let read = Inventory::read(&path).unwrap();
         assert_eq!(read.get(1).unwrap().record(), Some(record(0x21)));
         assert!(read.get(2).is_none_or(|board| board.record().is_none()));
-        // The record is set again, and an init does not remove the record.
+        // The flash record is set again, and an init does not remove this record.
         Inventory::set_record(&path, 0x21, Some(FlashRecord { address: 0, ..record(0x21) })).unwrap();
         let again = Inventory::read(&path).unwrap();
         assert_eq!(again.get(1).unwrap().record().map(|r| r.address), Some(0));
@@ -61,21 +61,21 @@ fn d62_a_record_changes_one_key_of_the_file() {
         made.keep(&again);
         assert!(made.get(7).unwrap().record().is_some());
         assert!(made.without_records().get(7).unwrap().record().is_none());
-        // The record is removed. A second removal has no effect.
+        // The flash record is removed. A second removal of the record has no effect.
         for _ in 0..2 {
             Inventory::set_record(&path, 0x21, None).unwrap();
             let left = std::fs::read_to_string(&path).unwrap();
             let plain = |text: &str| text.replace([' ', '\n'], "");
             assert_eq!(plain(&left), plain(text));
         }
-        // No record is stored for a board that the file does not list.
+        // No flash record is stored for a board that the file does not list.
         Inventory::set_record(&path, 0x77, Some(record(0x77))).unwrap();
         assert!(!std::fs::read_to_string(&path).unwrap().contains("sha256"));
     }
     assert!(Inventory::set_record(&dir.path().join("nowhere"), 0x21, None).is_err());
 }
 
-/// D-62: a record that was copied to another board is not used, and a damaged record is refused.
+/// D-62: a flash record that was copied to another board is not used, and a damaged record is refused.
 #[test]
 fn d62_a_record_belongs_to_one_board() {
     let with = |record: &str| format!("[[board]]\nnumber = 1\nflash_number = 0x42\nprogram = {record}\n");

@@ -1,4 +1,4 @@
-//! Checks a parameter file against the boards on the bus. Every error is reported with its position before any frame is sent.
+//! Checks a parameter file against the boards on the bus. The check reports every error with its position before any frame is sent.
 
 use super::{ParamsBoard, ParamsEntry, Place};
 use crate::files::signals::{BoardSignals, ValueError};
@@ -10,28 +10,28 @@ use ucom::BoardInfo;
 /// Identity of a board on the bus.
 #[derive(Clone, Copy, Debug)]
 pub struct ParamsTarget<'a> {
-    /// Answer to PC_INFO.
+    /// Answer of the board to PC_INFO.
     pub info: &'a BoardInfo,
-    /// Name in the inventory; `None` if the inventory has no name for the board.
+    /// Name of the board in the inventory; `None` if the inventory has no name for the board.
     pub name: Option<&'a str>,
 }
 
-/// Word of a signal, converted from a value in a file.
+/// Word of a signal, converted from a value in a parameter file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParamsWord {
     /// Index of the signal in its buffer.
     pub index: u16,
     /// Complete name of the signal as the board reports it.
     pub name: String,
-    /// The word.
+    /// Value as a 16-bit word.
     pub word: u16,
-    /// The value in the signal's unit, with the unit.
+    /// Value in the signal's unit, followed by the unit.
     pub text: String,
-    /// Requested and sent value, such as `0.04 → 0.0`, if the value lies between two words; `None` otherwise.
+    /// Requested value and sent value, such as `0.04 → 0.0`, if the requested value lies between two words; `None` otherwise.
     pub rounded: Option<String>,
 }
 
-/// Error in a file.
+/// Error in a parameter file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsProblem {
     /// Position of the error in the file.
@@ -45,7 +45,7 @@ pub struct ParamsProblem {
 impl core::fmt::Display for ParamsProblem {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { place, board, kind } = self;
-        // The error for an unknown name already begins with the board.
+        // The error for an unknown name already begins with the board, so the board is not added again.
         let board = if matches!(kind, ParamsProblemKind::NoSignal(_)) {
             String::new()
         } else {
@@ -55,14 +55,14 @@ impl core::fmt::Display for ParamsProblem {
     }
 }
 
-/// Kinds of errors in a file.
+/// Kinds of errors in a parameter file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsProblemKind {
     /// No board answers to this number.
     #[error("the board does not answer")]
     Absent,
-    /// Another board has this number.
+    /// A board with another flash number has this board number.
     #[error("its flash number is 0x{found:04X}, but the file is for 0x{wanted:04X}")]
     WrongFlash {
         /// Flash number in the file.
@@ -78,7 +78,7 @@ pub enum ParamsProblemKind {
         /// Name in the inventory.
         found: Option<String>,
     },
-    /// The board has another program than the file expects.
+    /// The board has another program than the parameter file expects.
     #[error("its program is {}, but the names in the file belong to 0x{wanted:04X}", found.map_or("missing".into(), |f| format!("0x{f:04X}")))]
     WrongProgram {
         /// Program ID in the file.
@@ -86,15 +86,15 @@ pub enum ParamsProblemKind {
         /// Program ID of the board; `None` if the board has no application.
         found: Option<u16>,
     },
-    /// No signal has this name.
+    /// No signal of the board has this name.
     #[error("{0}")]
     NoSignal(SignalError),
-    /// A signal has two entries.
+    /// A signal has two entries in the parameter file.
     #[error("{kind} `{name}` has two entries, the first one in line {first}")]
     Twice {
-        /// `CI` or `PAR`.
+        /// Kind of the signal, `CI` or `PAR`.
         kind: &'static str,
-        /// Name in the file.
+        /// Name of the signal in the file.
         name: String,
         /// Line of the first entry.
         first: u32,
@@ -102,16 +102,16 @@ pub enum ParamsProblemKind {
     /// The value is not valid for the signal.
     #[error("{kind} `{name}`: {problem}")]
     Value {
-        /// `CI` or `PAR`.
+        /// Kind of the signal, `CI` or `PAR`.
         kind: &'static str,
-        /// Name in the file.
+        /// Name of the signal in the file.
         name: String,
-        /// Reason.
+        /// Reason why the value is not valid.
         problem: ValueError,
     },
 }
 
-/// Checks that the board and its program agree with the file.
+/// Checks that the board and its program agree with the parameter file.
 pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<ParamsProblem> {
     let mut problems = Vec::new();
     let mut add = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });
@@ -135,8 +135,8 @@ pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<Par
     problems
 }
 
-/// Returns the words for a board whose description is known: first its inputs, then its parameters. If there are errors, returns all of
-/// them.
+/// Returns the words for a board whose description is known: first the words of its inputs, then the words of its parameters. If the entry
+/// of the board has errors, the function returns all of them.
 pub fn check_board(
     board: &ParamsBoard,
     description: &IoDescription,

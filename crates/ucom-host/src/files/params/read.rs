@@ -1,4 +1,4 @@
-//! Conversion of YAML to values, with their positions in the file.
+//! Converts the YAML of a parameter file to values, with their positions in the file.
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
@@ -6,7 +6,7 @@ use serde_saphyr::Spanned;
 use super::{ParamsBoard, ParamsEntry, ParamsError, ParamsFile, Place};
 use crate::files::signals::SignalValue;
 
-/// Limit of the number of YAML nodes. The limit allows more boards than a bus has and more values than a buffer has.
+/// Limit of the number of YAML nodes in a parameter file. The limit allows more boards than a bus has and more values than a buffer has.
 const MAX_NODES: usize = 400_000;
 
 #[derive(Deserialize)]
@@ -15,7 +15,7 @@ struct File {
     boards: Vec<Spanned<Board>>,
 }
 
-// Every scalar is read as text, so the reader distinguishes `0x10` from `16`.
+// The reader reads every scalar as text, because it must distinguish `0x10` from `16`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Board {
@@ -122,7 +122,7 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
 
 /// Rewords a message of the YAML library for the author of the file.
 fn people(words: &str) -> String {
-    // The message itself contains another position, which is removed.
+    // The message of the library contains another position, which is removed.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);
@@ -156,7 +156,7 @@ fn people(words: &str) -> String {
 }
 
 impl ParamsFile {
-    /// Reads YAML.
+    /// Reads a parameter file from YAML text.
     pub fn parse(text: &str) -> Result<Self, ParamsError> {
         let options = serde_saphyr::options! {
             budget: serde_saphyr::budget! { max_nodes: MAX_NODES, max_events: 2 * MAX_NODES, max_depth: 16 },

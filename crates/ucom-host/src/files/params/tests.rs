@@ -51,7 +51,7 @@ fn values_become_words_of_their_signals() {
     assert_eq!((file.board(2).unwrap().program_id, file.board(2).unwrap().flash_number), (None, None));
 }
 
-/// A board is identified by its number, its flash number or name, and its program.
+/// A parameter file identifies a board by its number, its flash number or name, and its program.
 #[test]
 fn another_board_or_program_is_a_problem_with_its_line() {
     let file = ParamsFile::parse(GOOD).unwrap();
@@ -76,7 +76,7 @@ fn another_board_or_program_is_a_problem_with_its_line() {
     assert!(message(&other, 2, None).contains("name in the inventory is missing"));
 }
 
-/// All errors are reported together, each with line and column.
+/// All errors of a parameter file are reported together, each with line and column.
 #[test]
 fn names_and_ranges_are_checked_with_their_place() {
     let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3 A\n    mode: on\n  ci:\n    set_position: 61 deg\n";
@@ -150,7 +150,7 @@ fn saved() -> SavedBoard {
     }
 }
 
-/// D-35: a signal without a requested value is written as a comment.
+/// D-35: in a saved file, a signal without a requested value is a comment.
 #[test]
 fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     let text = params_text(&[saved()]);
@@ -166,7 +166,7 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
 }
 
 /// D-11, D-35: if a saved file is read with another signal table, or without a table, each value results in the saved word or is refused.
-/// The file never results in another word.
+/// The saved file never results in another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };

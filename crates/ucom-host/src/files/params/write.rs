@@ -1,37 +1,37 @@
-//! Writes a parameter file. Requested values become entries; all other signals become comments.
+//! Writes a parameter file. Requested values become entries in the file; all other signals become comments.
 
 use crate::files::signals::{Signal, SignalType, SignalValue};
 use crate::files::text::quoted;
 use crate::master::io::{IoDescription, Kind, short};
 use std::fmt::Write;
 
-/// Board that is saved.
+/// Board whose values are saved in a parameter file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SavedBoard {
     /// Board number.
     pub number: u8,
     /// Flash number of the board.
     pub flash_number: u16,
-    /// Name in the inventory; empty if the inventory has none.
+    /// Name of the board in the inventory; empty if the inventory has no name.
     pub name: String,
-    /// Program ID.
+    /// Program ID of the board.
     pub program_id: u16,
     /// Description with the names of the board's signals.
     pub description: IoDescription,
-    /// Parameters, in the order of the buffer.
+    /// Parameters of the board, in the order of the buffer.
     pub par: Vec<SavedSignal>,
-    /// Inputs, in the order of the buffer.
+    /// Inputs of the board, in the order of the buffer.
     pub ci: Vec<SavedSignal>,
 }
 
-/// Signal of a board that is saved.
+/// Signal of a board whose values are saved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedSignal {
-    /// Meaning of the word.
+    /// Meaning of the signal's word.
     pub signal: Signal,
     /// Requested word; `None` if the signal is written as a comment.
     pub word: Option<u16>,
-    /// Remark after the entry. For a requested word, the remark is the time of writing.
+    /// Remark after the entry in the file. For a requested word, the remark is the time of writing.
     pub remark: String,
 }
 
@@ -90,8 +90,9 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// Returns the text for a word. A file may be read again with another signal table, or without one. A number without a unit would then
-/// result in another word. Therefore each number gets a unit, which a reader without the table refuses, or the raw word is written.
+/// Returns the text that a parameter file contains for a word. A parameter file may be read again with another signal table, or without
+/// one. A number without a unit would then result in another word. Therefore each number gets a unit, which a reader without the table
+/// refuses, or the file contains the raw word.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
     let text = match signal.kind {
@@ -101,7 +102,7 @@ fn value(signal: &Signal, word: u16) -> String {
         }
         _ => return raw,
     };
-    // Writes the raw word if rounding removed a digit or if the word is beyond a limit.
+    // Writes the raw word if rounding removed a digit or if the value of the word is beyond a limit.
     if text.parse::<SignalValue>().map(|given| signal.word(&given)) != Ok(Ok(word)) {
         return raw;
     }
@@ -109,8 +110,8 @@ fn value(signal: &Signal, word: u16) -> String {
     if text.chars().all(plain) { text } else { quoted(&text) }
 }
 
-/// Returns a remark for the end of a line. Texts of boards may contain any characters, so control characters and line separators are
-/// replaced by blanks.
+/// Returns a remark for the end of a line in the file. Texts of boards may contain any characters, so control characters and line
+/// separators are replaced by blanks.
 fn comment(words: &str) -> String {
     let one_line: String = words.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let one_line = one_line.replace(['\u{2028}', '\u{2029}', '\u{FEFF}', '\u{FFFE}', '\u{FFFF}'], " ");
@@ -120,18 +121,19 @@ fn comment(words: &str) -> String {
 /// Longest implicit key that YAML allows (1.2.2, section 7.4.2), in characters, including quotes and escapes.
 const KEY_MAX: usize = 1024;
 
-/// Returns the shortest unambiguous name of a signal. If a YAML key cannot contain the name, returns the signal's index.
+/// Returns the shortest unambiguous name of a signal in the file. If a YAML key cannot contain the name, the function returns the signal's
+/// index.
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
-    // A board may have another signal with the name "#1". Additional `#` characters distinguish the index from every name.
+    // A board may have another signal whose name is "#1". Additional `#` characters distinguish the index from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
     let fits = |name: &str| quoted(name).chars().count() <= KEY_MAX;
     let name = names.chain(numbers).find(|name| fits(name) && means(name)).unwrap_or_default();
     let word = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    // Words that have a special meaning in YAML.
+    // These words have a special meaning in YAML.
     let taken = ["null", "true", "false", "yes", "no", "on", "off", "y", "n"];
     if word && !taken.contains(&name.to_ascii_lowercase().as_str()) { name } else { quoted(&name) }
 }

@@ -7,19 +7,19 @@ use std::io::{BufRead, Write};
 /// Beginning of a comment line that carries one line of the profile.
 const PROFILE: &str = "# profile: ";
 
-/// Reads records one by one.
+/// Reads the records of a candump file one by one.
 pub struct CandumpReader<R> {
     lines: Lines<R>,
     profile: Option<String>,
 }
 
 impl<R: BufRead> CandumpReader<R> {
-    /// Creates a reader at the start of the file.
+    /// Creates a reader at the start of the candump file.
     pub fn new(input: R) -> Self {
         Self { lines: Lines::new(input), profile: None }
     }
 
-    /// Returns the profile from the comment lines read so far.
+    /// Returns the profile in the comment lines that were read so far.
     pub fn into_profile(self) -> Option<String> {
         self.profile
     }
@@ -28,7 +28,7 @@ impl<R: BufRead> CandumpReader<R> {
 impl<R: BufRead> Iterator for CandumpReader<R> {
     type Item = Result<Record, RecordingError>;
 
-    /// Returns the next record. The sequence ends after the first error.
+    /// Returns the next record of the file. The sequence of records ends after the first error.
     fn next(&mut self) -> Option<Self::Item> {
         self.lines.record(record, |comment| {
             if let Some(text) = comment.strip_prefix(PROFILE.trim_end()) {
@@ -104,7 +104,7 @@ fn frame_of(text: &str) -> Result<RecordedFrame, RecordProblem> {
         };
         return Ok(made(FrameKind::Remote { length }, Vec::new(), dlc));
     }
-    // Dots may separate the bytes.
+    // Dots may separate the data bytes.
     let data = hex_bytes(&body.replace('.', ""), 8).ok_or(RecordProblem::Data)?;
     Ok(made(if error { FrameKind::Error } else { FrameKind::Data }, data, dlc))
 }
@@ -115,12 +115,12 @@ pub struct CandumpWriter<W> {
 }
 
 impl<W: Write> CandumpWriter<W> {
-    /// Creates a writer. Like candump's output, the file has no header.
+    /// Creates a writer for a candump file. Like the output of candump, the file has no header.
     pub fn new(out: W) -> Self {
         Self { out }
     }
 
-    /// Writes the profile as comment lines. can-utils skips them; python-can's reader does not accept them.
+    /// Writes the profile as comment lines. can-utils skips comment lines; python-can's reader does not accept them.
     pub fn comment_profile(&mut self, profile: &str) -> Result<(), RecordingError> {
         for line in profile.lines() {
             writeln!(self.out, "{PROFILE}{line}")?;
@@ -128,7 +128,7 @@ impl<W: Write> CandumpWriter<W> {
         Ok(())
     }
 
-    /// Adds a line. Times have six decimals, because can-utils refuses any other number of decimals.
+    /// Adds a line with a frame to the file. Times have six decimals, because can-utils refuses any other number of decimals.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let (seconds, ns) = (record.time_ns / 1_000_000_000, record.time_ns % 1_000_000_000);
         write!(self.out, "({seconds:010}.{:06})", ns / 1000)?;
@@ -141,12 +141,12 @@ impl<W: Write> CandumpWriter<W> {
         Ok(())
     }
 
-    /// Writes buffered data.
+    /// Writes the buffered data to the output.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }
 
-    /// Returns the output.
+    /// Returns the output of the writer.
     pub fn into_inner(self) -> W {
         self.out
     }

@@ -1,24 +1,24 @@
-//! Errors of reading and writing recordings.
+//! Errors that occur while recordings are read or written.
 
 use std::path::{Path, PathBuf};
 /// Reasons why a recording cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// The file cannot be used.
+    /// The recording file cannot be used.
     #[error("{}{source}", prefix(path))]
     Io {
-        /// File; empty if not known.
+        /// Path of the file; empty if the path is not known.
         path: PathBuf,
-        /// System error.
+        /// Error that the system reported.
         source: std::io::Error,
     },
     /// A line is not a valid record.
     #[error("line {line}: {problem}")]
     Line {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// Error in the line.
+        /// Error in this line.
         problem: RecordProblem,
     },
     /// The file is not an FZI-CAN stream of version 1.2.
@@ -27,47 +27,47 @@ pub enum RecordingError {
         /// First line in the file.
         first: String,
     },
-    /// The format cannot represent this frame.
+    /// The file format cannot represent this frame.
     #[error("FZI-CAN cannot store {frame}, only classic data frames with 11-bit ids")]
     NotRepresentable {
-        /// The frame.
+        /// Frame that the format cannot represent, as text.
         frame: String,
     },
     /// The MCAP file is damaged.
     #[error("{}{problem}", prefix(path))]
     Mcap {
-        /// File; empty if not known.
+        /// Path of the file; empty if the path is not known.
         path: PathBuf,
-        /// Error in the file.
+        /// Error in the MCAP file.
         problem: String,
     },
 }
 
-/// Errors in a line.
+/// Errors in a line of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordProblem {
     /// The line is longer than any record.
     #[error("the line is longer than {} bytes; this may not be a recording", super::MAX_LINE)]
     TooLong,
-    /// The line has a wrong number of columns.
+    /// The line of the candump file has a wrong number of columns.
     #[error("a line of candump is `(seconds) interface ID#DATA`")]
     Columns,
-    /// The text is not a time.
+    /// The time in the line is not valid.
     #[error("not a time in seconds")]
     Time,
-    /// The text is not an identifier.
+    /// The identifier in the line is not valid.
     #[error("not an identifier")]
     Id,
-    /// The text is not a length.
+    /// The length in the line is not valid.
     #[error("not a length of 0 to 8")]
     Length,
-    /// The text is not data.
+    /// The data in the line are not valid.
     #[error("the data are not pairs of hexadecimal digits, or have more than 8 bytes")]
     Data,
-    /// The file ends in the middle of the record. The readable part may be only the beginning of the record.
+    /// The file ends in the middle of the record in this line. The readable part of the line may be only the beginning of the record.
     #[error("the file is broken off here: the line has no end")]
     Truncated,
-    /// The line has a wrong number of columns.
+    /// The line of the FZI-CAN file has a wrong number of columns.
     #[error("a line of FZI-CAN is `sec.usec id dlc` and eight bytes")]
     FziColumns,
 }

@@ -8,28 +8,28 @@ pub enum FrameKind {
     Data,
     /// Remote frame: it has no data and requests `length` bytes.
     Remote {
-        /// Requested length, 0..8.
+        /// Requested length, 0..8 bytes.
         length: u8,
     },
     /// CAN FD frame.
     Fd {
-        /// Flags in candump's form: bit 0 is the bit rate switch, and bit 1 is the error state.
+        /// Flags in the format of candump: bit 0 is the bit rate switch, and bit 1 is the error state.
         flags: u8,
     },
-    /// Error report of the adapter; not a frame on the bus.
+    /// Error report of the CAN adapter, which is not a frame on the bus.
     Error,
 }
 
-/// A recorded frame.
+/// A frame in a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordedFrame {
-    /// Identifier, or the error class of an error report.
+    /// Identifier of the frame, or the error class of an error report.
     pub id: u32,
     /// `true` if the identifier has 29 bits.
     pub extended: bool,
-    /// Kind.
+    /// Kind of the frame.
     pub kind: FrameKind,
-    /// Payload.
+    /// Payload of the frame.
     pub data: Vec<u8>,
     /// Raw DLC 9..15 of a classic frame with eight bytes, if candump recorded it.
     pub dlc: Option<u8>,
@@ -41,7 +41,7 @@ impl RecordedFrame {
         Self { id: id.into(), extended: false, kind: FrameKind::Data, data: data.to_vec(), dlc: None }
     }
 
-    /// Returns identifier and payload of a classic data frame with an 11-bit identifier (D-02); `None` for other frames.
+    /// Returns identifier and payload of a classic data frame with an 11-bit identifier (D-02); returns `None` for other frames.
     pub fn as_classic(&self) -> Option<(u16, &[u8])> {
         let id = u16::try_from(self.id).ok().filter(|id| *id <= 0x7FF)?;
         (self.kind == FrameKind::Data && !self.extended && self.data.len() <= 8)
@@ -49,7 +49,7 @@ impl RecordedFrame {
     }
 }
 
-/// Prints a frame as candump does.
+/// Prints a frame in the format of candump.
 impl fmt::Display for RecordedFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.kind == FrameKind::Error {
@@ -76,21 +76,21 @@ impl fmt::Display for RecordedFrame {
 /// Direction of a frame, if the recording contains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Received (`R`).
+    /// The recorder received the frame (`R`).
     Received,
-    /// Sent by the recorder itself (`T`).
+    /// The recorder itself sent the frame (`T`).
     Sent,
 }
 
-/// A line of a recording.
+/// Record of one frame in a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Record {
     /// Time since the recorder's epoch, ns.
     pub time_ns: u64,
-    /// Name of the interface.
+    /// Name of the CAN interface.
     pub channel: String,
-    /// Direction.
+    /// Direction of the frame.
     pub direction: Option<Direction>,
-    /// The frame.
+    /// Frame of this record.
     pub frame: RecordedFrame,
 }

@@ -1,21 +1,22 @@
-//! Format FZI-CAN 1.2: `sec.usec id dlc b0 … b7`. The id is decimal. There are always eight bytes, in hexadecimal.
+//! Format FZI-CAN 1.2 of a recording: `sec.usec id dlc b0 … b7`. The id of the frame is decimal. Each line always contains eight data
+//! bytes, in hexadecimal.
 
 use super::{Record, RecordProblem, RecordedFrame, RecordingError, lines::Lines, seconds};
 use std::io::{BufRead, Write};
 
-/// First line of a stream.
+/// First line of an FZI-CAN stream.
 pub const FZI_HEADER: &str = "# FZI-CAN Stream version 1.2";
 
-/// Interface name of the records. The format has no interface names.
+/// Interface name of all records in this format. The name is fixed, because the format has no interface names.
 const CHANNEL: &str = "can0";
 
-/// Reads records one by one.
+/// Reads the records of an FZI-CAN stream one by one.
 pub struct FziReader<R> {
     lines: Lines<R>,
 }
 
 impl<R: BufRead> FziReader<R> {
-    /// Checks the first line.
+    /// Creates a reader and checks the first line of the stream.
     pub fn new(input: R) -> Result<Self, RecordingError> {
         let mut lines = Lines::new(input);
         let first = lines.line()?.unwrap_or_default();
@@ -29,7 +30,7 @@ impl<R: BufRead> FziReader<R> {
 impl<R: BufRead> Iterator for FziReader<R> {
     type Item = Result<Record, RecordingError>;
 
-    /// Returns the next record. The sequence ends after the first error.
+    /// Returns the next record of the stream. The sequence of records ends after the first error.
     fn next(&mut self) -> Option<Self::Item> {
         self.lines.record(record, |_| ())
     }
@@ -56,19 +57,19 @@ fn record(line: &str) -> Result<Record, RecordProblem> {
     Ok(Record { time_ns, channel: CHANNEL.into(), direction: None, frame })
 }
 
-/// Writes records.
+/// Writes records to an FZI-CAN stream.
 pub struct FziWriter<W> {
     out: W,
 }
 
 impl<W: Write> FziWriter<W> {
-    /// Creates a writer and writes the first line.
+    /// Creates a writer and writes the first line of the stream.
     pub fn new(mut out: W) -> Result<Self, RecordingError> {
         writeln!(out, "{FZI_HEADER}")?;
         Ok(Self { out })
     }
 
-    /// Adds a line. The format cannot represent frames of other protocols.
+    /// Adds a line with a frame to the stream. The format can represent only classic data frames with 11-bit identifiers.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let Some((id, data)) = record.frame.as_classic() else {
             return Err(RecordingError::NotRepresentable { frame: record.frame.to_string() });
@@ -82,12 +83,12 @@ impl<W: Write> FziWriter<W> {
         Ok(())
     }
 
-    /// Writes buffered data.
+    /// Writes the buffered data to the output.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }
 
-    /// Returns the output.
+    /// Returns the output of the writer.
     pub fn into_inner(self) -> W {
         self.out
     }

@@ -1,24 +1,25 @@
-//! Lines of the text formats. Each record is one line; blank lines and comments may be between them.
+//! Reads the lines of text recordings. Each record is one line; blank lines and comment lines may be between records.
 
 use super::{MAX_LINE, Record, RecordProblem, RecordingError};
 use std::io::{BufRead, Read};
 
-/// Reads records line by line.
+/// Reads the records of a text recording line by line.
 pub(super) struct Lines<R> {
     input: R,
     number: usize,
-    /// `true` if the last line had no line end.
+    /// `true` if the last line of the file had no line end.
     endless: bool,
     failed: bool,
 }
 
 impl<R: BufRead> Lines<R> {
-    /// Creates a reader at the start of the file.
+    /// Creates a reader at the start of the text recording.
     pub(super) fn new(input: R) -> Self {
         Self { input, number: 0, endless: false, failed: false }
     }
 
-    /// Returns the next line without surrounding blanks; `None` at the end of the file. The memory use is limited for any input.
+    /// Returns the next line without surrounding blanks; returns `None` at the end of the file. The function limits the memory that a line
+    /// uses.
     pub(super) fn line(&mut self) -> Result<Option<String>, RecordingError> {
         let mut line = Vec::new();
         self.input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;
@@ -33,8 +34,8 @@ impl<R: BufRead> Lines<R> {
         Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
     }
 
-    /// Returns the next record. `parse` creates the record from its line; `comment` receives the comment lines before the record. The
-    /// sequence ends after the first error.
+    /// Returns the next record of the recording. `parse` creates the record from its line; `comment` receives the comment lines before the
+    /// record. The sequence of records ends after the first error.
     pub(super) fn record(
         &mut self,
         parse: fn(&str) -> Result<Record, RecordProblem>,

@@ -1,4 +1,4 @@
-//! MCAP files with one channel `/can` of JSON messages. Foxglove, PlotJuggler and the MCAP tools can read them.
+//! Reads and writes MCAP files with one channel `/can` of JSON messages. Foxglove, PlotJuggler and the MCAP tools can read these files.
 
 use host_kit::mcap::each_record;
 use mcap::records::{self, MessageHeader, Metadata};
@@ -13,7 +13,7 @@ use super::{Direction, FrameKind, Record, RecordedFrame, Recording, RecordingErr
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const TOPIC: &str = "/can";
 const METADATA: &str = "ucom";
-/// JSON schema of a message.
+/// JSON schema of a message in the channel.
 const SCHEMA: &str = r#"{
   "title": "CanFrame",
   "type": "object",
@@ -114,7 +114,7 @@ fn damaged(problem: String) -> RecordingError {
     RecordingError::Mcap { path: PathBuf::new(), problem }
 }
 
-/// Writes records.
+/// Writes records to an MCAP file.
 pub struct McapWriter<W: Write + Seek> {
     out: mcap::Writer<W>,
     channel: u16,
@@ -122,7 +122,7 @@ pub struct McapWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> McapWriter<W> {
-    /// Creates a writer and stores the profile as metadata.
+    /// Creates a writer and stores the profile as metadata of the file.
     pub fn new(out: W, profile: &str) -> Result<Self, RecordingError> {
         let mut out = WriteOptions::new()
             .library(concat!("openjtc ", env!("CARGO_PKG_VERSION")))
@@ -135,7 +135,7 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(Self { out, channel, sequence: 0 })
     }
 
-    /// Adds a frame; `name` describes it in words.
+    /// Adds a frame to the file; `name` describes the frame in words.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         let header = MessageHeader {
             channel_id: self.channel,
@@ -153,14 +153,14 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(self.out.flush()?)
     }
 
-    /// Writes the index and the end of the file.
+    /// Writes the index and the end of the MCAP file.
     pub fn finish(mut self) -> Result<W, RecordingError> {
         self.out.finish()?;
         Ok(self.out.into_inner())
     }
 }
 
-/// Reads a complete file. If its writer was killed, reads all complete records.
+/// Reads a complete MCAP file. If the writer of the file was killed, the function reads all complete records.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();
@@ -185,7 +185,8 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         Ok(())
     });
-    // A writer that was killed leaves a chunk without its length. Therefore the damage is not always at the end of the file.
+    // If the writer was killed, the last chunk of the file does not contain its length. Therefore the damage of the file is not always at
+    // its end.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
     let broken_off = |why: String| format!("the file ends after {} bytes{why}", file.len());
     recording.broken_off = match read {

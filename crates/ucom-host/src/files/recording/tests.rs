@@ -1,4 +1,4 @@
-//! Tests of C-3 and C-7 for recording files. The reference checks run the Python readers.
+//! Tests of the requirements C-3 and C-7 for recording files. The reference checks run the Python readers.
 
 use proptest::prelude::*;
 use std::io::Cursor;
@@ -17,7 +17,7 @@ fn problem(line: &str) -> RecordProblem {
     }
 }
 
-/// C-3: a reset of all boards is read and written like any other frame.
+/// C-3: a reset of all boards is read from a recording and written to a recording like any other frame.
 #[test]
 fn c3_reset_for_all_is_kept() {
     let records = read("(1.5) can0 000#\n").unwrap();
@@ -45,7 +45,7 @@ fn times_are_written_with_six_decimals() {
     assert_eq!(String::from_utf8(out.into_inner()).unwrap(), "(0000000007.123456) can0 680#\n");
 }
 
-/// D-02: foreign frames are read with their kind, and are written as the original text.
+/// D-02: foreign frames in a recording are read with their kind, and are written as the original text.
 #[test]
 fn d02_foreign_lines_are_recognised() {
     for frame in [
@@ -132,7 +132,8 @@ fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     bytes
 }
 
-/// If a writer is killed, its file may end at any byte. All complete records are read, no other record appears, and the damage is reported.
+/// If a writer is killed, its file may end at any byte. All complete records are read, no other record appears in the result, and the
+/// damage is reported.
 #[test]
 fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     let record = |i: u64| {
@@ -226,7 +227,7 @@ proptest! {
         prop_assert_eq!(back, plain);
     }
 
-    /// MCAP: frames and the profile are read back unchanged.
+    /// The frames and the profile that are read from an MCAP file are equal to those that were written.
     #[test]
     fn mcap_round_trip(records in records(false)) {
         let mut out = McapWriter::new(Cursor::new(Vec::new()), "endian = \"big\"\n").unwrap();

@@ -1,4 +1,4 @@
-//! TOML form of a signal table, and the valid ranges of its numbers.
+//! TOML form of a signal table, and the valid ranges of the numbers in it.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use super::value::may_follow;
 use super::{Signal, SignalType};
 
-/// Largest scale and offset. The smallest scale is the inverse of this limit. With these limits, every displayed value can be represented
-/// as a number.
+/// Largest scale and largest offset of a signal. The smallest scale is the inverse of this limit. With these limits, every displayed value
+/// can be represented as a number.
 pub(super) const LARGEST: f64 = 1e9;
 
 #[derive(Deserialize)]
@@ -50,7 +50,8 @@ impl Default for FileSignal {
     }
 }
 
-/// Reads `0x1234` or `[0x1234, 0x4B3F]`. An untagged enum would lose the position of an error.
+/// Reads one Program ID or a list of Program IDs: `0x1234` or `[0x1234, 0x4B3F]`. With an untagged enum, the position of an error in the
+/// file would be lost.
 fn one_or_many<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u16>, D::Error> {
     struct Ids;
     impl<'de> serde::de::Visitor<'de> for Ids {

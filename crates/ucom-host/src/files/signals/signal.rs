@@ -6,27 +6,27 @@ use super::value_error::space;
 use super::{SignalValue, ValueError};
 use ucom::Profile;
 
-/// Number type of a word.
+/// Number type of a signal's word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SignalType {
-    /// Signed.
+    /// The word is a signed number.
     #[default]
     Int16,
-    /// Unsigned.
+    /// The word is an unsigned number.
     Uint16,
-    /// Bits, displayed as `0x0000`. Has no scale.
+    /// The word is a set of bits, displayed as `0x0000`. Such a signal has no scale.
     Hex,
-    /// Off (0) or on (1). Has no scale.
+    /// The word means off (0) or on (1). Such a signal has no scale.
     Bool,
 }
 
-/// Meaning of a signal's word: the value in the signal's unit is `word × scale + offset`.
+/// Meaning of a signal's word. The value in the signal's unit is `word × scale + offset`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
-    /// Number type of the word.
+    /// Number type of the signal's word.
     pub kind: SignalType,
-    /// Units per step of the word.
+    /// Change of the value, in the signal's unit, for one step of the word.
     pub scale: f64,
     /// Value of the word 0, in the signal's unit.
     pub offset: f64,
@@ -36,17 +36,17 @@ pub struct Signal {
     pub min: Option<f64>,
     /// Largest value that may be written, in the signal's unit.
     pub max: Option<f64>,
-    /// `true` if a table has an entry for the signal; otherwise its word is raw.
+    /// `true` if a signal table has an entry for the signal; otherwise the signal's word is raw.
     pub known: bool,
-    /// `true` if the signal table has no entry for the program. In this case, only raw words are accepted.
+    /// `true` if the signal table has no entry for the program. In this case, the signal accepts only raw words.
     pub raw_only: bool,
 }
 
-/// Relative error allowed for floating-point arithmetic.
+/// Relative error that is allowed for floating-point arithmetic.
 const SLACK: f64 = 1e-9;
 
 impl Signal {
-    /// Creates a signal that no table contains. The value of this signal is the raw word, signed or unsigned as the profile defines.
+    /// Creates a signal that no signal table contains. The value of this signal is the raw word, signed or unsigned as the profile defines.
     pub fn bare(profile: &Profile) -> Self {
         let kind = if profile.pd_signed { SignalType::Int16 } else { SignalType::Uint16 };
         Self {
@@ -65,12 +65,12 @@ impl Signal {
         self.scale == 1.0 && self.offset == 0.0
     }
 
-    /// Returns `true` if the word is a signed number.
+    /// Returns `true` if the signal's word is a signed number.
     pub fn signed(&self) -> bool {
         self.kind == SignalType::Int16
     }
 
-    /// Returns the smallest and the largest number that the word can represent.
+    /// Returns the smallest and the largest number that the signal's word can represent.
     fn words(&self) -> (i32, i32) {
         match self.kind {
             SignalType::Int16 => (-32768, 32767),
@@ -87,7 +87,7 @@ impl Signal {
         f64::from(number) * self.scale + self.offset
     }
 
-    /// Returns the number of decimals that are needed to distinguish two neighbouring words.
+    /// Returns the number of decimals that are needed to distinguish the values of two neighbouring words.
     fn digits(&self) -> usize {
         let written = |x: f64| format!("{x}").split_once('.').map_or(0, |(_, digits)| digits.len());
         let enough = (-self.scale.abs().log10()).ceil().max(0.0) as usize + 2;
@@ -110,7 +110,7 @@ impl Signal {
         }
     }
 
-    /// Returns the text followed by the unit.
+    /// Returns the value as text, followed by the unit.
     pub fn text_with_unit(&self, word: u16) -> String {
         self.text(word) + &space(&self.unit)
     }
@@ -133,14 +133,14 @@ impl Signal {
         (self.min.map_or(low, |min| min.max(low)), self.max.map_or(high, |max| max.min(high)))
     }
 
-    /// Returns the limits as text.
+    /// Returns the limits of the signal as text.
     pub fn limits(&self) -> (String, String) {
         if self.kind == SignalType::Hex {
             return ("0x0000".into(), "0xFFFF".into());
         }
         let text = |limit: f64, own: Option<f64>| {
             let text = self.written(limit);
-            // A limit of the table that lies between two words is displayed unchanged.
+            // A limit of the signal table that lies between two words is displayed unchanged.
             let odd = own == Some(limit) && text.parse() != Ok(limit);
             if odd { limit.to_string() } else { text }
         };
@@ -176,18 +176,18 @@ impl Signal {
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// Returns the word for a value. If the signal has a scale, a value between two words gives the nearer word, but never a word beyond
-    /// the limits.
+    /// Returns the word that is sent for a value. If the signal has a scale, a value between two words gives the nearer word, but never a
+    /// word beyond the limits.
     ///
     /// # Errors
-    /// The value is out of the limits, has another unit or type, or lies between two words of a signal without a scale.
+    /// Returns an error if the value is out of the limits, has another unit or type, or lies between two words of a signal without a scale.
     pub fn word(&self, given: &SignalValue) -> Result<u16, ValueError> {
         let text = || given.to_string();
         let number = match (given, self.kind) {
             (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
-            // A raw word is sent unchanged, with any scale. The limits also apply to raw words.
+            // A raw word is sent unchanged, even if the signal has a scale. The limits also apply to raw words.
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {
@@ -202,7 +202,7 @@ impl Signal {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
-                // If this check were missing, the meaning of a number without a unit would depend on the signal table in the directory.
+                // Without this check, the meaning of a number without a unit would depend on the signal table in the directory.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }

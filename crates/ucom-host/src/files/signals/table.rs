@@ -1,4 +1,4 @@
-//! Signal table files: TOML with one table for each Program ID.
+//! Reads signal table files: TOML with one table for each Program ID.
 
 use super::Signal;
 use super::form::{File, FileSignal, LARGEST, people};
@@ -10,19 +10,19 @@ use std::path::{Path, PathBuf};
 /// Help page about signal tables.
 pub const SIGNAL_HELP: &str = include_str!("help.txt");
 
-/// Tables of several programs.
+/// Signal tables of several programs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SignalTable {
     programs: Vec<ProgramSignals>,
     given: bool,
 }
 
-/// Signals of a program.
+/// Signals of one program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramSignals {
     /// Program IDs of the versions of the program to which the table applies.
     pub program_ids: Vec<u16>,
-    /// Name for display.
+    /// Name of the program for display.
     pub name: String,
     ci: BTreeMap<String, Signal>,
     so: BTreeMap<String, Signal>,
@@ -33,48 +33,48 @@ pub struct ProgramSignals {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalTableError {
-    /// The file cannot be read.
+    /// The signal table file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// The text is not TOML in the form of a signal table. The message contains the line.
+    /// The text is not TOML in the form of a signal table. The error message contains the line.
     #[error("{0}")]
     Form(String),
-    /// A program has no ID.
+    /// A program in the table has no Program ID.
     #[error("program {number} has no program_id")]
     NoId {
-        /// Index, from 1.
+        /// Index of the program in the file, from 1.
         number: usize,
     },
     /// Two tables have the same Program ID.
     #[error("program 0x{id:04X} has two entries")]
     Twice {
-        /// The Program ID.
+        /// Program ID that both tables have.
         id: u16,
     },
-    /// A number is not valid.
+    /// A number of a signal is not valid.
     #[error("program 0x{id:04X}, {kind} `{signal}`: {what}")]
     Signal {
-        /// The first Program ID.
+        /// First Program ID of the program.
         id: u16,
-        /// `CI`, `SO` or `PAR`.
+        /// Kind of the signal: `CI`, `SO` or `PAR`.
         kind: &'static str,
-        /// The signal.
+        /// Name of the signal.
         signal: String,
-        /// Error text, with the limit.
+        /// Text of the error, with the limit.
         what: String,
     },
-    /// Error in a file.
+    /// A signal table file contains an error.
     #[error("{}: {source}", path.display())]
     In {
-        /// The file.
+        /// Path of the signal table file.
         path: PathBuf,
-        /// Error in the file.
+        /// Error in the signal table file.
         source: Box<SignalTableError>,
     },
 }
 
 impl SignalTable {
-    /// Reads TOML.
+    /// Reads a signal table from TOML text.
     pub fn parse(text: &str) -> Result<Self, SignalTableError> {
         let file: File = toml::from_str(text).map_err(|e| SignalTableError::Form(people(&e.to_string())))?;
         let mut table = Self { programs: Vec::new(), given: true };
@@ -107,13 +107,13 @@ impl SignalTable {
         Ok(table)
     }
 
-    /// Reads a file.
+    /// Reads a signal table from a file.
     pub fn read(path: &Path) -> Result<Self, SignalTableError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| SignalTableError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Returns `true` if a table was read. If no table was read, the meaning of words is unknown.
+    /// Returns `true` if a signal table was read. If no signal table was read, the meaning of words is unknown.
     pub fn is_given(&self) -> bool {
         self.given
     }
@@ -123,8 +123,8 @@ impl SignalTable {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// Returns the text of a signal table for programs that need a table. The text contains every name, with scale and unit guessed from
-    /// the texts of the boards. An expert must review it.
+    /// Returns the text of a signal table for programs that need a table. The text contains the name of every signal, with scale and unit
+    /// guessed from the texts of the boards. An expert must review the text.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
             "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\
@@ -149,8 +149,8 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Skips a key that is already used. For example, two signals share a name, and a third signal has the name `#2`, which
-                    // is the index of one of the two.
+                    // Skips a key that the table already contains. For example, two signals share a name, and a third signal has the name
+                    // `#2`, which is the index of one of the two.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }
@@ -161,7 +161,7 @@ impl SignalTable {
     }
 }
 
-/// Returns keys such as `scale = 0.01, unit = "deg"` for a name such as `position [0.01 deg]`.
+/// Returns the keys of a signal, such as `scale = 0.01, unit = "deg"` for the name `position [0.01 deg]`.
 fn keys(name: &str) -> String {
     let bracket =
         name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
@@ -183,7 +183,7 @@ fn keys(name: &str) -> String {
 }
 
 impl ProgramSignals {
-    /// Returns the names in the table of one kind of signal.
+    /// Returns the names in the table for one kind of signal.
     pub fn names(&self, kind: Kind) -> impl Iterator<Item = &String> {
         self.of(kind).keys()
     }
@@ -196,8 +196,8 @@ impl ProgramSignals {
         }
     }
 
-    /// Returns a signal by its complete name, its name without the unit in brackets, or its index. The letter case is ignored if the names
-    /// are still distinct without it. Names from the user follow this rule too.
+    /// Finds a signal by its complete name, by its name without the unit in brackets, or by its index. The letter case is ignored if the
+    /// names still differ without it. This rule also applies to names that the user gives.
     pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
         let like = |wanted: &str| {
@@ -211,7 +211,7 @@ impl ProgramSignals {
             .or_else(|| all.get(&format!("#{index}")))
     }
 
-    /// Returns the names in the table that the program does not have. Most of these names are typing errors.
+    /// Returns the names in the table that the program does not have. Most of these names are typing errors of the author.
     pub fn strays(&self, description: &IoDescription) -> Vec<String> {
         let mut strays = Vec::new();
         for kind in [Kind::Ci, Kind::So, Kind::Par] {
@@ -250,7 +250,7 @@ mod tests {
         }
     }
 
-    /// D-11: the Program ID selects the table. A signal without an entry stays a raw word.
+    /// D-11: the Program ID of the board selects the signal table. A signal without an entry in the table stays a raw word.
     #[test]
     fn d11_tables_are_found_by_program_and_name() {
         let text = "[[program]]\nprogram_id = [0x1234, 0x4B3F]\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\" }\n\
@@ -294,7 +294,7 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 
-    /// D-11: the letter case of names in the table does not matter, as for values given by the user.
+    /// D-11: the letter case of names in the signal table does not matter, as for values that the user gives.
     #[test]
     fn d11_names_of_the_table_are_found_in_any_case() {
         let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\
@@ -307,7 +307,7 @@ mod tests {
         assert!(table.is_given() && !SignalTable::default().is_given());
     }
 
-    /// A template is a valid table and contains every signal.
+    /// A template is a valid signal table and contains every signal.
     #[test]
     fn a_template_is_a_table_of_all_signals() {
         let text = SignalTable::template(&[(0x1234, &description())]);

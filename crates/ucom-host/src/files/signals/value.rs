@@ -1,8 +1,8 @@
-//! Value written by a user, on a command line or in a parameter file.
+//! Value that a user writes on a command line or in a parameter file.
 use core::fmt;
 use core::str::FromStr;
 
-/// Longest unit, in bytes.
+/// Longest unit of a value, in bytes.
 const UNIT_MAX: usize = 32;
 
 /// A value that is not assigned to a signal yet.
@@ -10,14 +10,15 @@ const UNIT_MAX: usize = 32;
 pub enum SignalValue {
     /// `0x05DC`: a raw word, for any type and scale of the signal.
     Raw(u16),
-    /// `15.5 deg`: a value in the signal's unit. `15.5`: a value of a signal without a unit; without a signal table, the word as a number.
+    /// Number, with or without a unit. `15.5 deg` is a value in the signal's unit. `15.5` is a value of a signal without a unit. Without a
+    /// signal table, `15.5` is the word as a number.
     Number {
-        /// The number.
+        /// Number in the text.
         value: f64,
         /// Unit after the number; empty if the text has no unit.
         unit: String,
     },
-    /// `on`, `off`, `true`, `false`, `yes`, `no`.
+    /// Switch: `on`, `off`, `true`, `false`, `yes`, `no`.
     Switch(bool),
 }
 
@@ -27,7 +28,7 @@ pub enum SignalValueError {
     /// The text is hexadecimal, but not a 16-bit word.
     #[error("\"{0}\" is not a 16-bit word, expected 0x0000 to 0xFFFF")]
     Hex(String),
-    /// The text is not in any form of a value.
+    /// The text does not have the form of a value.
     #[error(
         "\"{0}\" is not a value, expected a number (15.5deg, or 15.5 if the signal has no unit), a word \
          (0x05DC), on or off"
@@ -51,11 +52,11 @@ impl FromStr for SignalValue {
             return word.map(Self::Raw).ok_or_else(|| SignalValueError::Hex(text.into()));
         }
         let wrong = || SignalValueError::Form(text.into());
-        // Rust reads words like "inf" and "nan" as numbers, but users do not mean numbers.
+        // Rust reads words like "inf" and "nan" as numbers, but users do not mean numbers by these words.
         if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
             return Err(wrong());
         }
-        // The number is the longest valid part at the start of the text. The remainder is the unit.
+        // The number is the longest valid number at the start of the text. The remainder of the text is the unit.
         let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
@@ -63,7 +64,8 @@ impl FromStr for SignalValue {
         if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
-        // 0o10 and -0x10 are numbers in other languages. Such texts are refused, so that they are not read as 0 with a unit.
+        // The texts 0o10 and -0x10 are numbers in other languages. The reader refuses such texts, so that it does not read them as 0 with a
+        // unit.
         let mut letters = unit.chars();
         let joined = !text.contains(char::is_whitespace);
         if joined
@@ -77,7 +79,7 @@ impl FromStr for SignalValue {
     }
 }
 
-/// Returns `true` if a unit can follow a number without being read as a part of it.
+/// Returns `true` if a reader cannot mistake the unit after a number for a part of the number.
 pub(super) fn may_follow(unit: &str) -> bool {
     !unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_:;'".contains(c))
 }
@@ -94,7 +96,7 @@ impl fmt::Display for SignalValue {
             Self::Raw(word) => write!(f, "0x{word:04X}"),
             Self::Number { value, unit } => {
                 let size = value.abs();
-                // Without the exponent, 1e300 would be printed with 300 zeros.
+                // Without the exponent, the number 1e300 would be printed with 300 zeros.
                 if *value != 0.0 && !(1e-6..1e15).contains(&size) {
                     write!(f, "{value:e}")?;
                 } else {
@@ -134,7 +136,7 @@ mod tests {
             assert!(given(wrong).is_err(), "{wrong}");
         }
         assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
-        // The displayed form of an accepted text is also accepted, although it has an additional blank.
+        // The displayed form of an accepted text is also accepted, although it contains an additional blank.
         assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
         for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
             assert_eq!(given(text).unwrap().to_string(), short);

@@ -1,49 +1,49 @@
-//! Errors of values for signals.
+//! Errors that occur when a value is converted to a signal's word.
 /// Reasons why a value cannot be written to a signal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
     /// The value is too large or too small.
     #[error("{given} is outside {min}..{max}{}", space(unit))]
     Range {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
-        /// Smallest value.
+        /// Smallest allowed value.
         min: String,
-        /// Largest value.
+        /// Largest allowed value.
         max: String,
         /// Unit of the limits.
         unit: String,
-        /// The value as a number in this unit.
+        /// Requested value as a number in this unit.
         value: f64,
-        /// The limit that was exceeded.
+        /// Limit that the value exceeds.
         limit: f64,
     },
-    /// The unit differs from the signal's unit.
+    /// The unit of the value differs from the signal's unit.
     #[error("{given}: {}", if unit.is_empty() { "the unit of the signal is not known".into() } else { format!("the unit of the signal is {unit}") })]
     Unit {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
-        /// The signal's unit.
+        /// Unit of the signal.
         unit: String,
     },
-    /// A number without a unit, which could be the raw word or a value in the signal's unit.
+    /// The value is a number without a unit, which could be the raw word or a value in the signal's unit.
     #[error("{given}: {}, or give the word as 0x0000", no_unit(given, unit))]
     NoUnit {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
-        /// Unit of the signal. Empty if the table scales the signal but has no unit for it.
+        /// Unit of the signal. The unit is empty if the table scales the signal but has no unit for it.
         unit: String,
     },
     /// The value lies between two words.
     #[error("{given}: the signal has whole numbers only")]
     Fraction {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
     },
-    /// The value is not 0, 1, on or off.
+    /// The signal is a switch, but the value is not 0, 1, on or off.
     #[error("{given}: the signal has the values on and off only")]
     Switch {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
     },
     /// The value is a number or a switch, but the meaning of the signal is not known.
@@ -51,13 +51,13 @@ pub enum ValueError {
         "{given}: the signal table does not contain this program, so only a word (0x0000 to 0xFFFF) is valid"
     )]
     Meaning {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
     },
     /// The value is on or off, but the signal is a number.
     #[error("{given}: the signal is a number")]
     NoSwitch {
-        /// Text of the user.
+        /// Text that the user wrote.
         given: String,
     },
 }

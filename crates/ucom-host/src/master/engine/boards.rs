@@ -1,4 +1,4 @@
-//! The last known state of the boards, and their supervision by heartbeats (D-51).
+//! The last known states of the boards, and the supervision of the boards by heartbeats (D-51).
 
 use std::collections::BTreeMap;
 use ucom::{Admin, Assembled, BoardInfo, ErrorCode, Function, Payload, Profile, Status, StringAssembler};
@@ -6,56 +6,56 @@ use ucom::{Admin, Assembled, BoardInfo, ErrorCode, Function, Payload, Profile, S
 /// State of a board's heartbeats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Life {
-    /// No heartbeat was received yet, or the application was stopped by a command.
+    /// No heartbeat was received yet, or a command stopped the application.
     #[default]
     Unarmed,
-    /// The heartbeats arrive in time.
+    /// The heartbeats of the board arrive in time.
     Alive,
-    /// A single heartbeat is missing.
+    /// A single heartbeat of the board is missing.
     Late,
-    /// Three heartbeats are missing.
+    /// Three heartbeats of the board are missing.
     Lost,
 }
 
 /// Time in µs after the end of a board's application during which a last heartbeat may still arrive.
 const UNDER_WAY: u64 = 100_000;
 
-/// State of a board as last received.
+/// Last known state of a board.
 #[derive(Clone, Debug, Default)]
 pub struct Board {
-    /// Last answer to PC_INFO.
+    /// Last answer of the board to PC_INFO.
     pub info: Option<BoardInfo>,
     /// Description; `None` until it has been received completely.
     pub description: Option<String>,
-    /// Flags that the board sent last.
+    /// Flags that the board sent last (`MCA_ADMIN_DATA`).
     pub admin: Option<Admin>,
-    /// State of the supervision.
+    /// State of the board's supervision.
     pub life: Life,
     /// Time of the last heartbeat, µs.
     pub alive_at: Option<u64>,
-    /// Time (µs) and function of the last frame of any kind.
+    /// Time (µs) and function of the last frame from the board.
     pub last: Option<(u64, Function)>,
-    /// Time of the last sensor outputs, µs. The control loop was running at that time.
+    /// Time of the last sensor outputs, µs. The control loop of the board was running at that time.
     pub so_at: Option<u64>,
     /// `true` if the board has rebooted since it got its number.
     pub rebooted: bool,
     /// Last errors that the board reported, at most 16, the newest last. Each entry contains the time in µs and the code.
     pub errors: Vec<(u64, ErrorCode)>,
-    /// Number of reported errors.
+    /// Number of errors that the board has reported.
     pub error_count: u64,
     /// Number of strings of the board that could not be reassembled.
     pub bad_strings: u64,
-    /// Number of MCA_DSP_READY frames, including frames that were not requested.
+    /// Number of MCA_DSP_READY frames from the board, including frames without a request.
     pub ready_count: u64,
-    /// Start of the time in which the application is known to be stopped and no automatic start is pending.
+    /// Time since which the application is known to be stopped and no automatic start is pending.
     pub(crate) stopped_at: Option<u64>,
-    /// Time of the last start command. The time is cleared when the board shows that it has started.
+    /// Time of the last start command to the board. The time is cleared when the board reports that it has started.
     pub(crate) starting_since: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
 
 impl Life {
-    /// Returns the displayed name, which is one word.
+    /// Returns the name of the state for display, which is one word.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unarmed => "-",
@@ -80,12 +80,12 @@ pub const fn state_name(status: Status) -> &'static str {
 }
 
 impl Board {
-    /// Returns `true` if the last received state is still valid: the board is not lost and has not rebooted.
+    /// Returns `true` if the last received state of the board is still valid: the board is not lost and has not rebooted.
     pub fn is_known(&self) -> bool {
         self.life != Life::Lost && !self.rebooted
     }
 
-    /// Returns the state in one word. Unsolicited frames of the board have priority over an older answer.
+    /// Returns the state of the board in one word. Frames that the board sent without a request have priority over an older answer.
     pub fn state_name(&self, now_us: u64) -> &'static str {
         match (self.life, self.status()) {
             _ if self.rebooted => "rebooted",
@@ -97,7 +97,7 @@ impl Board {
         }
     }
 
-    /// Returns the time since the last heartbeat in s.
+    /// Returns the time since the last heartbeat of the board in s.
     pub fn alive_age_s(&self, now_us: u64) -> Option<f64> {
         self.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
@@ -113,14 +113,14 @@ impl Board {
         self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000)
     }
 
-    /// Returns `true` if the control loop runs, according to the last frames of the board.
+    /// Returns `true` if the control loop of the board runs, according to the last frames of the board.
     pub fn running(&self, now: u64) -> bool {
         self.sends_outputs(now)
             || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
     }
 
-    /// Handles a package of a text of the board. Returns the text when it is complete. `passed_us` is the total of the times between
-    /// frames.
+    /// Handles one package of a text that the board sends. The function returns the text when it is complete. `passed_us` is the sum of the
+    /// times between the received frames.
     pub(crate) fn debug_text(
         &mut self,
         passed_us: u64,
@@ -151,7 +151,8 @@ impl Board {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
-    /// Records that the application has ended or will end now. From now on heartbeats are not expected, and the state is unknown.
+    /// Records that the application of the board has ended or will end now. After this call, the master expects no heartbeats of the board,
+    /// and the state of the board is unknown.
     pub(crate) fn application_ended(&mut self) {
         self.life = Life::Unarmed;
         self.alive_at = None;
@@ -160,7 +161,7 @@ impl Board {
     }
 }
 
-/// Boards by number.
+/// Last known states of the boards, by board number.
 #[derive(Clone, Debug, Default)]
 pub struct Boards {
     boards: BTreeMap<u8, Board>,
@@ -185,7 +186,7 @@ impl Boards {
         self.boards.iter_mut().map(|(n, board)| (*n, board))
     }
 
-    /// Removes all boards, because all numbers have become invalid.
+    /// Removes all boards, because all board numbers have become invalid.
     pub(crate) fn clear(&mut self) {
         self.boards.clear();
     }

@@ -1,4 +1,4 @@
-//! Events: reports of the master that its user did not request.
+//! Events that the master reports without a request of its user.
 use crate::master::error::Error;
 use crate::master::io::Snapshot;
 use crate::master::reports::update::Progress;
@@ -11,106 +11,106 @@ use ucom::{Admin, BoardInfo, ErrorCode, Foreign, Function};
 pub enum Event {
     /// A procedure ended.
     Done {
-        /// Procedure.
+        /// Procedure that ended.
         id: ProcedureId,
-        /// Result.
+        /// Result of the procedure.
         result: Result<Outcome, Error>,
     },
     /// An update made progress.
     Progress {
-        /// Procedure.
+        /// Procedure of the update.
         id: ProcedureId,
-        /// Progress.
+        /// Progress of the update.
         progress: Progress,
     },
     /// An update will reset this board for programming, so the board's flash record is no longer valid (D-62). The board's memory is erased
     /// only after the board has answered the reset.
     FlashBegins {
-        /// Procedure.
+        /// Procedure of the update.
         id: ProcedureId,
         /// Flash number of the board.
         flash_number: u16,
     },
     /// A board reported the program that an update has written (D-62).
     FlashVerified {
-        /// Procedure.
+        /// Procedure of the update.
         id: ProcedureId,
-        /// Answer of the board.
+        /// Answer of the board to PC_INFO.
         info: BoardInfo,
     },
     /// A conformance test ended.
     Tested {
-        /// Procedure.
+        /// Procedure of the conformance tests.
         id: ProcedureId,
-        /// Result.
+        /// Test that ended, with its result.
         test: ConformanceTest,
     },
     /// A procedure reports a note before its end.
     Note {
-        /// Procedure.
+        /// Procedure that reports the note.
         id: ProcedureId,
         /// Text of the note.
         text: String,
     },
-    /// A board's heartbeats changed.
+    /// The supervision of a board's heartbeats changed.
     Supervision {
         /// Board number.
         board: u8,
-        /// Change.
+        /// Change of the board's supervision.
         change: Supervision,
     },
     /// A board reported an error.
     BoardError {
-        /// Board number; 0 (or its equivalent) from a board without a number.
+        /// Board number; for a board without a number, the number that the profile defines for such boards (0 by default).
         board: u8,
-        /// The code.
+        /// Reported error code.
         code: ErrorCode,
-        /// Procedure that works with the board; `None` if no procedure does.
+        /// Procedure that works with the board; `None` if no procedure works with it.
         during: Option<ProcedureId>,
     },
     /// A board sent its flags without a request.
     Admin {
         /// Board number.
         board: u8,
-        /// The flags.
+        /// Flags that the board sent.
         admin: Admin,
     },
     /// A board sent a text.
     Debug {
         /// Board number.
         board: u8,
-        /// The text.
+        /// Text of the board.
         text: String,
     },
-    /// All sensor outputs of a board at one time. Reported only for boards that [`Master::watch`](crate::master::Master::watch) has
-    /// selected.
+    /// All sensor outputs of a board at one time. The master reports this event only for boards that
+    /// [`Master::watch`](crate::master::Master::watch) has selected.
     Snapshot {
         /// Board number.
         board: u8,
-        /// The words.
+        /// Values of the sensor outputs.
         snapshot: Snapshot,
     },
-    /// A frame is not of this protocol (D-02). Only the first frame of each kind is reported, but all frames are counted.
+    /// A frame is not of this protocol (D-02). The master reports only the first foreign frame of each kind, but counts all foreign frames.
     Foreign(Foreign),
-    /// Another PC sent a frame and is therefore a competing master (D-08). The event is reported only after at least one second without
-    /// frames of another PC. [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that sends
-    /// permanently.
+    /// Another PC sent a frame and is therefore a competing master (D-08). The master reports this event only after at least one second
+    /// without frames of another PC. [`Master::competing_master`](crate::master::Master::competing_master) also returns a competing master
+    /// that sends permanently.
     CompetingMaster {
         /// Function of the frame.
         function: Function,
-        /// Number that the frame was sent to.
+        /// Board number that the frame was sent to; it can be the broadcast number.
         to: u8,
     },
-    /// Two boards have the same number (D-24). The event is reported only once until numbers are assigned again.
+    /// Two boards have the same number (D-24). The master reports each shared number only once until the number is assigned again.
     NumberShared {
-        /// The number.
+        /// Number that the boards share.
         board: u8,
-        /// Flash numbers of these boards. The list contains one number twice if the boards cannot be distinguished.
+        /// Flash numbers of the boards that share the number. The list contains one number twice if the boards cannot be distinguished.
         found: Vec<u16>,
     },
-    /// Events were discarded because the caller did not fetch them.
+    /// The master discarded events because the caller did not fetch them.
     Overflow {
-        /// Number of discarded events.
+        /// Number of events that the master discarded.
         dropped: u64,
     },
 }
@@ -118,20 +118,20 @@ pub enum Event {
 /// Change of a board's supervision (D-51).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supervision {
-    /// A heartbeat is missing.
+    /// A heartbeat of the board is missing.
     Late,
-    /// Three heartbeats are missing. The frames that the policy requires are sent at once.
+    /// Three heartbeats of the board are missing. The master immediately sends the frames that the policy requires.
     Lost,
-    /// The heartbeats have returned.
+    /// The board sends heartbeats again.
     Back,
-    /// The board sent a report without a request: it has rebooted and has lost its number (D-26).
+    /// The board sent a report without a request, which means that it has rebooted and has lost its number (D-26).
     Rebooted {
-        /// Low byte of its flash number.
+        /// Low byte of the board's flash number.
         ucom_id: u8,
     },
     /// An unknown board sent a report without a request.
     UnknownRebooted {
-        /// Low byte of its flash number.
+        /// Low byte of the board's flash number.
         ucom_id: u8,
     },
 }

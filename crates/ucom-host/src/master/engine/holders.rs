@@ -1,28 +1,29 @@
-//! Detection of numbers that two boards share. The master checks every answer to PC_INFO, for all procedures.
+//! Detection of numbers that two boards share. The master checks every answer to PC_INFO, for each procedure.
 //!
-//! If two boards have the same number, both boards carry out every command to this number: both are flashed, and both move. A board cannot
-//! detect a shared number, but the PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before
-//! a procedure changes a board, it waits until no other board can answer (`one_board_each`).
+//! If two boards have the same number, both boards carry out every command to this number: an update writes both boards, and both boards
+//! move. A board cannot detect a shared number, but the PC can, because two boards answer one PC_INFO. The master compares all answers
+//! ([`Holders::received`]). Before a procedure changes a board, the procedure waits until no other board can answer (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
-/// Number of consecutive PC_INFO requests that the same flash number must answer twice. A single double answer is not enough, because a
-/// gateway may sometimes double a frame.
+/// Number of consecutive PC_INFO requests that one flash number must answer twice before the board number is considered shared. A single
+/// double answer is not enough, because a gateway may sometimes send a frame twice.
 const TWICE: u32 = 3;
-/// Limit of flash numbers stored per number. Damaged answers may contain any flash number.
+/// Limit of flash numbers that are stored for each board number. The limit is necessary because damaged answers may contain any flash
+/// number.
 const MOST: usize = 8;
 
-/// Returns the contents of a first frame of DSP_INFO; `None` for other frames. A package of the description does not contain the board's
-/// number or a possible status at these positions.
+/// Returns the contents of a first frame of DSP_INFO; `None` for other frames. At these positions, a package of the description does not
+/// contain the board's number or a possible status.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
     let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
     (possible && info.sequence == number).then_some(info)
 }
 
-/// Boards that answered, by number.
+/// Boards that answered PC_INFO, by board number.
 #[derive(Debug, Default)]
 pub(crate) struct Holders {
     numbers: BTreeMap<u8, Holder>,
@@ -31,10 +32,10 @@ pub(crate) struct Holders {
 /// Boards that have answered to a number since it was assigned.
 #[derive(Debug, Default)]
 struct Holder {
-    /// Time of the last PC_INFO, µs.
+    /// Time of the last PC_INFO to the number, µs.
     asked_at: Option<u64>,
-    /// Counts of the answers to the last PC_INFO: first frames of each flash number, other frames, and other frames that one answer
-    /// contains.
+    /// Counts of the frames that answered the last PC_INFO: first frames of each flash number, other frames, and other frames of one
+    /// complete answer.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
@@ -45,7 +46,7 @@ struct Holder {
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
-    /// Flash numbers of the boards that share the number, once this is certain.
+    /// Flash numbers of the boards that share the number; empty until it is certain that boards share it.
     shared: Vec<u16>,
 }
 
@@ -89,11 +90,11 @@ impl Holder {
         }
     }
 
-    /// Returns the flash numbers of the boards that share the number, according to the answers received so far. The list is empty if no
-    /// boards share it.
+    /// Returns the flash numbers of the boards that share the number, according to the answers received so far. The list is empty if the
+    /// answers do not show that boards share the number.
     ///
-    /// A single damaged answer, or a board that has replaced another board, is not mistaken for a shared number. If flash numbers answer
-    /// different PC_INFO requests, each flash number must answer repeatedly, and the flash numbers must alternate.
+    /// A single damaged answer is not mistaken for a shared number. A board that has replaced another board is not mistaken for one either.
+    /// If flash numbers answer different PC_INFO requests, each flash number must answer repeatedly, and the flash numbers must alternate.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();
@@ -110,12 +111,12 @@ impl Holder {
     }
 }
 
-/// Next step that is needed to be sure that a number belongs to one board.
+/// Next step after which the PC can be sure that a number belongs to one board.
 pub(crate) enum Open {
     Nothing,
     /// Another board may still answer until this time.
     Wait(u64),
-    /// No board has answered.
+    /// No board has answered a recent PC_INFO to the number.
     Ask,
     /// A flash number answered twice, so one more PC_INFO is needed.
     AskAgain,
@@ -127,7 +128,8 @@ impl Holders {
         self.numbers.entry(number.number()).or_default().ask(now);
     }
 
-    /// Handles a frame of DSP_INFO. If this frame shows that boards share the number, returns their flash numbers.
+    /// Handles a frame of DSP_INFO for a number. If this frame shows that boards share the number, the function returns their flash
+    /// numbers.
     pub(crate) fn received(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
         let holder = self.numbers.entry(number).or_default();
         holder.answer(number, payload, profile);
@@ -157,7 +159,7 @@ impl Holders {
             _ => false,
         };
         match (forgets, function) {
-            // For any `addr.broadcast`, a reset to the number for boards without a number reaches all boards.
+            // For any `addr.broadcast`, a reset that is sent to the number for boards without a number reaches all boards.
             (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
             (true, _) => self.forget(to.number()),
             (false, Function::Info) if broadcast => {
@@ -174,12 +176,13 @@ impl Holders {
         mine.filter_map(|(_, holder)| holder.asked_at).max()
     }
 
-    /// Removes a number that another board may have now, because the number was assigned or withdrawn, or its board has rebooted.
+    /// Removes the recorded answers of a number that another board may have now: the number was assigned or withdrawn, or its board has
+    /// rebooted.
     pub(crate) fn forget(&mut self, number: u8) {
         self.numbers.remove(&number);
     }
 
-    /// Removes all numbers, because all of them have become invalid.
+    /// Removes the recorded answers of all numbers, because all numbers have become invalid.
     fn clear(&mut self) {
         self.numbers.clear();
     }
@@ -197,14 +200,14 @@ impl Holders {
         self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
     }
 
-    /// Returns the numbers that one flash number has answered twice, but not often enough to be certain.
+    /// Returns the numbers to which one flash number has answered twice, but not often enough to be certain.
     pub(crate) fn doubtful(&self) -> Vec<u8> {
         let doubtful = |holder: &Holder| holder.shared.is_empty() && holder.answered_twice();
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// Returns the next step that is needed for a number. All frames up to the time `received` have been delivered. Answers to PC_INFO
-    /// requests older than `oldest` µs are not accepted.
+    /// Returns the next step that is needed to be sure that a number belongs to one board. The driver has delivered all frames up to the
+    /// time `received`. A PC_INFO that was sent more than `oldest` µs ago does not count.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {

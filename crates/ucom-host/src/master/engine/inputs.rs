@@ -7,7 +7,7 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percentage of the bus time that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
-/// Longest delay of the repetitions, in µs, for which the master later compensates.
+/// Longest delay of the repeated inputs, in µs, for which the master later compensates.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
@@ -24,11 +24,11 @@ impl Core {
         all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
-    /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The board that has
-    /// waited longest is first.
+    /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The master sends the
+    /// inputs of the board that has waited longest first.
     ///
-    /// The repetitions use only a part of the bus time, even if boards were started with `force`. On the bus, answers and heartbeats have a
-    /// lower priority than inputs, and a socket accepts more frames than the bus can carry.
+    /// The repeated inputs use only a part of the bus time, even if boards were started with `force`. On the bus, answers and heartbeats
+    /// have a lower priority than inputs. A socket accepts more frames than the bus can carry.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -60,8 +60,9 @@ impl Core {
         offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
-    /// Sends a changed input at once. If this PC repeats the inputs, it sends the complete package, which takes effect as a whole (D-34).
-    /// If this PC does not repeat the inputs, it sends only the word (DLC 4, D-15), because it does not know the other words.
+    /// Sends a changed controller input at once. If this PC repeats the inputs, it sends the complete package of inputs, which takes effect
+    /// as a whole (D-34). If this PC does not repeat the inputs, it sends only the changed word (DLC 4, D-15), because it does not know the
+    /// other words.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
         let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
         if data.repeat.is_some() {
@@ -80,15 +81,15 @@ impl Core {
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
             data.ci_known.clear();
-            // The board may run another application now.
+            // The board may run another application now, so its stored description no longer counts as sent.
             data.sent = false;
         }
     }
 
-    /// Writes one parameter. The shadow stores the value as assumed (D-35).
+    /// Writes one parameter of a board. The PC cannot read the value back, so the shadow stores it as assumed (D-35).
     ///
-    /// The package contains only this word (DLC 4, which every receiver accepts). The other words of the package may be unknown and must
-    /// not change.
+    /// The package contains only the word of this parameter (DLC 4, which every receiver accepts). The other words of the buffer may be
+    /// unknown and must not change.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };
         let Some(data) = self.data.get_mut(&board) else { return false };

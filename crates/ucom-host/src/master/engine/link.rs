@@ -1,8 +1,8 @@
-//! Actions of a procedure: sending, waiting for frames, sleeping.
+//! Actions of a procedure: it sends frames, waits for frames, and sleeps.
 //!
-//! Procedures are `async` functions without an executor. The compiler turns each procedure into a state machine, and
-//! [`Master`](crate::master::Master) advances it when a frame arrives or a wait ends. A procedure can therefore be read as a sequence of
-//! steps. No lock is ever held during a wait.
+//! Procedures are `async` functions without an executor. The compiler turns each procedure into a state machine.
+//! [`Master`](crate::master::Master) advances this state machine when a frame arrives or a wait ends. A procedure can therefore be read as
+//! a sequence of steps. A procedure never holds a lock while it waits.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use core::future::{Future, poll_fn};
@@ -24,7 +24,7 @@ pub(crate) struct Link {
     pub(crate) id: ProcedureId,
 }
 
-/// Locks the core. The core stays usable after a panic in another thread.
+/// Locks the core of the master. The core can still be used after a panic in another thread.
 pub(crate) fn lock(core: &Mutex<Core>) -> MutexGuard<'_, Core> {
     core.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -67,15 +67,15 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but does not discard errors. `feed` is for program data, because a board may report an error in the middle of a
-    /// block. Returns the time at which the frame left the queue.
+    /// Like [`Link::ask`], but keeps error frames that were received before the frame left the queue. `feed` is for program data, because a
+    /// board may report an error in the middle of a block. The function returns the time at which the frame left the queue.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
         self.with(|core| core.sent_at)
     }
 
-    /// Like [`Link::send`], but for a frame in any format.
+    /// Like [`Link::send`], but sends a frame that the caller has built.
     pub(crate) async fn send_frame(&self, frame: Frame) {
         let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
         self.left(serial).await;
@@ -106,7 +106,7 @@ impl Link {
         self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
 
-    /// Waits until `take` returns a result for the mailbox; returns `None` if `take` has no result before `until`.
+    /// Waits until `take` finds a result in the mailbox; returns `None` if `take` finds no result before `until`.
     pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
@@ -127,7 +127,7 @@ impl Link {
         .await
     }
 
-    /// Returns the next unparsed frame; `None` if no frame arrives before `until`.
+    /// Returns the next unparsed frame; `None` if no unparsed frame arrives before `until`.
     pub(crate) async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
         self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
@@ -173,9 +173,10 @@ impl Link {
         }
     }
 
-    /// Runs `work`, and ends it early in three cases. [`MasterError::Cancelled`]: the caller cancels it. [`MasterError::Bus`]: the caller
-    /// reports that the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared): two boards with the same number appear,
-    /// and the procedure does not tolerate this. This error is reported only once. The queued frames of the procedure are then discarded.
+    /// Runs `work`, and ends `work` early with one of three errors. [`MasterError::Cancelled`]: the caller cancels the procedure.
+    /// [`MasterError::Bus`]: the caller reports that the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared): two
+    /// boards with the same number appear, and the procedure does not tolerate shared numbers. `NumberShared` is reported only once. In
+    /// each case, the queued frames of the procedure are discarded.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -190,7 +191,8 @@ impl Link {
                 let mut ended = gone.or(cancelled);
                 if ended.is_none() && !mailbox.bears_shared_numbers {
                     ended = core.holders.shared(mailbox.claims).map(Error::from);
-                    // The procedure now undoes its changes. The reason that ended the procedure must not end this step.
+                    // After this error, the procedure undoes its changes. A shared number that ended the procedure must not also end this
+                    // clean-up.
                     mailbox.bears_shared_numbers = ended.is_some();
                 }
                 if ended.is_some() {
@@ -206,7 +208,8 @@ impl Link {
         .await
     }
 
-    /// Sets whether the procedure tolerates two boards with the same number. If `bears` is `false`, such boards end the procedure.
+    /// Sets whether the procedure tolerates two boards with the same number. If `bears` is `false`, two boards with the same number end the
+    /// procedure.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {

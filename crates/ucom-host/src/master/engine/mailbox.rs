@@ -3,31 +3,31 @@ use std::collections::VecDeque;
 
 use ucom::{Frame, FromBoard, Function};
 
-/// Limit of frames that wait in a mailbox.
+/// Limit of the frames that wait in a mailbox.
 pub(crate) const MAX_RECEIVED: usize = 16_384;
 
 /// A frame of a board that a procedure receives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Received {
-    /// Time in µs that has certainly passed between frames since the start.
+    /// Time of reception in µs, measured as the time that has certainly passed between frames since the start.
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,
 }
 
-/// Selection of the frames that a procedure receives.
+/// Selection of boards and functions whose frames a procedure receives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Filter {
-    /// Boards; bit n is board n.
+    /// Boards whose frames are received; bit n is board n.
     pub boards: u32,
-    /// Functions; bit n is function n.
+    /// Functions that are received; bit n is function n.
     pub functions: u32,
 }
 
 impl Filter {
     pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
         let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
-        // Errors are always included, because a board may answer any request with an error.
+        // The filter always includes error frames, because a board may answer any request with an error.
         Self { boards, functions: functions | 1 << Function::Error.number() }
     }
 
@@ -44,14 +44,14 @@ pub(crate) struct Mailbox {
     pub claims: u32,
     pub filter: Filter,
     pub received: VecDeque<Received>,
-    /// Every unparsed frame, for a procedure that evaluates frames itself.
+    /// All received frames in unparsed form, for a procedure that evaluates frames itself.
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
-    /// `true` if two boards with the same number do not end the procedure. The value is `true` for a stop, for a step that undoes changes,
-    /// and for a procedure that checks numbers itself.
+    /// `true` if two boards with the same number do not end the procedure. The value is `true` for three kinds of work: a stop, a step that
+    /// undoes changes, and a procedure that checks numbers itself.
     pub bears_shared_numbers: bool,
-    /// Reason why frames can no longer be sent or received.
+    /// Reason why the procedure can no longer send or receive frames.
     pub bus_gone: Option<String>,
 }
 
@@ -59,7 +59,7 @@ pub(crate) struct Mailbox {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Forget {
     Nothing,
-    /// All frames except errors.
+    /// All frames except error frames.
     Answers,
     All,
 }

@@ -1,4 +1,4 @@
-//! State that all procedures share: clock, queued frames, mailboxes, and the last known state of the boards.
+//! State that all procedures share: clock, queued frames, mailboxes, and the last known states of the boards.
 
 use crate::master::engine::boards::Boards;
 use crate::master::engine::event::Event;
@@ -13,59 +13,61 @@ use crate::master::reports::ProcedureId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use ucom::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, Status, ToBoard};
 
-/// Limit of events that the user has not fetched yet.
+/// Limit of the events that the user has not fetched yet.
 const MAX_EVENTS: usize = 4096;
 
 struct Outgoing {
     serial: u64,
     owner: Option<ProcedureId>,
-    /// Received frames that the owner discards when this frame leaves the queue.
+    /// Received frames that the procedure discards when this frame leaves the queue.
     forget: Forget,
     what: What,
 }
 
 enum What {
     Frame(Frame),
-    /// Package of a board's inputs that begins with word `offset`. The values are read when the package is sent, so queued inputs are never
-    /// outdated.
+    /// Package of a board's inputs that begins with word `offset`. The values of the inputs are read when the package is sent, so queued
+    /// inputs are never outdated.
     Inputs {
         board: u8,
         offset: u16,
     },
 }
 
-/// Role of this PC.
+/// Role of this PC on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Session {
     /// The PC only listens and sends queries.
     Quiet,
-    /// The PC sends heartbeats.
+    /// The PC is the master and sends heartbeats.
     Master { next_alive: u64 },
 }
 
 pub(crate) struct Core {
     pub profile: Profile,
     pub times: Times,
-    /// Time of the last call.
+    /// Time of the last call of the master.
     pub now: u64,
-    /// Time at which waits end: the time of the last `poll`. The caller has then delivered all frames received before. If the caller is
-    /// late, frames received between this time and `now` are not delivered yet.
+    /// Time at which the waits of procedures end: the time of the last `poll`. At that time, the caller has delivered all frames that were
+    /// received before. If the caller is late, it has not delivered the frames between this time and `now` yet.
     pub fired: u64,
-    /// Time that has certainly passed between received frames: the sum of the times from a last frame to the next `poll`. Simultaneous
-    /// frames that the caller delivers late do not increase this time, so they do not cause a gap in a string.
+    /// Time that has certainly passed between received frames: the sum of the times from the delivery of a frame to the last `poll` before
+    /// the next frame. Frames that were received at the same time and delivered late do not increase this time. Such frames therefore do
+    /// not cause a gap in a string.
     pub passed: u64,
-    /// Time at which the last frame was delivered.
+    /// Time at which the caller delivered the last frame.
     handed_over: u64,
     /// Time at which this PC started to listen to the bus.
     pub since: Option<u64>,
     pub session: Session,
-    /// Last frame of another PC.
+    /// Time, function and destination number of the last frame of another PC.
     pub competing_master: Option<(u64, Function, u8)>,
-    /// Reports until this time are considered to be answers.
+    /// Until this time, a report of a board is considered to be an answer and not the sign of a reboot.
     pub report_until: u64,
-    /// Stop commands of the policy that will be repeated, and their times. The stops are repeated because a frame can be lost.
+    /// Times at which stop commands of the policy will be repeated, with the boards. The master repeats the stops because a frame can be
+    /// lost.
     pub stops: Vec<(u64, Sequence)>,
-    /// Earliest time at which inputs may be repeated.
+    /// Earliest time at which the inputs may be repeated.
     pub inputs_from: u64,
     pub boards: Boards,
     /// Boards that have answered, by number.
@@ -76,7 +78,8 @@ pub(crate) struct Core {
     pub mailboxes: BTreeMap<ProcedureId, Mailbox>,
     urgent: VecDeque<Frame>,
     normal: VecDeque<Outgoing>,
-    /// Packages of inputs in `normal`. Each package is queued only once, so the queue stays short if the bus cannot carry all inputs.
+    /// Packages of inputs that are queued in `normal`. Each package is queued only once, so the queue stays short if the bus cannot carry
+    /// all inputs.
     waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
@@ -118,14 +121,14 @@ impl Core {
         }
     }
 
-    /// Advances the time, but never backwards.
+    /// Sets the current time, which never moves backwards.
     pub(crate) fn advance(&mut self, now: u64) {
         self.now = self.now.max(now);
         self.since.get_or_insert(self.now);
     }
 
     pub(crate) fn event(&mut self, event: Event) {
-        // The end of a procedure must be reported, even if other events are discarded.
+        // The queue always accepts the end of a procedure, even if it discards other events.
         if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
             self.dropped += 1;
         } else {
@@ -141,12 +144,12 @@ impl Core {
         event
     }
 
-    /// Queues a frame before all other frames. Used for heartbeats and stops.
+    /// Queues a frame before all other frames of the PC. The master uses this function for heartbeats and stops.
     pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
 
-    /// Queues a frame. Returns the serial number of the frame for [`Core::left`].
+    /// Queues a frame for the bus. The function returns the serial number of the frame for [`Core::left`].
     pub(crate) fn queue(
         &mut self,
         owner: Option<ProcedureId>,
@@ -210,7 +213,7 @@ impl Core {
                 What::Frame(frame) => Some(frame),
                 What::Inputs { board, offset } => self.inputs_frame(board, offset),
             };
-            // A package that no longer exists is skipped.
+            // A package whose inputs no longer exist is skipped.
             if frame.is_some() {
                 return frame;
             }
@@ -262,7 +265,8 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure may wait for a removed frame that was queued before the first remaining frame. The procedure must not wait endlessly.
+        // A procedure may wait for a removed frame that was queued before the first remaining frame. These removed frames count as sent, so
+        // that the procedure does not wait endlessly.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }
@@ -271,7 +275,7 @@ impl Core {
         self.urgent.is_empty() && self.normal.is_empty()
     }
 
-    /// Records the time at which a frame is delivered.
+    /// Records the time at which the caller delivers a frame.
     pub(crate) fn mark_time(&mut self) {
         self.passed += self.fired.saturating_sub(self.handed_over);
         self.handed_over = self.now;
@@ -314,7 +318,7 @@ impl Core {
         }
     }
 
-    /// Handles a frame that only a PC sends.
+    /// Handles a frame that only another PC can have sent.
     pub(crate) fn competing_master_frame(&mut self, function: Function, to: u8, data: &[u8]) {
         self.statistics.competing_master += 1;
         if let Some(to) = Sequence::new(to) {
@@ -326,10 +330,10 @@ impl Core {
             self.may_start(to);
         }
         if function == Function::AskReport {
-            // The reports that follow are answers to the other PC. The reports do not mean that a board has rebooted.
+            // The reports that follow are answers to the other PC. These reports do not mean that a board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
-        // An event is reported only after a pause of at least 1 s.
+        // A competing master is reported as an event only after a pause of at least 1 s.
         let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.competing_master = Some((self.now, function, to));
         if news {

@@ -1,4 +1,4 @@
-//! Values for a monitor: frame rate of each board, bus load, foreign frames.
+//! Values for a bus monitor: frame rate of each board, bus load, foreign frames.
 
 use crate::master::load::frame_bits;
 use std::collections::{BTreeMap, VecDeque};
@@ -9,10 +9,10 @@ pub const WINDOW_US: u64 = 1_000_000;
 const SLOTS: usize = 10;
 const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
 
-/// Rate, computed as the sum of the amounts in the last second.
+/// Rate per second, computed as the sum of the amounts in the last second.
 #[derive(Clone, Debug, Default)]
 pub struct Rate {
-    /// Time slots. Each slot has a number and a sum.
+    /// Time slots of the window. Each time slot has a number and a sum.
     slots: VecDeque<(u64, u64)>,
 }
 
@@ -28,23 +28,23 @@ impl Rate {
         }
     }
 
-    /// Returns the sum over the last second before `now`.
+    /// Returns the sum of the amounts in the last second before `now`.
     pub fn per_second(&self, now: u64) -> u64 {
         let slot = now / SLOT_US;
         self.slots.iter().filter(|(s, _)| *s <= slot && slot - s < SLOTS as u64).map(|(_, sum)| sum).sum()
     }
 }
 
-/// Counters of the bus.
+/// Counters of the frames on the bus.
 #[derive(Clone, Debug, Default)]
 pub struct Statistics {
     bitrate: u32,
     bits: Rate,
-    /// Frames received from boards, by board number. Reports of boards without a number are counted under the number in their identifier.
+    /// Frames received from boards, by board number. A report of a board without a number is counted under the number in its identifier.
     boards: BTreeMap<u8, Rate>,
-    /// Number of received frames without foreign frames.
+    /// Number of received frames, except foreign frames.
     pub received: u64,
-    /// Number of sent frames.
+    /// Number of frames that this PC sent.
     pub sent: u64,
     /// Number of foreign frames of each kind.
     pub foreign: Vec<(Foreign, u64)>,
@@ -71,7 +71,7 @@ impl Statistics {
         self.boards.entry(number).or_default().add(now, 1);
     }
 
-    /// Counts a foreign frame. Returns `true` if the frame is the first of its kind.
+    /// Counts a foreign frame. The function returns `true` if the frame is the first foreign frame of its kind.
     pub(crate) fn foreign(&mut self, now: u64, foreign: Foreign) -> bool {
         self.bits.add(now, frame_bits(8));
         if let Some((_, count)) = self.foreign.iter_mut().find(|(kind, _)| *kind == foreign) {

@@ -6,11 +6,11 @@ use crate::master::io::Snapshot;
 use ucom::profile::{AliveMode, OnLost};
 use ucom::{Admin, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status, ToBoard};
 
-/// Time between a stop and its repetition, µs.
+/// Time between a stop command and its repetition, µs.
 const STOP_AGAIN: u64 = 30_000;
 
 impl Core {
-    /// Begins to send heartbeats.
+    /// Makes the master begin to send heartbeats.
     pub(crate) fn start_session(&mut self) {
         if self.session == Session::Quiet {
             self.session = Session::Master { next_alive: self.now };
@@ -33,7 +33,7 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // The age is not computed up to `now`, because the caller may have received a heartbeat that it has not delivered yet.
+            // The age is not computed up to `now`: the caller may have received a heartbeat that it has not delivered yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -71,7 +71,7 @@ impl Core {
         }
     }
 
-    /// Applies the policy to boards whose heartbeats have stopped. Only a master stops boards.
+    /// Applies the policy to boards whose heartbeats have stopped. The PC stops boards only if it is the master.
     fn on_lost(&mut self, lost: &[u8]) {
         lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
@@ -89,8 +89,8 @@ impl Core {
         }
     }
 
-    /// Sends `run = 0` at once, and then two more times, because a stop must not depend on one frame. The repetitions have no further
-    /// effect.
+    /// Sends the stop command (`run = 0`) at once, and then two more times, because a stop must not depend on one frame. A repeated stop
+    /// command has no further effect.
     pub(crate) fn stop_running(&mut self, to: Sequence) {
         self.urgent(to, ToBoard::Admin(Admin::default()));
         self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);
@@ -103,7 +103,7 @@ impl Core {
         due.into_iter().for_each(|to| self.urgent(to, ToBoard::Admin(Admin::default())));
     }
 
-    /// Returns the time of the next task.
+    /// Returns the time of the next background task.
     pub(crate) fn duties_deadline(&self) -> Option<u64> {
         let alive = match self.session {
             Session::Quiet => None,
@@ -200,7 +200,7 @@ impl Core {
         } else {
             self.statistics.undecodable += 1;
         }
-        // A probe must detect boards that answer to the number for boards without a number.
+        // The frame is delivered because a probe must detect boards that answer to the number for boards without a number.
         self.deliver(from, message);
     }
 
@@ -253,7 +253,7 @@ impl Core {
                     self.event(Event::Debug { board: from, text });
                 }
             }
-            // After PC_START, this frame is the answer of the board. At other times, the frame has no meaning (D-30).
+            // After PC_START, MCA_DSP_READY is the answer of the board. At other times, MCA_DSP_READY has no meaning (D-30).
             FromBoard::McaReady => {
                 let board = self.boards.of(from);
                 board.ready_count += 1;

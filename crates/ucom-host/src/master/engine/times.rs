@@ -1,4 +1,4 @@
-//! Times of the profile in microseconds.
+//! Times of the profile, converted to microseconds.
 
 use ucom::Profile;
 

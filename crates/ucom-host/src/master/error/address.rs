@@ -1,4 +1,4 @@
-//! Errors of an address assignment that was refused.
+//! Errors of an address assignment that the PC refused.
 use crate::master::error::identity::OTHER_PROTOCOL;
 use host_kit::{Action, Diagnose, Diagnosis, ErrorKind, Next, next};
 
@@ -12,17 +12,17 @@ pub enum AddressError {
          rejected"
     )]
     AckMismatch {
-        /// Number in the identifier.
+        /// Board number in the identifier.
         id: u8,
-        /// Number in the data.
+        /// Board number in the data.
         data: u8,
     },
-    /// The first board of the chain does not answer, and could take the number of another board.
+    /// The first board of the chain does not answer. This board could take the number of another board.
     #[error("board {other} does not answer; if it has no number, it would take number {board}")]
     MayTakeNumber {
-        /// Number to be assigned.
+        /// Number that the PC wanted to assign.
         board: u8,
-        /// The first board.
+        /// Number of the first board of the chain.
         other: u8,
     },
     /// The boards that report differ from the boards that have a number. A new address assignment could give boards other numbers than

@@ -12,9 +12,9 @@ pub enum ExchangeError {
     /// No board can have this number.
     #[error("board number {number} is out of range ({first} to 31)")]
     NoBoard {
-        /// The number.
+        /// Requested board number.
         number: u8,
-        /// `addr.first`.
+        /// Lowest board number, `addr.first` of the profile.
         first: u32,
     },
     /// A board did not answer.
@@ -22,23 +22,23 @@ pub enum ExchangeError {
     NoAnswer {
         /// Board number.
         board: u8,
-        /// Request.
+        /// Function of the request.
         asked: Function,
-        /// Number of tries.
+        /// Number of times that the request was sent.
         tries: u32,
-        /// Time from the first request until the end of the last wait, ms.
+        /// Time from the first request to the end of the last wait, ms.
         waited_ms: u64,
         /// Last frame that was received from the board.
         last: Option<LastReceived>,
     },
-    /// No answer was complete.
+    /// The PC received parts of answers, but no complete answer.
     #[error("board {board}: the answer to {} was not received completely ({tries} tries): {problem}", asked.name())]
     Incomplete {
         /// Board number.
         board: u8,
-        /// Request.
+        /// Function of the request.
         asked: Function,
-        /// Number of tries.
+        /// Number of times that the request was sent.
         tries: u32,
         /// Error in the last answer.
         problem: Incomplete,
@@ -51,7 +51,7 @@ pub enum ExchangeError {
     Contradiction {
         /// Board number.
         board: u8,
-        /// Number of tries.
+        /// Number of times that the request was sent.
         tries: u32,
     },
     /// The board reported an error.
@@ -59,9 +59,9 @@ pub enum ExchangeError {
     Device {
         /// Board number.
         board: u8,
-        /// The code.
+        /// Reported error code.
         code: ErrorCode,
-        /// Step in progress.
+        /// Step that the procedure performed when the board reported the error.
         during: &'static str,
     },
 }
@@ -117,7 +117,7 @@ impl Diagnose for ExchangeError {
 pub struct LastReceived {
     /// Function of the frame.
     pub function: Function,
-    /// Time between the frame and the error, ms.
+    /// Time between the last frame and the error, ms.
     pub ago_ms: u64,
 }
 
@@ -139,10 +139,10 @@ impl fmt::Display for Received {
 /// Errors in an answer of several frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Incomplete {
-    /// The first frame is not valid.
+    /// The first frame of the answer is not valid.
     #[error("its first frame has {len} bytes, expected {need}")]
     Start {
-        /// Number of bytes received.
+        /// Number of bytes in the received first frame.
         len: u8,
         /// Number of bytes that the first frame must have.
         need: u8,
@@ -150,36 +150,36 @@ pub enum Incomplete {
     /// The board stopped sending in the middle of its answer.
     #[error("{complete} of {of} strings were received, then no more frames")]
     Silence {
-        /// Number of complete strings.
+        /// Number of complete strings in the answer.
         complete: u32,
-        /// Number of announced strings.
+        /// Number of strings that the board announced.
         of: u32,
     },
-    /// A frame cannot belong to a string.
+    /// A frame in the answer cannot belong to a string.
     #[error("a frame of string {string} does not match the frames before it")]
     Misfit {
         /// Number of the string, from 0.
         string: u32,
     },
-    /// The answer contains more frames than its totals announce.
+    /// The answer contains more frames than the board announced.
     #[error("the board sent more frames than it had announced")]
     Surplus,
     /// The answer announces more strings than possible.
     #[error("the board announces {strings} strings, which is too many; check the byte order")]
     TooMany {
-        /// Number of strings.
+        /// Number of strings that the board announced.
         strings: u32,
     },
-    /// The announced counts are multiples of 256. In the other byte order the counts would be small numbers.
+    /// The counts that the board announced are multiples of 256. In the other byte order, these counts would be small numbers.
     #[error(
         "the board announces {strings} strings, and each count is a multiple of 256: the byte order is \
          probably wrong"
     )]
     ByteOrder {
-        /// Number of strings.
+        /// Number of strings that the board announced.
         strings: u32,
     },
-    /// Packages of a buffer are missing.
+    /// Packages of a buffer are missing in the answer.
     #[error("{missing} of {of} packages are missing")]
     Packages {
         /// Number of missing packages.

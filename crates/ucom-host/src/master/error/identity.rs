@@ -12,9 +12,9 @@ pub enum IdentityError {
     /// DSP_INFO has different numbers in identifier and data.
     #[error("the answer from board {board} contains number {reported} and was rejected")]
     WrongSequence {
-        /// Number in the identifier.
+        /// Board number in the identifier.
         board: u8,
-        /// Number in the data.
+        /// Board number in the data.
         reported: u8,
     },
     /// The board has another flash number than expected.
@@ -22,15 +22,15 @@ pub enum IdentityError {
     WrongBoard {
         /// Board number.
         board: u8,
-        /// Expected flash number.
+        /// Flash number that the procedure expected.
         wanted: u16,
-        /// Flash number of the board.
+        /// Flash number that the board has.
         found: u16,
     },
-    /// The flash numbers of boards match their reports only after their bytes are swapped (D-10).
+    /// The flash numbers of boards match the boards' reports only after their bytes are swapped (D-10).
     #[error("{}", other_order(*endian))]
     ByteOrder {
-        /// Byte order of the profile.
+        /// Byte order that the profile defines.
         endian: Endian,
     },
     /// Two boards have the same number, so both boards carry out every command to this number.
@@ -40,12 +40,12 @@ pub enum IdentityError {
         if *given_back { "; the number was withdrawn from both boards" } else { "" }
     )]
     NumberShared {
-        /// The number.
+        /// Number that the boards share.
         board: u8,
         /// Flash numbers of the boards that answered to this number. The list contains one number twice if the boards
         /// cannot be distinguished.
         found: Vec<u16>,
-        /// `true` if the number was withdrawn and no board answers to this number any more.
+        /// `true` if the PC has withdrawn the number and no board answers to this number any more.
         given_back: bool,
     },
 }
@@ -113,6 +113,6 @@ pub(crate) fn shared_remedy() -> Next {
     )
 }
 
-/// Remedy if identifier and data contain different numbers.
+/// Remedy if the identifier and the data of a frame contain different board numbers.
 pub(crate) const OTHER_PROTOCOL: &str = "two boards may share a number, or the board interprets the \
                                          protocol differently: `ucom reset`, then `ucom probe`";

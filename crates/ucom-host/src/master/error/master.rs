@@ -1,34 +1,34 @@
-//! Errors of procedures that this PC did not begin, or that it ended early.
+//! Errors of procedures that this PC did not begin or ended early.
 use crate::master::error::words::Boards;
 use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use ucom::Function;
 
-/// Reasons why this PC did not begin a procedure, or ended it early.
+/// Reasons why this PC did not begin a procedure, or why it ended the procedure early.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MasterError {
     /// A competing master: another PC is on the bus (D-08).
     #[error("another PC is on the bus: {} to {to} was received {ago_ms} ms ago", function.name())]
     CompetingMaster {
-        /// Function of the frame.
+        /// Function of the last frame from the other PC.
         function: Function,
-        /// Number that the frame was sent to.
+        /// Board number that the frame was sent to; it can be the broadcast number.
         to: u8,
-        /// Time since this frame, ms.
+        /// Time since the last frame of the other PC, ms.
         ago_ms: u64,
     },
     /// Another procedure works with a board that this procedure needs.
     #[error("{} busy with {with}", Boards(boards))]
     Busy {
-        /// The boards.
+        /// Numbers of the boards that both procedures need.
         boards: Vec<u8>,
-        /// The other procedure.
+        /// Name of the other procedure.
         with: &'static str,
     },
     /// The caller reports that the bus is lost, see [`Master::abandon`](crate::master::Master::abandon).
     #[error("the bus failed: {reason}")]
     Bus {
-        /// Error of the driver.
+        /// Error that the CAN driver reported.
         reason: String,
     },
     /// The caller cancelled the procedure.

@@ -25,13 +25,13 @@ impl Diagnose for TargetError {
 /// Reasons why an update cannot be planned.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
-    /// The image has no bytes.
+    /// The image is empty.
     #[error("the image is empty")]
     Empty,
-    /// The image ends with half a word.
+    /// The image has an odd number of bytes, so its last word is incomplete.
     #[error("the image has {bytes} bytes, expected an even number")]
     HalfWord {
-        /// Length in bytes.
+        /// Length of the image in bytes.
         bytes: usize,
     },
     /// The image has another Program ID than the user expects.
@@ -42,7 +42,7 @@ pub enum PlanError {
         /// Program ID that the user expects.
         expected: u16,
     },
-    /// Program ID and date have the values that stand for "no application".
+    /// The Program ID and the date of the image have the values that mean "no application".
     #[error("Program ID 0xFFFF with date 0xFFFF means `no application`: choose another date")]
     Void,
     /// The plan and the second image do not match.
@@ -72,16 +72,16 @@ impl Diagnose for PlanError {
 /// Reasons why `prog.plan` and a second image do not match.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SecondImageError {
-    /// The plan needs a second image.
+    /// The plan needs a second image, but the user gave only one image.
     #[error("plan `{plan}` needs a second image")]
     Missing {
-        /// `prog.plan`.
+        /// Value of `prog.plan` in the profile.
         plan: Plan,
     },
-    /// The plan does not use a second image.
+    /// The user gave a second image, but the plan uses only one image.
     #[error("plan `{plan}` sends one image twice and does not use a second image")]
     Unused {
-        /// `prog.plan`.
+        /// Value of `prog.plan` in the profile.
         plan: Plan,
     },
 }

@@ -19,17 +19,17 @@ pub enum Error {
     Exchange(#[from] ExchangeError),
     /// A board is not the intended one.
     Identity(#[from] IdentityError),
-    /// Boards did not get their numbers.
+    /// Boards did not get their board numbers.
     Address(#[from] AddressError),
     /// A board did not reach the requested state.
     Status(#[from] StatusError),
-    /// Control loops are running, or cannot run.
+    /// Running control loops prevent the procedure, or control loops cannot run.
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// The request does not show which boards the update must write.
+    /// No board is selected for an update, or a board is selected twice.
     Target(#[from] TargetError),
-    /// An update cannot be planned.
+    /// The PC cannot create a plan for an update.
     Plan(#[from] PlanError),
     /// This PC did not begin the procedure, or ended it early.
     Master(#[from] MasterError),
@@ -85,7 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Returns the facts about some boards. For exactly one board, the facts contain its number.
+/// Returns the facts of a diagnosis about some boards. If there is exactly one board, the facts contain its number.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

@@ -13,19 +13,20 @@ pub enum RunningError {
         /// Numbers of the boards.
         boards: Vec<u8>,
     },
-    /// Control loops are running. The request could stop the boards in any position, or could have a worse effect.
+    /// Control loops are running, so the PC refuses the request. The request could stop the boards in any position, or could have a worse
+    /// effect.
     #[error("{} running its control loop", Boards(boards))]
     LoopRuns {
         /// Numbers of the boards.
         boards: Vec<u8>,
     },
-    /// The bus load would be too high.
+    /// The forecast bus load is too high.
     #[error("{0}")]
     Load(LoadForecast),
     /// A board was lost while boards were started, and `on_lost` required a stop of all boards (D-51).
     #[error("board {board} was lost while boards were started: all boards were stopped")]
     Lost {
-        /// Board number.
+        /// Number of the lost board.
         board: u8,
     },
 }

@@ -7,16 +7,16 @@ use host_kit::{Action, Diagnose, Diagnosis, ErrorKind, Next, next};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalError {
-    /// No signal has this name.
+    /// No signal of the board has the requested name.
     #[error("board {board} has no {kind} `{name}`{}", Near(near))]
     NoSignal {
         /// Board number.
         board: u8,
-        /// `CI`, `SO` or `PAR`.
+        /// Kind of the signal: `CI`, `SO` or `PAR`.
         kind: &'static str,
         /// Requested name.
         name: String,
-        /// Similar names.
+        /// Names of similar signals.
         near: Vec<String>,
     },
     /// The board has no application, or its application is not started.
@@ -27,7 +27,7 @@ pub enum SignalError {
         /// `true` if the board has an application that is not running.
         valid: bool,
     },
-    /// The board's description has changed since the values were chosen (D-36).
+    /// The board's description has changed since the user selected the values (D-36).
     #[error(
         "board {board}: its inputs, outputs and parameters differ from those that were read before from its \
          program"

@@ -6,7 +6,7 @@ use ucom::Status;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StatusError {
-    /// The status that was read back differs from the requested status.
+    /// The status that the PC read back differs from the requested status.
     #[error(
         "board {board}: status is {} after {tries} tries, expected {} in the bits {}",
         status,
@@ -16,35 +16,35 @@ pub enum StatusError {
     StatusNotTaken {
         /// Board number.
         board: u8,
-        /// Bits to change.
+        /// Status bits that the command should have changed.
         mask: Status,
-        /// Requested values of these bits.
+        /// Requested values of these status bits.
         wanted: Status,
-        /// Status that was read back.
+        /// Status that the PC read back.
         status: Status,
-        /// Number of tries.
+        /// Number of times that the command was sent.
         tries: u32,
     },
-    /// The board did not reach a state in time.
+    /// The board did not reach the expected state within the time limit.
     #[error("board {board}: {what} within {waited_ms} ms; status {status}")]
     NotReached {
         /// Board number.
         board: u8,
-        /// Expected state.
+        /// Step that did not happen, in words, such as `the exloader did not start`.
         what: &'static str,
-        /// Time waited, ms.
+        /// Time that the PC waited, ms.
         waited_ms: u64,
-        /// The last status.
+        /// Last status of the board.
         status: Status,
     },
     /// The flags that the board confirmed differ from the flags that were sent.
     #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
     AdminRefused {
-        /// Board number.
+        /// Number of the board.
         board: u8,
-        /// Flags that were sent.
+        /// Flags that the PC sent.
         wanted: ucom::Admin,
-        /// Flags in the answer.
+        /// Flags in the board's answer.
         is: ucom::Admin,
     },
 }

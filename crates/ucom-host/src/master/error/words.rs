@@ -1,4 +1,4 @@
-//! Texts that several errors and findings use.
+//! Texts that several errors and findings contain.
 use core::fmt;
 
 use ucom::profile::Endian;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::master::error::SignalError;
 use ucom::{BoardInfo, Dimensions};
 
-/// Kind of buffer.
+/// Kind of a board's buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Controller inputs.
@@ -17,7 +17,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Returns `CI`, `SO` or `PAR`.
+    /// Returns the name of the kind: `CI`, `SO` or `PAR`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ci => "CI",
@@ -27,15 +27,15 @@ impl Kind {
     }
 }
 
-/// Key of a description. The key contains Program ID, flash date (D-36) and board. The board is included because boards with equal images
-/// can have different applications.
+/// Key under which a board's description is stored. The key contains the Program ID, the flash date (D-36) and the board. The key includes
+/// the board because boards with equal images can have different applications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {
     /// Flash number of the board.
     pub flash_number: u16,
     /// Checksum of the board's program.
     pub program_id: u16,
-    /// Date of the program as a 16-bit word.
+    /// Flash date of the program as a 16-bit word.
     pub date: u16,
 }
 
@@ -49,13 +49,13 @@ impl DescriptionKey {
 /// Description that an application sends about itself and about every signal. The description is stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
-    /// Text about the application. The text may differ from the board's own description in DSP_INFO.
+    /// Text about the application. This text may differ from the board's own description in DSP_INFO.
     pub description: String,
-    /// Controller inputs.
+    /// Texts of the controller inputs.
     pub ci: Vec<String>,
-    /// Sensor outputs.
+    /// Texts of the sensor outputs.
     pub so: Vec<String>,
-    /// Parameters.
+    /// Texts of the parameters.
     pub par: Vec<String>,
 }
 
@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Returns the index of a signal. The signal is selected by its text, with or without the unit in brackets at its end, or by its index
-    /// (`#3` or `3`). The letter case is ignored if only one signal then matches.
+    /// Returns the index of a signal in the buffer. The caller selects the signal by its text, with or without the unit in brackets at the
+    /// end of the text, or by its index (`#3` or `3`). The letter case is ignored if only one signal then matches.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {
@@ -90,7 +90,7 @@ impl IoDescription {
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
         }
-        // Units in brackets do not reduce the similarity of names.
+        // A unit in brackets must not reduce the similarity of two names, so both forms of the name are compared.
         let like = |n: &str| similarity(n, name).max(similarity(short(n), name));
         let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
         near.retain(|(similarity, _)| *similarity > 0.6);
@@ -100,7 +100,7 @@ impl IoDescription {
     }
 }
 
-/// Returns a text without the unit in brackets at its end.
+/// Returns the text of a signal without the unit in brackets at its end.
 pub fn short(text: &str) -> &str {
     text.split_once(" [").map_or(text, |(name, _)| name).trim()
 }

@@ -11,22 +11,22 @@ use crate::master::io::snapshot::SnapshotAssembler;
 pub(crate) struct ProcessData {
     /// Key of the board's description.
     pub description: Option<DescriptionKey>,
-    /// `true` if the board has sent this description since its application started.
+    /// `true` if the board has sent the description with this key since its application started.
     pub sent: bool,
-    /// Values of the inputs that were set last.
+    /// Values of the controller inputs that were set last.
     pub ci: Vec<u16>,
-    /// Indices, in `ci`, of the inputs that were set or read since the application started. The other values are not known.
+    /// Indices, in `ci`, of the inputs that were set or read since the application started. The values of the other inputs are not known.
     pub ci_known: BTreeSet<u16>,
-    /// Time of the next repetition; `None` if the inputs are not repeated.
+    /// Time at which the inputs are repeated next; `None` if the inputs are not repeated.
     pub repeat: Option<u64>,
     pub par: Shadow,
     pub so: SnapshotAssembler,
-    /// `true` if snapshots are requested.
+    /// `true` if the caller requested snapshots of the sensor outputs.
     pub watched: bool,
 }
 
 impl ProcessData {
-    /// Stores the values of all inputs.
+    /// Stores the values of all inputs of the board.
     pub(crate) fn know_inputs(&mut self, ci: Vec<u16>) {
         self.ci_known = (0..).zip(&ci).map(|(place, _)| place).collect();
         self.ci = ci;

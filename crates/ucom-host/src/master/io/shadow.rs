@@ -1,15 +1,15 @@
-//! Parameters that this PC assumes for a board. The protocol does not allow parameters to be read back (D-35).
-/// A parameter's value.
+//! Parameters that this PC assumes for a board. The protocol has no function that reads parameters back (D-35).
+/// Value of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ParValue {
-    /// The parameter was not written since the application started.
+    /// The PC has not written the parameter since the application started.
     #[default]
     Unknown,
-    /// The parameter was written; the protocol has no confirmation.
+    /// The PC wrote the parameter; the protocol has no confirmation for this.
     Assumed(u16),
 }
 
-/// The parameters of one board.
+/// Values that this PC assumes for the parameters of one board.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Shadow {
     values: Vec<ParValue>,
@@ -30,12 +30,12 @@ impl Shadow {
         self.values.fill(ParValue::Unknown);
     }
 
-    /// Returns all parameters in order.
+    /// Returns the values of all parameters in the order of the buffer.
     pub fn values(&self) -> &[ParValue] {
         &self.values
     }
 
-    /// Returns the number of parameters.
+    /// Returns the number of parameters of the board.
     pub(crate) fn len(&self) -> u16 {
         self.values.len() as u16
     }

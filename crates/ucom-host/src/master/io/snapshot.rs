@@ -4,15 +4,16 @@ use ucom::BufferPackage;
 /// All sensor outputs of one period.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Time of the last package, µs.
+    /// Time of the last package of the snapshot, µs.
     pub time_us: u64,
-    /// Words in the order of the buffer.
+    /// Values of the sensor outputs in the order of the buffer.
     pub words: Vec<u16>,
-    /// Number of incomplete snapshots since the previous complete one.
+    /// Number of incomplete snapshots since the previous complete snapshot.
     pub incomplete_before: u64,
 }
 
-/// Reassembles snapshots, from offset 0 to the package with the last word. An incomplete snapshot is counted and discarded.
+/// Reassembles snapshots of the sensor outputs, from the package with offset 0 to the package with the last word. The assembler counts and
+/// discards incomplete snapshots.
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotAssembler {
     words: Vec<u16>,
@@ -33,12 +34,12 @@ impl SnapshotAssembler {
         Self { words: vec![0; dimension.into()], ..Default::default() }
     }
 
-    /// Returns the number of words of the buffer.
+    /// Returns the number of words in the buffer.
     pub fn dimension(&self) -> usize {
         self.words.len()
     }
 
-    /// Handles a package. Returns the snapshot if the package completes it.
+    /// Handles a package of sensor outputs. The function returns the snapshot if the package completes it.
     pub fn push(&mut self, now: u64, package: &BufferPackage) -> Option<Snapshot> {
         if usize::from(package.offset) >= self.words.len() {
             self.beyond += 1;
@@ -88,7 +89,8 @@ mod tests {
         Packages::new(&words).collect()
     }
 
-    /// D-33: incomplete snapshots are not reported. The next complete snapshot contains the number of incomplete snapshots.
+    /// D-33: the assembler does not report incomplete snapshots. The next complete snapshot contains the number of incomplete snapshots
+    /// before it.
     #[test]
     fn d33_gaps_are_counted_and_never_shown() {
         for lost in 0..3 {
@@ -99,7 +101,7 @@ mod tests {
             let whole: Vec<_> = packages(200).iter().filter_map(|p| assembler.push(5, p)).collect();
             assert_eq!(whole.len(), 1);
             assert_eq!(whole[0].words, (200..208).collect::<Vec<u16>>());
-            // If the first package is lost, the assembler cannot distinguish this from a start in the middle of a snapshot.
+            // If the first package is lost, the assembler cannot distinguish this loss from a start in the middle of a snapshot.
             assert_eq!(whole[0].incomplete_before, u64::from(lost > 0));
         }
     }

@@ -3,11 +3,11 @@ use crate::master::engine::Link;
 use crate::master::reports::Reports;
 use ucom::{FromBoard, Function, ToBoard};
 
-/// The four functions of reports from boards.
+/// The four functions that boards use for reports.
 pub(crate) const REPORTS: [Function; 4] =
     [Function::Report0, Function::Report1, Function::Report2, Function::Report3];
 
-/// Sends PC_REPORT and collects the reports within the window.
+/// Sends PC_REPORT and collects the reports that arrive within the allowed time.
 pub(crate) async fn ask_reports(link: &Link, reports: &mut Reports) {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Report).await;

@@ -1,8 +1,8 @@
-//! Acceptance tests for real boards. The tests check that boards follow the protocol page.
+//! Acceptance tests for real boards. The tests check that boards behave as the protocol page describes.
 //!
-//! By default, the tests only send queries, which change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
-//! can allow three more kinds of test: a new address assignment, running applications with safe outputs, and programming. Each test builds
-//! its few frames itself, so the procedures of this crate do not check themselves.
+//! By default, the tests do not change any board. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions) can allow three
+//! more kinds of test: tests that assign numbers again, tests that run applications with safe outputs, and tests that program a board. Each
+//! test builds its few frames itself, so that the procedures of this crate do not check themselves.
 
 mod application;
 mod ask;

@@ -1,4 +1,4 @@
-//! Single actions: status, resets, start, stop, flags.
+//! Single actions on a board: status, reset, start, stop, flags.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, IdentityError, MEASURE_ORDER, SignalError, StatusError};
 use crate::master::procedures::ask_reports::{REPORTS, ask_reports, collect_reports};
@@ -18,7 +18,8 @@ pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Err
     Ok(Outcome::Info(seen))
 }
 
-/// Sends PC_SETSTATUS and reads the status back. If a change takes longer than one answer, waits for the change.
+/// Sends PC_SETSTATUS and reads the status of the board back. If the board needs longer for a change than for an answer, the procedure
+/// waits for the change.
 pub(crate) async fn set_status_procedure(
     link: Link,
     board: u8,
@@ -34,7 +35,7 @@ pub(crate) async fn set_status_procedure(
         return forget_number(&link, board, mask, value).await;
     }
     if mask.has(Status::MSTART) && value.has(Status::MSTART) {
-        // The application needs time to start, as after PC_START.
+        // The application needs time to start, as it does after PC_START.
         let before = numbers(&link, board).await?;
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         if !before.status.has(Status::MSTART) {
@@ -47,7 +48,7 @@ pub(crate) async fn set_status_procedure(
     Ok(Outcome::Status { board, info: now })
 }
 
-/// Clears INIT. The board then forgets its number, so its silence confirms the change.
+/// Clears the INIT bit of a board. After this command, the board forgets its number, so its silence confirms the change.
 async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> Result<Outcome, Error> {
     let to = link.board(board)?;
     let before = numbers(link, board).await?;
@@ -56,7 +57,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                // The board can no longer answer. Therefore the function returns the status that the rules require (D-22).
+                // A board without a number can no longer answer. Therefore the function returns the status that D-22 requires.
                 let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
@@ -68,7 +69,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
     Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
-/// Polls PC_INFO every 200 ms until the selected bits have the requested values.
+/// Sends PC_INFO every 200 ms until the selected status bits have the requested values.
 pub(crate) async fn wait_status(
     link: &Link,
     board: u8,
@@ -98,15 +99,15 @@ pub(crate) async fn wait_status(
     }
 }
 
-/// Sends PC_RESET to one board or to all boards, and returns the reports. The command is never repeated automatically; only the user may
-/// repeat it.
+/// Sends PC_RESET to one board or to all boards, and returns the reports of the boards. The procedure never repeats PC_RESET automatically;
+/// only the user may repeat it.
 pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
     let to = match board {
         Some(board) => link.board(board)?,
         None => link.broadcast_number(),
     };
     link.become_master(force).await?;
-    // Checks that the board exists. If this check were missing, the reset of a missing board would look like a reset that no board
+    // Checks that the board exists before the reset. Without this check, the reset of a missing board would look like a reset that no board
     // confirmed.
     let before = match board {
         Some(board) => {
@@ -139,7 +140,8 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
     Ok(Outcome::Reset(reports))
 }
 
-/// Checks that a board was reset: it has reported, and it no longer has a number. If the report was lost, requests another report.
+/// Checks that a board was reset: the board has reported and no longer has a number. If the report of the board was lost, the function
+/// requests another report.
 async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Reports) -> Result<(), Error> {
     let since = link.now().saturating_sub(link.times().report_window);
     let ucom_id = before.flash_number as u8;
@@ -172,7 +174,7 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
     }
 }
 
-/// Sends PC_XRESET. After this step, the board is in its exloader with programming enabled (D-23).
+/// Sends PC_XRESET to a board. At the end of this procedure, the board runs its exloader with programming enabled (D-23).
 pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
@@ -181,9 +183,11 @@ pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome
     Ok(Outcome::Status { board, info })
 }
 
-/// Sends PC_XRESET, waits, and polls PC_INFO until the exloader runs. If PROG is still not set, sets PROG with PC_SETSTATUS (U-4).
+/// Sends PC_XRESET, waits, and sends PC_INFO until the exloader runs. If PROG is still not set, the function sets PROG with PC_SETSTATUS
+/// (U-4).
 ///
-/// If the board no longer answers and its flash number is known, repairs the board. If another board answers instead, returns an error.
+/// If the board no longer answers and its flash number is known, the function repairs the board's number. If another board answers instead,
+/// the function returns an error.
 pub(crate) async fn enter_exloader(
     link: &Link,
     board: u8,
@@ -198,7 +202,7 @@ pub(crate) async fn enter_exloader(
         (result, _) => result?,
     };
     if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
-        // A single damaged answer must not be interpreted as another board.
+        // The function reads the flash number twice, because a single damaged answer must not be interpreted as another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -210,7 +214,7 @@ pub(crate) async fn enter_exloader(
     set_status(link, board, Status::PROG, Status::PROG).await
 }
 
-/// Longest time for an exloader to start.
+/// Longest time that an exloader needs to start.
 const EXLOADER_WAIT: u64 = 3_000 * MS;
 
 async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, Error> {
@@ -218,8 +222,8 @@ async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, 
     wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
 }
 
-/// Sends PC_XRESET until the board executes it. The command has no answer. If a board answers PC_INFO from its application, it did not
-/// receive the command. If the board is silent, it is rebooting or has lost its number, and gets no further PC_XRESET.
+/// Sends PC_XRESET until the board executes the command. A board does not answer PC_XRESET. If the application of a board answers PC_INFO,
+/// the board did not receive PC_XRESET. A silent board is rebooting or has lost its number, so it gets no further PC_XRESET.
 async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let soon = EXLOADER_WAIT / 3;
@@ -266,7 +270,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // The start is recorded before the frame leaves the queue, so that a cancel considers it.
+        // The start is recorded before PC_START leaves the queue, so that a cancel considers the start.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
@@ -282,7 +286,8 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors that a bad bus causes are only logged. If all attempts fail, the last error is returned.
+                // Errors that a bad bus causes do not end the start. If all attempts to start the board fail, the function returns the last
+                // error.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
@@ -310,11 +315,11 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// Returns the flags before a change, as the board sent them last. If the board has not sent flags, derives them from the status, with the
-/// outputs off (D-37).
+/// Returns the flags of a board before a change, as the board sent them last. If the board has not sent flags, the function derives them
+/// from the status, with the outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
-    // A command that only ends motion must not wait for answers.
+    // A command that only ends motion must not wait for answers of boards.
     if !ends {
         one_board_each(link, &[board]).await?;
     }
@@ -323,7 +328,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
-    // The last flags of the board may have been lost. The status byte shows if the loop runs.
+    // The frame with the last flags of the board may have been lost. The status byte of the board shows if the control loop runs.
     Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
         active: flags.active && run,
@@ -331,7 +336,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }))
 }
 
-/// Reads, modifies and writes the flags.
+/// Reads the flags of a board, changes them and writes them.
 pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
     let wanted = change.apply(flags(link, board, change.only_ends()).await?);
     admin(link, board, wanted).await

@@ -1,5 +1,5 @@
-//! Reading of descriptions and initial inputs. A request has no side effect and is sent at most three times. An answer is accepted only if
-//! its totals are correct (D-14).
+//! Reads the descriptions and the initial inputs of boards. A request for a description or for inputs changes nothing and is sent at most
+//! three times. The PC accepts an answer only if its totals are correct (D-14).
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, Incomplete, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, SnapshotAssembler};
@@ -10,10 +10,11 @@ use ucom::{
     Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard,
 };
 
-/// Limit of strings that a description may announce. A bus could not carry the data of more signals.
+/// Limit of strings that a board may announce in its description. A description with more strings is not possible, because a bus could not
+/// carry the data of more signals.
 const MAX_STRINGS: u32 = 4096;
 
-/// Received parts of one answer.
+/// Parts of one description that were received so far.
 struct Collector {
     dimensions: Option<Dimensions>,
     strings: Vec<String>,
@@ -25,8 +26,8 @@ impl Collector {
         let profile = link.profile();
         let Some(dimensions) = self.dimensions else {
             let need = 6;
-            // Strings begin with a package of 2 bytes, followed by packages of 1 to 8 bytes. The first frame is an exception: its 6 bytes
-            // are the dimensions.
+            // Each string begins with a package of 2 bytes, followed by packages of 1 to 8 bytes. The first frame of a description is an
+            // exception: its 6 bytes are the dimensions of the buffers.
             let start = Incomplete::Start { len: payload.len(), need };
             let dimensions = Dimensions::parse(payload, profile.endian).ok_or(start)?;
             self.dimensions = Some(dimensions);
@@ -62,7 +63,7 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
-    /// Returns the problem of the answer. If the byte order is probably wrong, returns this as the problem.
+    /// Returns the reason why the answer is not complete. If the byte order is probably wrong, the function returns this as the reason.
     fn problem(&self, problem: Incomplete) -> Incomplete {
         let exchanged = |d: &Dimensions| {
             let all = [d.ci, d.so, d.par];
@@ -83,7 +84,7 @@ impl Collector {
     }
 }
 
-/// Sends the request once. Returns `None` if no frame arrived.
+/// Sends the request for the description once. The function returns `None` if no frame arrived.
 async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescription, Incomplete>>, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::DumpIo).await;
@@ -102,7 +103,7 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
                 if let Err(problem) = collector.push(received.at, &payload, link) {
                     return Ok(Some(Err(collector.problem(problem))));
                 }
-                // An additional frame would follow immediately.
+                // After a complete description, a surplus frame would follow immediately.
                 until = link.now() + if collector.done() { times.quiet } else { times.gap };
             }
             message => {
@@ -114,7 +115,7 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
     }
 }
 
-/// Reads a board's description without any cache.
+/// Reads a board's description from the board, without any cache.
 async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error> {
     link.listen(1 << board, &[Function::DumpIo]);
     let since = link.now();
@@ -138,8 +139,8 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
 
 /// Returns the description of a board whose application runs. The board must have sent the description since the application started.
 ///
-/// A description that is only stored for this Program ID and date (D-36) may belong to another application. Therefore its names are not
-/// used to write values.
+/// A description that is stored only for this Program ID and date (D-36) may belong to another application. Therefore the names in such a
+/// description are not used to write values.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
     let kept = link.with(|core| {
@@ -155,7 +156,7 @@ pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Resul
     Ok(description)
 }
 
-/// Sets the sizes of the buffers according to the description.
+/// Sets the sizes of the board's buffers according to the description.
 fn take_over(link: &Link, board: u8, key: DescriptionKey, description: &IoDescription) {
     let d = description.dimensions();
     link.with(|core| {
@@ -185,11 +186,11 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // The attempts are independent of one another, because a board may change its values between them.
+        // The attempts are evaluated independently of one another, because a board may change its values between two attempts.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;
-        // The time is limited, even if a board repeats its frames endlessly.
+        // The time of an attempt is limited, even if a board repeats its frames endlessly.
         let limit = link.now() + times.gap * u64::from(packages + 1);
         while missing_packages(&seen) > 0
             && let Some(received) = link.next((link.now() + times.gap).min(limit)).await
@@ -228,7 +229,7 @@ fn missing_packages(seen: &[bool]) -> u32 {
     seen.iter().filter(|seen| !**seen).count() as u32
 }
 
-/// Reads a board's identity and the state of its application, then its description.
+/// Reads a board's identity and the state of its application, and then reads its description.
 async fn described(link: &Link, board: u8) -> Result<(BoardInfo, IoDescription), Error> {
     let known = info(link, board).await?.info;
     one_board_each(link, &[board]).await?;

@@ -1,24 +1,24 @@
-//! Requests that procedures use, each with a limited number of repetitions.
+//! Requests to boards that procedures use, each with a limited number of repetitions.
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, IdentityError, Incomplete, StatusError};
 use crate::master::reports::BoardSeen;
 use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
 
-/// Maximum number of times that a request is sent. A request is repeated only if its repetition has no further effect.
+/// Maximum number of times that a request is sent. A request is repeated only if its repetition has no further effect on the board.
 pub(crate) const TRIES: u32 = 3;
 
-/// Result of one PC_INFO.
+/// Result of one PC_INFO request.
 #[derive(Debug)]
 pub(crate) enum Answer {
-    /// No frame arrived.
+    /// No frame of the board arrived.
     Silence,
-    /// The frames were not a valid answer.
+    /// The frames of the board were not a valid answer.
     Broken(Incomplete),
-    /// Values of the first frame. The description is included only if it was complete.
+    /// Values in the first frame of the answer. The description of the board is included only if it was complete.
     Info(BoardInfo, Option<String>),
 }
 
-/// Collects the frames of one DSP_INFO.
+/// Collects the frames of one DSP_INFO answer.
 #[derive(Default)]
 pub(crate) struct InfoCollector {
     info: Option<BoardInfo>,
@@ -28,7 +28,7 @@ pub(crate) struct InfoCollector {
 }
 
 impl InfoCollector {
-    /// Handles a frame. `Err` if the frame does not belong to an answer.
+    /// Handles a frame of DSP_INFO. Returns `Err` if the frame does not belong to an answer.
     pub(crate) fn push(&mut self, at: u64, payload: &Payload, link: &Link) -> Result<(), Incomplete> {
         let profile = link.profile();
         if self.info.is_none() {
@@ -58,7 +58,7 @@ impl InfoCollector {
     }
 }
 
-/// Sends a single PC_INFO. The mailbox must accept DSP_INFO.
+/// Sends a single PC_INFO and waits for the answer. The filter of the mailbox must accept DSP_INFO.
 pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::Info).await;
@@ -78,8 +78,8 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     }
     let answer = collector.answer();
     if let Answer::Info(info, text) = &answer {
-        // A package of a string could be mistaken for the first frame. A package of a string does not contain the board's number or a
-        // possible status.
+        // The collector could mistake a package of a string for the first frame. A package of a string does not contain the board's number
+        // or a possible status.
         if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
@@ -119,10 +119,11 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
     });
 }
 
-/// Sends PC_INFO and reads the answer with the description. Makes at most three attempts.
+/// Sends PC_INFO to a board and reads the answer with the description. The function makes at most three attempts.
 ///
-/// If the description is never complete, returns the values of the first frame without it. If an answer contains another number, the
-/// request is sent again. If a later answer contains the same wrong number, the procedure ends at once with an error (D-24).
+/// If the description is never complete, the function returns the values of the first frame without the description. If an answer contains
+/// another board number, PC_INFO is sent again. If a later answer contains the same wrong number, the procedure ends at once with an error
+/// (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }
@@ -139,7 +140,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     let mut mismatch = None;
     for tries in 0..TRIES {
         if tries > 0 {
-            // The remaining frames of a truncated answer must not mix with the next answer.
+            // The remaining frames of an incomplete answer must not mix with the next answer.
             link.quiet(link.times().gap).await;
         }
         match ask_info(link, board).await {
@@ -149,7 +150,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // A single damaged frame may contain any values, so the request is sent again.
+            // A single damaged frame may contain any values, so PC_INFO is sent again.
             Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
                 if mismatch.as_ref() != Some(&e) =>
             {
@@ -171,7 +172,8 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     }
 }
 
-/// Reads a board until two consecutive answers agree. Therefore one damaged answer is never mistaken for another board.
+/// Sends PC_INFO to a board until two consecutive answers agree. Therefore the function never mistakes one damaged answer for another
+/// board.
 pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let mut first = info(link, board).await?;
     for _ in 0..TRIES {
@@ -186,13 +188,13 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
     Err(ExchangeError::Contradiction { board, tries: TRIES + 1 }.into())
 }
 
-/// Returns the fields whose values are equal in all answers of a board.
+/// Returns the values that are equal in all answers of one board.
 pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }
 
-/// Sends PC_SETSTATUS and reads the status back with PC_INFO. Repeats the command and the query if the board did not execute the command
-/// (D-22). Value bits that are outside the mask are never sent.
+/// Sends PC_SETSTATUS and reads the status back with PC_INFO. The function repeats the command and the query if the board did not execute
+/// the command (D-22). The function never sends value bits that are outside the mask.
 pub(crate) async fn set_status(
     link: &Link,
     board: u8,
@@ -213,22 +215,23 @@ pub(crate) async fn set_status(
     Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
-/// Sends MCA_ADMIN_DATA. The board answers with its flags.
+/// Sends MCA_ADMIN_DATA to a board. The board answers with its flags.
 pub(crate) async fn admin(link: &Link, board: u8, wanted: Admin) -> Result<Admin, Error> {
     let to = link.board(board)?;
     let wanted = Admin { active: wanted.active && wanted.run, ..wanted };
     ask_admin(link, board, ToBoard::Admin(wanted), to, |is| is == wanted, wanted).await
 }
 
-/// Sends MCA_PC_START. The board answers with its flags.
+/// Sends MCA_PC_START to a board. The board answers with its flags.
 pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     let to = link.board(board)?;
     let wanted = Admin { run: true, ..Admin::default() };
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// Sends a request that is answered with flags. An error from the board does not end the exchange. A bad bus can cause such errors, and
-/// they often come when the request itself was lost. If all attempts fail, the error is returned.
+/// Sends a request that the board answers with its flags. An error that the board reports does not end the exchange. A bad bus can cause
+/// such errors, and a board often reports them when the request itself was lost. If all attempts fail, the function returns the error of
+/// the board.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -246,7 +249,7 @@ async fn ask_admin(
         while let Some(received) = link.next(until).await {
             match received.message {
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
-                // The board sent these flags without a request, before it received the request.
+                // The board sent these flags before it received the request.
                 FromBoard::Admin(is) => other = Some(is),
                 message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }

@@ -1,8 +1,8 @@
-//! Assigns numbers to the boards of a chain, in the order of the wire (section on initialisation: D-21, D-24).
+//! Assigns numbers to the boards of a chain, in the order of the init wire (section on initialisation: D-21, D-24).
 //!
-//! The board that has no number and whose incoming pin is active takes PC_INIT(n). After this PC has confirmed the number, it switches on
-//! the board's outgoing pin, which enables the next board. PC_INIT is repeated only after a PC_INFO. Without this query, the next board
-//! would take the same number if a board switches on its pin by itself.
+//! A board takes the number of PC_INIT(n) if it has no number and its incoming pin is active. After this PC has confirmed the number, it
+//! switches on the board's outgoing pin, which lets the next board accept a number. The PC repeats PC_INIT only after a PC_INFO. Without
+//! this PC_INFO, the next board would take the same number if a board switches on its pin by itself.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -41,8 +41,8 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
     Ok(Outcome::Init(report))
 }
 
-/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but this PC no longer repeats its
-/// inputs.
+/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but this PC no longer repeats the
+/// inputs of the board.
 async fn stop_unreset(link: &Link, report: &mut InitReport) {
     for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
         let stopped = stop_board(link, seen.number, StopLevel::Application).await;
@@ -59,8 +59,7 @@ fn runs_on(status: Status) -> bool {
     status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }
 
-/// Sends PC_RESET to all boards and collects their reports. If boards exist but none of them has reported, the reset was lost and is
-/// repeated.
+/// Sends PC_RESET to all boards and collects their reports. If boards exist but no board has reported, the reset was lost and is repeated.
 async fn reset_all(link: &Link, reports: &mut Reports) {
     for _ in 0..2 {
         link.listen(0, &REPORTS);
@@ -89,26 +88,26 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
     }
     let seen = info(link, number).await?;
     one_board_each(link, &[number]).await?;
-    // The pin is also switched on if the board reports that its pin is already on. The additional command is harmless, and the status must
-    // be read back in any case.
+    // The PC also switches on the outgoing pin if the board reports that this pin is already on. The additional command is harmless, and
+    // the PC must read the status back in any case.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
-        // Either an answer was damaged, or two boards have this number.
+        // Either the answer of the board was damaged, or two boards have the same number.
         return confirmed(link, number).await.map(Some);
     }
     Ok(Some(BoardSeen { info: raised, ..seen }))
 }
 
-/// Compares the numbered boards with the reports and with the inventory.
+/// Compares the numbered boards with the reports of boards and with the inventory.
 async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
     let low = |seen: &BoardSeen| seen.info.flash_number as u8;
     let reached: BTreeSet<u8> = report.boards.iter().map(low).collect();
     if reached != report.reports.ids {
-        // A report may have been lost, so reports are requested again.
+        // A report of a board may have been lost, so the PC requests the reports again.
         ask_reports(link, &mut report.reports).await;
     }
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {
-        // The numbers were read in the wrong byte order, so further comparisons are not possible.
+        // The PC read the flash numbers in the wrong byte order, so further comparisons are not possible.
         report.findings.push(InitFinding::ByteOrder { endian: link.profile().endian });
         return;
     }

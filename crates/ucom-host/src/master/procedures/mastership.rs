@@ -5,8 +5,8 @@ use crate::master::procedures::exchange::numbers;
 use ucom::Function;
 
 impl Link {
-    /// Makes this PC the master before the first command that changes something (D-08). Listens for another master, then sends ALIVE until
-    /// the session ends.
+    /// Makes this PC the master before the first command that changes a board (D-08). The function listens for another master, and then
+    /// sends ALIVE until the session ends.
     pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
         self.look_for_master(force).await?;
         self.with(|core| {
@@ -22,14 +22,14 @@ impl Link {
         self.with(|core| core.session != Session::Quiet)
     }
 
-    /// Waits until this PC has listened to the bus for `master.listen`. Returns an error if it received a frame of another PC during this
-    /// time (D-08). Does nothing if this PC is already the master or if `force` is set.
+    /// Waits until this PC has listened to the bus for `master.listen`. The function returns an error if this PC received a frame of
+    /// another PC during this time (D-08). The function does nothing if this PC is already the master or if `force` is set.
     pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
         let already = self.with(|core| core.session != Session::Quiet);
         if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
-            // The listening time includes the time before the command in which this PC has already listened to the bus.
+            // The time in which this PC has listened to the bus before this command counts as well.
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }
@@ -51,9 +51,9 @@ impl Link {
         }
     }
 
-    /// Reports heartbeats of another PC. A heartbeat with the number of a board may come from the board, or from another PC that sends it
-    /// only to this board. The status of the board shows the sender: a board that is not started sends no heartbeats. If the board does not
-    /// answer, the heartbeat is assumed to come from the board.
+    /// Reports heartbeats that another PC sends. A heartbeat with the number of a board may come from the board, or from another PC that
+    /// sends heartbeats only to this board. The status of the board shows the sender: a board that is not started sends no heartbeats. If
+    /// the board does not answer, the PC assumes that the board sent the heartbeat.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

@@ -1,4 +1,4 @@
-//! Checks before a change that each number belongs to only one board (D-24).
+//! Checks, before a procedure changes a board, that each number belongs to only one board (D-24).
 use std::collections::BTreeMap;
 
 use crate::master::engine::{Link, MS, Open};
@@ -18,12 +18,12 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Ide
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // After the first wait, answers of any age are accepted, because an old answer then only means that the driver is late.
+        // After the first wait, an answer of any age is accepted, because an old answer then only means that the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();
         for board in boards {
-            // Numbers that a board cannot have are skipped.
+            // The check skips numbers that a board cannot have.
             let Ok(to) = link.board(*board) else { continue };
             match link.with(|core| core.holders.open(*board, core.fired, patience, oldest)) {
                 Open::Nothing => {}
@@ -55,7 +55,7 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Ide
     }
 }
 
-/// Checks all numbers of boards.
+/// Checks every number that a board can have.
 pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), IdentityError> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let asked = match link.profile().broadcast_number() {
@@ -72,8 +72,8 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Identit
     link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
-/// Waits until the last PC_INFO to these boards can no longer be answered, because a board that shares a number may answer late. Each bit
-/// of `boards` is a board.
+/// Waits until the last PC_INFO to these boards can no longer be answered. This is necessary because a board that shares a number may
+/// answer late. Each bit of `boards` is a board.
 pub(crate) async fn last_answers(link: &Link, boards: u32) {
     let patience = link.times().info;
     if let Some(asked_at) = link.with(|core| core.holders.last_asked(boards)) {
@@ -81,7 +81,7 @@ pub(crate) async fn last_answers(link: &Link, boards: u32) {
     }
 }
 
-/// Waits until the time `until`, and until an answer that is being received has ended.
+/// Waits until the time `until`, and then until an answer that is being received has ended.
 async fn out_of_words(link: &Link, mut until: u64) {
     let (gap, limit) = (link.times().gap, until + 20 * link.times().gap);
     while link.next(until).await.is_some() && link.now() < limit {

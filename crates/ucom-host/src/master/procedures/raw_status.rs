@@ -1,4 +1,4 @@
-//! Sends PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask (D-22). For experts.
+//! Sends PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask (D-22). This procedure is for experts.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, RunningError};
 use crate::master::procedures::exchange::numbers;
@@ -6,7 +6,7 @@ use crate::master::procedures::one_board::one_board_each;
 use crate::master::reports::{Outcome, RawStatus, expected_status};
 use ucom::{Status, ToBoard};
 
-/// Sends one frame to one board or to all boards, and reports the effect. `seen` lists the boards to read.
+/// Sends one PC_SETSTATUS to one board or to all boards, and reports the effect. `seen` lists the boards whose status is read.
 pub(crate) async fn raw_status(
     link: Link,
     to: Option<u8>,
@@ -29,7 +29,7 @@ pub(crate) async fn raw_status(
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;
-    // The frame is never repeated, because it must take effect only once.
+    // The PC never repeats this PC_SETSTATUS, because the command must take effect only once.
     link.send(address, ToBoard::SetStatus { mask, value }).await;
     let limit = link.now() + link.times().start;
     let mut boards = Vec::new();
@@ -42,7 +42,7 @@ pub(crate) async fn raw_status(
                 Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => None,
                 Err(e) => return Err(e),
             };
-            // Applications need time to start, so the status is read again.
+            // Applications need time to start, so the PC reads the status again.
             if result.as_expected() || link.now() >= limit {
                 break;
             }

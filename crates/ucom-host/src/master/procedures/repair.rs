@@ -1,9 +1,9 @@
 //! Assigns a lost number to its board again while the other boards keep their numbers (section on initialisation: D-21, D-24).
 //!
-//! PC_INIT(n) assigns the number to *every* board that has no number and whose incoming pin is active. Therefore only the outgoing pin of the
-//! board before n may be on at that moment. The incoming pin of the first board is always active, so the first board must have its number.
-//! Other pins may stay off, for example after a cancel. Pins that are off do no harm: only PC_INIT depends on them, and a repair switches on
-//! the pin that it needs.
+//! PC_INIT(n) assigns the number to *every* board without a number whose incoming pin is active. Therefore only the outgoing pin of the
+//! board before n may be on when PC_INIT(n) is sent. The incoming pin of the first board is always active, so the first board must have its
+//! number. Other outgoing pins may be off, for example after a cancel. Pins that are off do no harm: only PC_INIT depends on them, and each
+//! repair switches on the pin that it needs.
 
 use crate::master::engine::{Link, MS, head};
 use crate::master::error::{AddressError, Error, IdentityError};
@@ -18,7 +18,7 @@ use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
 /// Limit of rounds in which PC_INFO is sent to find the boards with a number.
 const ROUNDS: u32 = 6;
 
-/// Assigns the number `number` to its board again if the board no longer answers. Returns an error if the board has another flash number,
+/// Assigns `number` to its board again if the board no longer answers. The function returns an error if the board has another flash number,
 /// or if another board has also taken the number.
 pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
     link.board(number)?;
@@ -37,7 +37,7 @@ pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result
     Ok(BoardSeen { info: raised, ..seen })
 }
 
-/// Assigns the number to the intended board only. Boards whose pin was on and is switched off here are added to `lowered`.
+/// Assigns the number to the intended board only. The function adds a board to `lowered` if it switches off the outgoing pin of the board.
 async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>) -> Result<BoardSeen, Error> {
     let since = link.now();
     only_its_pin(link, number, lowered).await?;
@@ -51,7 +51,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
-        // A wrong board must lose the number. If the board kept the number, the next command would reach that board.
+        // A board with another flash number must lose the number. If that board kept the number, the next command would reach that board.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give up number {number}"));
@@ -66,17 +66,18 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
     }
 }
 
-/// Switches off all outgoing pins except the pin of the board before `number`, which must be on.
+/// Switches off the outgoing pins of all boards except the board before `number`, whose pin must be on.
 ///
-/// The command is sent to every number three times, even if no board answers: a board may work although its answers are lost. The status of
-/// boards that answer is read back.
+/// The function sends PC_SETSTATUS to every other number three times, even if no board answers: a board may work although its answers are
+/// lost. The function reads the status of each board that answers.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
     let first = numbers.first().map_or(number, |n| n.number());
     let feeder = (number > first).then(|| number - 1);
     if let Some(feeder) = feeder {
-        // The pin of the board before `number` stays on only if that board has a number. If that pin is off, no board can take this number.
+        // The pin of the board before `number` stays on only if that board has a number. If the pin of the board before `number` is off, no
+        // board can take this number.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
             return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
@@ -93,15 +94,16 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
     }
     for (board, status) in statuses(link, &others).await {
         if !status.is_ok_and(|status| !status.has(Status::OPINIT)) {
-            // The function makes three more attempts and reads the status back each time. If all attempts fail, the repair ends.
+            // `set_status` makes three more attempts and reads the status back each time. If all attempts to switch off the pin fail, the
+            // repair ends.
             set_status(link, board, Status::OPINIT, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// Returns the flash numbers of all boards that answer to this number. A flash number that is received only once is considered to be a
-/// damaged answer.
+/// Returns the flash numbers of all boards that answer to `number`. A flash number that is received only once is considered to be a damaged
+/// answer.
 async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let mut seen: BTreeMap<u16, u32> = BTreeMap::new();
     for round in 1..=ROUNDS {
@@ -116,7 +118,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
 }
 
-/// Sends one PC_INFO. Returns the flash numbers in all answers to it, not only in the first answer.
+/// Sends one PC_INFO. The function returns the flash numbers in all answers to this PC_INFO, not only in the first answer.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
@@ -138,14 +140,14 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(found)
 }
 
-/// Removes a number from both boards that have it.
+/// Removes a number from both boards that share it.
 pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
     let Error::Identity(IdentityError::NumberShared { board, found, .. }) = error else { return Ok(error) };
     let given_back = take_back(link, number).await?;
     Ok(Error::Identity(IdentityError::NumberShared { board, found, given_back }))
 }
 
-/// Removes a number from its board. Returns `true` if no board answers to the number after the removal.
+/// Removes a number from its board. The function returns `true` if no board answers to the number after the removal.
 async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     let to = link.board(number)?;
     for _ in 0..TRIES {
@@ -161,7 +163,7 @@ async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     Ok(true)
 }
 
-/// Runs a repair as a separate procedure.
+/// Runs the repair of a number as a separate procedure.
 pub(crate) async fn repair_procedure(
     link: Link,
     number: u8,
@@ -172,7 +174,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board works. Only its outgoing pin is missing, so the repair switches on this pin alone.
+        // The board with this flash number answers. Only the outgoing pin of the board may be off, so the repair only switches on this pin.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

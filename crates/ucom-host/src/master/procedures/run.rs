@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use ucom::profile::OnLost;
 use ucom::{Admin, BoardInfo, Dimensions, Status};
 
-/// Runs boards. At the end, either all boards run, or all boards are in their previous state (idle, started or running). A board that was
-/// running before keeps its values, except for inputs and parameters that the user sets.
+/// Starts the control loops of boards. At the end, either all boards run, or all boards are in their previous state (idle, started or
+/// running). A board that was running before keeps its values, except for inputs and parameters that the user sets.
 pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
     let mut begun = Vec::new();
     let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
@@ -35,12 +35,12 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
     result.map(Outcome::Running)
 }
 
-/// Record of a board that a run has started. If the run fails, the start is undone.
+/// Record of a board that a run has started. If the run fails, the procedure undoes the start of this board.
 struct Begun {
     board: u8,
-    /// Level of the stop that returns the board to its previous state; `None` if nothing must be undone.
+    /// Stop level that returns the board to its previous state; `None` if the procedure does not need to undo anything.
     back: Option<StopLevel>,
-    /// `true` if the loop was running already.
+    /// `true` if the control loop of the board was already running.
     ran: bool,
 }
 
@@ -59,7 +59,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // Checks that can refuse the command (names, load) come first, if their data are known before a board is started.
+    // Checks that can refuse the command (names, load) are performed first, if their data are known before a board is started.
     let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
@@ -71,8 +71,8 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
     }
     one_board_each(link, &options.boards.iter().map(|plan| plan.board).collect::<Vec<_>>()).await?;
     for (plan, seen) in options.boards.iter().zip(found) {
-        // If the procedure fails, each board that did not run before is stopped to its previous state. A board that was running is not
-        // stopped.
+        // If the procedure fails, it returns each board whose control loop did not run before to its previous state. A board whose control
+        // loop was running is not stopped.
         let status = seen.info.status;
         let back = match (status.has(Status::MSTART), status.has(Status::MCARUN)) {
             (false, _) => Some(StopLevel::Application),
@@ -82,7 +82,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
-        // The user selected the values by the names that were known before.
+        // The user selected the values by the names in the description that was known before.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
             return Err(SignalError::StaleNames { board: plan.board }.into());
         }
@@ -104,7 +104,7 @@ fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
     link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
 }
 
-/// Adds a board with its description. Checks the names of the board's values, and the bus load.
+/// Adds a board with its description to the run. The function checks the names of the board's values, and the bus load.
 fn add(
     link: &Link,
     options: &RunOptions,
@@ -122,7 +122,7 @@ fn add(
     if load.exceeds() && !options.force { Err(RunningError::Load(load).into()) } else { Ok(()) }
 }
 
-/// Sends inputs and parameters, starts the loop, and enables the outputs if the options require it.
+/// Sends inputs and parameters to a board, starts its control loop, and enables the outputs if the options require it.
 async fn start_loop(
     link: &Link,
     options: &RunOptions,
@@ -131,8 +131,8 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // If the board was already running, this PC knows only the values that it sent to the board itself. Initial values must not replace the
-    // values of another PC unless the user requests it.
+    // If the board was already running, this PC knows only the inputs that it sent to the board itself. The initial values must not replace
+    // the inputs that another PC has set, unless the user requests this.
     let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
     let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
@@ -155,7 +155,7 @@ async fn start_loop(
         let index = description.find(board, Kind::Par, &setting.name)?;
         link.with(|core| core.send_parameter(board, index, setting.value));
     }
-    // The board must not start before its values have been sent.
+    // The control loop must not start before the board's inputs and parameters have been sent.
     link.flush().await;
     let flags = mca_start(link, board).await?;
     if begun.back.is_none() && !flags.active && options.active {
@@ -172,7 +172,7 @@ async fn start_loop(
     change_flags(link, board, AdminChange { active: Some(true), ..running }).await
 }
 
-/// Returns an error if a board was lost and `on_lost` stops all boards. In this case, no further board is started.
+/// Returns an error if a board was lost and `on_lost` stops all boards. In this case, the procedure starts no further board.
 fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
     let lost = |core: &mut Core, number: u8| {
         core.boards.get(number).is_some_and(|b| b.life == Life::Lost || b.rebooted)
@@ -205,7 +205,8 @@ fn forecast(link: &Link, described: &BTreeMap<u8, IoDescription>) -> LoadForecas
                 let known = Dimensions { ci: data.ci.len() as u16, so, par: 0 };
                 all.entry(number).or_insert(known);
             } else if board.so_at.is_some() {
-                // The dimensions of this board are not known. The forecast assumes one package in each direction, which is the minimum.
+                // The buffer dimensions of this board are not known. The forecast assumes one package in each direction for this board,
+                // which is the minimum.
                 all.entry(number).or_insert(Dimensions { ci: 1, so: 1, par: 0 });
             }
         }

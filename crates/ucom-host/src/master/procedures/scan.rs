@@ -1,4 +1,4 @@
-//! Scan that changes nothing: PC_REPORT to all boards and PC_INFO to each number, without a reset (5.4).
+//! Scan that does not change any board: PC_REPORT to all boards and PC_INFO to each number, without a reset (5.4).
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -12,16 +12,16 @@ use std::collections::BTreeSet;
 use ucom::Sequence;
 use ucom::profile::Endian;
 
-/// Scans the bus. Sends only `PC_REPORT` and `PC_INFO` (P-1).
+/// Scans the bus. The scan sends only `PC_REPORT` and `PC_INFO` (P-1).
 pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     let mut report = ScanReport::default();
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
-    // Numbers that two boards may share get another PC_INFO. Numbers that two boards certainly share are reported below.
+    // The scan sends another PC_INFO to each number that two boards may share. Numbers that two boards certainly share are reported below.
     let doubtful = link.with(|core| core.holders.doubtful());
     let _ = one_board_each(&link, &doubtful).await;
-    // If a board has answered without a report, the report may have been lost.
+    // If a board has answered PC_INFO but has not reported, its report may have been lost.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };
@@ -62,7 +62,7 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
 
 fn judge(report: &mut ScanReport, endian: Endian) {
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {
-        // Findings that the wrong byte order causes are not problems of the chain.
+        // Findings that are caused by the wrong byte order are not problems of the chain.
         report.findings.retain(|finding| !matches!(finding, ScanFinding::NoDescription { .. }));
         report.findings.push(ScanFinding::ByteOrder { endian });
         return;

@@ -1,4 +1,4 @@
-//! Stops a board, even if the board does not answer. The stop covers outputs, control loop and application.
+//! Stops a board, even if the board does not answer. A stop can end the outputs, the control loop and the application of the board.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::control::change_flags;
@@ -12,13 +12,13 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     link.board(board)?;
     link.become_master(force).await?;
     let info = stop_board(&link, board, level).await;
-    // A shared number is only reported as an event, after both boards have received the stop.
+    // A number that two boards share is only reported as an event, after both boards have received the stop command.
     let _ = one_board_each(&link, &[board]).await;
     Ok(Outcome::Status { board, info: info? })
 }
 
-/// Switches off the outputs, then stops the loop, then the application. The order is the reverse of a start. If a board does not answer a
-/// step, the next steps are still performed. The first failure is returned.
+/// Switches off the outputs, then stops the control loop, then the application. The order of these steps is the reverse of a start. If a
+/// board does not answer a step, the function still performs the next steps. The function returns the first failure.
 pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
     let mut known = match info(link, board).await {
         Ok(seen) => seen.info,
@@ -48,8 +48,9 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// Stops a board to which a start command was sent and which does not show the start yet. Such a board may start at any time until
-/// `start.timeout` has passed. Therefore the board gets the stop command in any state, and its state is read again after that time.
+/// Stops a board to which a start command was sent and which has not yet reported the start. Such a board may start at any time until
+/// `start.timeout` has passed. Therefore the board gets the stop command in any state, and the function reads the state of the board again
+/// after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;
@@ -62,13 +63,13 @@ async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<Board
     Ok(now)
 }
 
-/// Stops a board that does not answer PC_INFO, because it may still be running. The board's flags are not read first.
+/// Stops a board that does not answer PC_INFO, because it may still be running. The function does not read the flags of the board first.
 async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
     let run = flags.run && level == StopLevel::Outputs;
     link.with(|core| core.stop_inputs(board));
-    // An answer is not expected here.
+    // The function does not expect an answer to this command.
     let _ = admin(link, board, Admin { run, active: false, ..flags }).await;
     for _ in 0..TRIES {
         link.send(to, ToBoard::Admin(Admin { run, active: false, ..flags })).await;

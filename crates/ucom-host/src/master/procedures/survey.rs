@@ -7,13 +7,13 @@ use crate::master::procedures::exchange::{Answer, InfoCollector, TRIES, identity
 use crate::master::reports::BoardSeen;
 use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Time between two requests of a round in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
+/// Time between two PC_INFO requests of a round in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
 const SPACING: u64 = 2_000;
 
-/// Answers to one number.
+/// Answers to PC_INFO that were sent to one number.
 #[derive(Default)]
 pub(crate) struct Slot {
-    /// Answers so far, which may differ in their identity.
+    /// Answers so far, which may differ in flash number, Program ID or date.
     pub answers: Vec<(BoardInfo, Option<String>)>,
     pub confirmed: bool,
     pub contradicts: bool,
@@ -40,7 +40,7 @@ impl Slot {
 
     pub(crate) fn seen(&self, number: u8) -> Option<BoardSeen> {
         let (info, _) = self.answers.last()?;
-        // Uses the latest answer whose identity agrees with another answer.
+        // Uses the latest answer whose identity agrees with the identity of another answer.
         let agreed =
             |i: &BoardInfo| self.answers.iter().filter(|(o, _)| identity(o) == identity(i)).count() > 1;
         let info = self.answers.iter().rev().map(|(i, _)| i).find(|i| agreed(i)).unwrap_or(info);
@@ -50,8 +50,8 @@ impl Slot {
     }
 }
 
-/// Sends PC_INFO to all given numbers in at most four rounds. PC_INFO is repeated until the board has sent a complete description and two
-/// answers that agree, or has been silent three times.
+/// Sends PC_INFO to all given numbers in at most four rounds. The function repeats PC_INFO until the board has sent a complete description
+/// and two answers that agree, or has been silent three times.
 pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
     let times = link.times();
@@ -103,7 +103,7 @@ fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: 
     }
 }
 
-/// Returns the last status for each of these numbers, or an error if the answers of a board contradict each other.
+/// Returns the last status of the boards with these numbers, or an error if the answers of a board contradict each other.
 pub(crate) async fn statuses(
     link: &Link,
     numbers: &[Sequence],

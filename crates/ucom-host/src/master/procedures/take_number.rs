@@ -1,12 +1,12 @@
-//! PC_INIT to one board (D-21, D-24).
+//! Sends PC_INIT, which assigns a number to one board (D-21, D-24).
 use crate::master::engine::{Link, MS};
 use crate::master::error::{AddressError, Error};
 use crate::master::procedures::exchange::TRIES;
 use crate::master::procedures::exchange::{Answer, ask_info};
 use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
 
-/// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the board's own pin is
-/// switched off before each repetition. If this step were missing, the next board would also take the number if the board switches on its
+/// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the function switches off the
+/// board's outgoing pin before each repetition. Without this step, the next board would also take the number if the board switches on its
 /// pin by itself.
 pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
     let to = link.board(number)?;
@@ -29,7 +29,8 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
                     acknowledged = true;
                     break;
                 }
-                // The board has not sent its previous acknowledgement yet (D-24), so the procedure waits for it.
+                // The board has not sent the acknowledgement of its previous PC_INIT yet (D-24), so the procedure waits for this
+                // acknowledgement.
                 FromBoard::Error(ErrorCode::Reinit) if received.from == nobody || received.from == number => {
                     until = until.max(link.now() + 100 * MS);
                 }
@@ -39,8 +40,8 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
         if acknowledged {
             return Ok(true);
         }
-        // The acknowledgement may have been lost, so PC_INIT is not repeated without a query. An incomplete answer is enough, because it
-        // shows that a board has this number. The board's identity is read later.
+        // The acknowledgement of the board may have been lost, so PC_INIT is not repeated without a PC_INFO. An incomplete answer to
+        // PC_INFO is enough, because it shows that a board has this number. The caller reads the identity of the board later.
         link.listen(1 << number, &[Function::DspInfo]);
         if !matches!(ask_info(link, number).await?, Answer::Silence) {
             return Ok(true);

@@ -1,4 +1,4 @@
-//! Starts the procedure for a request.
+//! Starts the procedure that performs a request.
 use crate::master::engine::Link;
 use crate::master::error::Error;
 use crate::master::procedures::{
@@ -7,15 +7,15 @@ use crate::master::procedures::{
 use crate::master::procedures::{control, describe, init, one_board, raw_status, repair, run, scan, stop};
 use crate::master::reports::{Outcome, Request};
 
-/// A procedure in progress.
+/// A procedure in progress, as a future.
 pub(crate) type Work = core::pin::Pin<Box<dyn Future<Output = Result<Outcome, Error>> + Send>>;
 
-/// Returns the procedure for a request.
+/// Returns the procedure that performs a request.
 pub(crate) fn work(link: Link, request: Request) -> Work {
     let (outer, end, boards) = (link.clone(), link.clone(), request.claims());
     let looks = !request.bears_shared_numbers() && boards != u32::MAX;
     let inner: Work = match request {
-        // These procedures undo their changes when they are cancelled.
+        // These procedures undo their changes when the caller cancels them.
         Request::Update(options) => return Box::pin(update(link, options)),
         Request::Run(options) => return Box::pin(run::run(link, options)),
         Request::Conformance(options) => return Box::pin(conformance(link, options)),

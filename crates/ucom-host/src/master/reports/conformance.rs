@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Permissions for the tests, and the selection of tests and boards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConformanceOptions {
-    /// Boards to test. If empty, the tests cover all boards that answer.
+    /// Numbers of the boards to test. If this list is empty, the tests cover all boards that answer.
     pub boards: Vec<u8>,
     /// Permission to reset and renumber the chain, and to set and clear status bits.
     pub init: bool,
@@ -16,7 +16,7 @@ pub struct ConformanceOptions {
     pub run: bool,
     /// Program for one board, and permission to program that board.
     pub program: Option<ConformanceProgram>,
-    /// Names of the tests to run. Empty: all tests.
+    /// Names of the tests to run. An empty list selects all tests.
     pub only: Vec<String>,
     /// Permission to run the tests while another PC is on the bus.
     pub force: bool,
@@ -29,24 +29,24 @@ impl ConformanceOptions {
     }
 }
 
-/// Program for one board.
+/// Program for one board, which the programming tests write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConformanceProgram {
-    /// Board number.
+    /// Number of the board that the tests may program.
     pub board: u8,
     /// Flash number that the board must have. The header of the image contains this number, so that other boards refuse the image.
     pub flash_number: u16,
-    /// The program.
+    /// Image of the program.
     pub image: UpdateImage,
     /// Flash date in the form that `prog.date` in the profile defines.
     pub date: u16,
 }
 
-/// Result of a test.
+/// Result of a conformance test.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase", tag = "verdict", content = "why")]
 pub enum Verdict {
-    /// The board behaves as expected.
+    /// The board behaves as the test expects.
     Pass,
     /// The test failed; the text describes the actual result.
     Fail(String),
@@ -54,41 +54,41 @@ pub enum Verdict {
     Skipped(String),
 }
 
-/// Result of a test with one board or the whole chain.
+/// Result of a conformance test for one board or for the whole chain.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConformanceTest {
-    /// Name, such as `D-T10`.
+    /// Name of the test, such as `D-T10`.
     pub id: &'static str,
-    /// Board number; `None` for the whole chain.
+    /// Board number; `None` for a test of the whole chain.
     pub board: Option<u8>,
-    /// Expected behaviour.
+    /// Behaviour that the test expects.
     pub expected: &'static str,
-    /// Actual result.
+    /// Result of the test.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Option that would have allowed the test; `None` if the test was allowed.
     pub needs: Option<&'static str>,
-    /// Sent frames in candump's form.
+    /// Frames that the test sent, in the format of candump.
     pub sent: Vec<String>,
-    /// Received frames in candump's form, at most 64.
+    /// Frames that the test received, in the format of candump, at most 64.
     pub came: Vec<String>,
 }
 
 impl ConformanceTest {
-    /// Returns the tested part in words: `board 3` or `chain`.
+    /// Returns the subject of the test in words: `board 3` or `chain`.
     pub fn subject(&self) -> String {
         self.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
     }
 }
 
-/// Results of all tests of a bus.
+/// Results of all conformance tests of a bus.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ConformanceReport {
-    /// Tests in the order of execution.
+    /// Results of the tests in the order of execution.
     pub tests: Vec<ConformanceTest>,
-    /// Remaining differences from the state before the tests, each with the remedy.
+    /// Remaining differences of the boards from their state before the tests, each with the remedy.
     pub left: Vec<String>,
-    /// Error that ended the tests early. The remaining tests are skipped.
+    /// Error that ended the series of tests early. The remaining tests are skipped.
     #[serde(skip)]
     pub error: Option<Error>,
 }
@@ -122,8 +122,8 @@ impl ConformanceReport {
         by_option
     }
 
-    /// Returns the kind of failure. If an error ended the tests, returns the kind of that error. If a test failed or a board is not in its
-    /// previous state, returns `Device`. Returns `None` if every test passed.
+    /// Returns the kind of failure of the tests. If an error ended the tests early, the function returns the kind of that error. If a test
+    /// failed or a board is not in its previous state, the function returns `Device`. If every test passed, the function returns `None`.
     pub fn failure(&self) -> Option<ErrorKind> {
         match &self.error {
             Some(error) => Some(error.kind()),

@@ -1,4 +1,4 @@
-//! Options and results of an init, which assigns numbers to a chain.
+//! Options and results of an init. An init assigns numbers to the boards of a chain.
 use crate::master::counted::counted;
 use crate::master::error::{Error, MEASURE_ORDER, other_order};
 use crate::master::reports::scan::Reports;
@@ -18,11 +18,11 @@ pub struct InitOptions {
 /// Result of an init.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitReport {
-    /// Reports of boards after the reset.
+    /// Reports that boards sent after the reset.
     pub reports: Reports,
-    /// Boards in the order of the chain.
+    /// Boards that got a number, in the order of the chain.
     pub boards: Vec<BoardSeen>,
-    /// Problems; empty if the init succeeded.
+    /// Problems that the init found; empty if the init succeeded.
     pub findings: Vec<InitFinding>,
 }
 
@@ -32,7 +32,7 @@ impl InitReport {
         self.findings.is_empty()
     }
 
-    /// Returns the kind of failure; `None` if the init succeeded.
+    /// Returns the kind of failure of the init; returns `None` if the init succeeded.
     pub fn failure(&self) -> Option<ErrorKind> {
         match self.findings.as_slice() {
             [] => None,
@@ -42,7 +42,7 @@ impl InitReport {
     }
 }
 
-/// Problem found by an init.
+/// Problem that an init found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InitFinding {
@@ -59,15 +59,15 @@ pub enum InitFinding {
         hex(ids)
     )]
     NotReached {
-        /// Position of the last board that was reached.
+        /// Number of the last board that got a number.
         after: u8,
         /// Low bytes of the flash numbers of boards that have reported but got no number.
         ids: Vec<u8>,
     },
-    /// The flash numbers match the reports only after their bytes are swapped (D-10).
+    /// The flash numbers of boards match the boards' reports only after their bytes are swapped (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
-        /// Byte order of the profile.
+        /// Byte order that the profile defines.
         endian: Endian,
     },
     /// The number of boards is higher than the number of reports, so boards have the same low byte in their flash numbers.
@@ -82,13 +82,13 @@ pub enum InitFinding {
         /// Number of different reports.
         reports: u32,
     },
-    /// A board did not report.
+    /// A board has a number but did not report.
     #[error("board {board} took a number but did not report")]
     NotReported {
         /// Board number.
         board: u8,
     },
-    /// A board did not receive the reset and continued to run.
+    /// A board did not receive the reset and continued to run its application.
     #[error("board {board} did not receive PC_RESET and continued to run: {}", if *stopped { "it was stopped" } else { "it may still run" })]
     NotReset {
         /// Board number.
@@ -99,47 +99,47 @@ pub enum InitFinding {
     /// Two boards have the same flash number.
     #[error("duplicate flash number 0x{flash_number:04X}: boards {first} and {second}")]
     DuplicateFlash {
-        /// The flash number.
+        /// Flash number that both boards have.
         flash_number: u16,
         /// Number of the first board.
         first: u8,
         /// Number of the second board.
         second: u8,
     },
-    /// The board at a position differs from the inventory.
+    /// The board at a position of the chain differs from the inventory.
     #[error(
         "unexpected board order: position {board} has flash number 0x{found:04X}, the inventory has 0x{expected:04X}"
     )]
     UnexpectedOrder {
-        /// The position.
+        /// Number of the position.
         board: u8,
-        /// Flash number in the inventory.
+        /// Flash number that the inventory contains for this position.
         expected: u16,
-        /// Flash number of the board.
+        /// Flash number of the board at this position.
         found: u16,
     },
     /// The inventory contains a board beyond the end of the chain.
     #[error("board {board} (flash number 0x{expected:04X}) of the inventory is missing")]
     Missing {
-        /// Position.
+        /// Number of the missing board.
         board: u8,
-        /// Flash number of the board.
+        /// Flash number of the board in the inventory.
         expected: u16,
     },
-    /// A board was refused, so only the boards that come before it in the chain got numbers.
+    /// A board was refused, so only the boards before it in the chain got numbers.
     #[error("position {board}: {error}")]
     Refused {
-        /// Position.
+        /// Number of the position of the refused board.
         board: u8,
-        /// Reason.
+        /// Reason why the board was refused.
         error: Error,
     },
     /// Two boards have UCoM ids that use the same identifier.
     #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
     Ambiguous {
-        /// The lower id.
+        /// The lower UCoM id.
         low: u8,
-        /// The higher id.
+        /// The higher UCoM id.
         high: u8,
     },
 }

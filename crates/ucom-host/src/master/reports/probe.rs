@@ -1,4 +1,4 @@
-//! Options and results of a probe.
+//! Options and results of a probe of board properties.
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -6,48 +6,51 @@ use ucom::Profile;
 
 use crate::master::reports::init::InitReport;
 
-/// Permissions of a probe.
+/// Permissions that a probe has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// Permission to reset and renumber the chain. The probe then also determines if boards switch on their pin by themselves.
+    /// Permission to reset and renumber the chain. With this permission, the probe also determines if boards switch on their outgoing pin
+    /// by themselves.
     pub init: bool,
-    /// Permission to start a control loop with inactive outputs. The probe then also determines which heartbeats keep the loop running.
+    /// Permission to start a control loop with inactive outputs. With this permission, the probe also determines which heartbeats keep the
+    /// control loop running.
     pub alive: bool,
-    /// Image that a board contains, as it was sent. The probe then also determines how the Program ID is computed.
+    /// Image that a board contains, in the form in which it was sent to the board. With this image, the probe also determines how the
+    /// Program ID is computed.
     pub image: Option<Arc<[u8]>>,
-    /// Permission to probe while another PC is on the bus. With `init` and `alive`, also permission to end running control loops.
+    /// Permission to probe while another PC is on the bus. With `init` and `alive`, the probe may also end running control loops.
     pub force: bool,
 }
 
-/// Property that the published description does not define, and its measurement.
+/// Property that the published description does not define, and the measurement of this property.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ProbeRow {
     /// Key of the profile.
     pub key: &'static str,
-    /// The property.
+    /// Property in words.
     pub unknown: &'static str,
-    /// Statement about the property in the published description.
+    /// Statement of the published description about the property.
     pub published: &'static str,
-    /// The observation.
+    /// Observation of the probe in words.
     pub observed: String,
-    /// Value in the resulting profile.
+    /// Value of the key in the resulting profile.
     pub decision: String,
-    /// `true` if the observation determines the value; otherwise the previous value is kept.
+    /// `true` if the observation determines the value; `false` if the previous value is kept.
     pub measured: bool,
 }
 
 /// Result of a probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeReport {
-    /// Profile with the measured values. The master does not apply this profile automatically.
+    /// Profile that contains the measured values. The master does not apply this profile automatically.
     pub profile: Profile,
     /// Table with one row per property.
     pub rows: Vec<ProbeRow>,
-    /// Boards that answered.
+    /// Numbers of the boards that answered.
     pub boards: Vec<u8>,
-    /// Number of different UCoM ids in the reports. The number includes boards without a number.
+    /// Number of different UCoM ids in the reports. Boards without a number are included.
     pub reports: usize,
-    /// Report of the new numbers, if the probe has assigned numbers.
+    /// Report of the address assignment, if the probe has assigned numbers.
     pub init: Option<InitReport>,
 }
 

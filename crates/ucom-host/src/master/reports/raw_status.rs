@@ -8,15 +8,15 @@ pub struct RawStatus {
     pub board: u8,
     /// Answer to PC_INFO before the command.
     pub before: BoardInfo,
-    /// Status that the formula and the rules require.
+    /// Status that the formula and the rules of D-22 require.
     pub expected: Status,
-    /// Answer after the command; `None` if the board no longer answers to its number.
+    /// Answer to PC_INFO after the command; `None` if the board no longer answers to its number.
     pub after: Option<BoardInfo>,
 }
 
 impl RawStatus {
-    /// Returns `true` if the board has the required state. If INIT was cleared, the board must be silent, because it has forgotten its
-    /// number.
+    /// Returns `true` if the board has the status that the rules require. If INIT was cleared, the board must be silent, because it has
+    /// forgotten its number.
     pub fn as_expected(&self) -> bool {
         match self.after {
             Some(after) => after.status == self.expected,
@@ -31,7 +31,8 @@ pub fn expected_status(before: &BoardInfo, mask: u8, value: u8) -> Status {
     let new = old.set(mask, value);
     let kept = new & Status::ASTART;
     if !new.has(Status::INIT) || !old.has(Status::INIT) {
-        // The board loses its number. Therefore it also ends its application, clears PROG and switches off its outgoing pin.
+        // Without INIT, the board has no number. A board without a number ends its application, clears PROG and switches off its outgoing
+        // pin.
         return kept | Status::EXLRUN | (old & Status::IPINIT);
     }
     let started = new.has(Status::MSTART) && (old.has(Status::MSTART) || before.has_application());
@@ -53,7 +54,7 @@ mod tests {
     use ucom::{Frame, Profile, Sequence, ToBoard};
     use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-    /// Creates a board that has a number. The parameters define the application and the state of the board.
+    /// Creates a board that has a number. The parameters define the application and the state of the simulated board.
     fn board(application: bool, started: bool, history: &[(u8, u8)]) -> (Board, u64) {
         let mut flash = MemoryFlash::default();
         if application {

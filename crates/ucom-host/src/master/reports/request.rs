@@ -11,17 +11,18 @@ use crate::master::reports::seen::BoardSeen;
 use crate::master::reports::update::{UpdateOptions, UpdateReport};
 use ucom::{Admin, BoardInfo, Status};
 
-/// Identifier of a procedure while it runs.
+/// Identifier of a running procedure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ProcedureId(pub(crate) u64);
 
-/// Request that starts a procedure. With `force`, the procedure runs even if another PC is on the bus or another check would refuse it.
+/// Request that starts a procedure of the master. With `force`, the procedure runs even if another PC is on the bus or if another check
+/// would refuse it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
-    /// Lists the boards. Changes nothing.
+    /// Lists the boards on the bus. This request does not change any board.
     Scan,
-    /// Assigns numbers to the whole chain.
+    /// Assigns numbers to all boards of the chain.
     Init(InitOptions),
     /// Assigns a lost number to one board again.
     Repair {
@@ -29,28 +30,29 @@ pub enum Request {
         board: u8,
         /// Flash number that the board at this position must have.
         flash_number: u16,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
-    /// Sends PC_INFO. Changes nothing.
+    /// Sends PC_INFO to a board. This request does not change any board.
     Info {
-        /// The board.
+        /// Board number.
         board: u8,
     },
-    /// Sends PC_SETSTATUS and reads the status back.
+    /// Sends PC_SETSTATUS to a board and reads the status back.
     SetStatus {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// Bits to change.
+        /// Status bits to change.
         mask: Status,
-        /// Requested values of the bits in the mask. Bits outside the mask are not sent.
+        /// Requested values of the status bits in the mask. The PC does not send the bits outside the mask.
         value: Status,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
-    /// Sends one PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask. Never repeated.
+    /// Sends one PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask. The master never repeats this
+    /// command.
     RawStatus {
-        /// Board that gets the command; `None` for a broadcast to all boards.
+        /// Number of the board that gets the command; `None` for a broadcast to all boards.
         board: Option<u8>,
         /// Boards whose status is read before and after the command.
         seen: Vec<u8>,
@@ -58,72 +60,73 @@ pub enum Request {
         mask: u8,
         /// Second byte of PC_SETSTATUS.
         value: u8,
-        /// See above. With `force`, the command is sent even if control loops run.
+        /// Permission to continue although a check would refuse the request, see [`Request`]. With `force`, the command is sent even if
+        /// control loops run.
         force: bool,
     },
-    /// Sends PC_RESET.
+    /// Sends PC_RESET to one board or to all boards.
     Reset {
-        /// Board that gets the command; `None` for all boards.
+        /// Number of the board that gets the command; `None` for all boards.
         board: Option<u8>,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
-    /// Sends PC_XRESET until the exloader runs with programming enabled.
+    /// Sends PC_XRESET to a board until the exloader runs with programming enabled.
     XReset {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
-    /// Sends PC_START until the application runs.
+    /// Sends PC_START to a board until the application runs.
     Start {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
     /// Stops a board in the reverse order of the start.
     Stop {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// Level of the stop.
+        /// Level at which the stop ends.
         level: StopLevel,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
     /// Reads the flags of a board, changes them and writes them.
     Admin {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// The change.
+        /// Change to the flags.
         change: AdminChange,
-        /// See above.
+        /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
     /// Updates the firmware of boards.
     Update(UpdateOptions),
-    /// Reads the descriptions of inputs, outputs and parameters. Changes nothing.
+    /// Reads the descriptions of a board's inputs, outputs and parameters. This request does not change any board.
     Describe {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// `true` to read the description again even if it is already known.
+        /// `true` to read the description again even if the description is already known.
         fresh: bool,
     },
-    /// Reads the initial inputs with MCA_DUMP_CI. Changes nothing.
+    /// Reads the initial inputs of a board with MCA_DUMP_CI. This request does not change any board.
     InitialInputs {
-        /// The board.
+        /// Board number.
         board: u8,
     },
-    /// Runs boards: performs all steps up to a running control loop.
+    /// Starts the control loops of boards with all steps that this needs.
     Run(RunOptions),
     /// Measures properties in which a board may differ from the profile.
     Probe(ProbeOptions),
-    /// Tests that boards follow the protocol page.
+    /// Tests that boards behave as the protocol page describes.
     Conformance(ConformanceOptions),
 }
 
 impl Request {
-    /// Returns the name of the request.
+    /// Returns the name of the request for messages.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Scan => "scan",
@@ -145,8 +148,9 @@ impl Request {
         }
     }
 
-    /// Returns `true` if the request continues when two boards have the same number. A stop must not wait, and reaches both of these
-    /// boards. The other requests detect boards with the same number themselves and report these boards in more detail.
+    /// Returns `true` if the request continues when two boards have the same number. A stop must not wait, and both boards receive the stop
+    /// command. This also applies to a change of flags that only ends motion. A scan, an init and a repair detect boards with the same
+    /// number themselves and report these boards in more detail.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
@@ -155,13 +159,13 @@ impl Request {
         }
     }
 
-    /// Returns the boards that the request works with, one bit per board. Only one procedure at a time can work with a board.
+    /// Returns the boards that the request works with. Each bit is a board. Only one procedure at a time can work with a board.
     pub(crate) fn claims(&self) -> u32 {
         let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
         match self {
             Self::Scan | Self::Init(_) | Self::Reset { board: None, .. } | Self::Probe(_) => u32::MAX,
             Self::RawStatus { .. } | Self::Conformance(_) => u32::MAX,
-            // The broadcast of a group reaches all boards, and no other board may be started while program data are sent.
+            // The broadcast of a group update reaches all boards, and no other board may be started while the PC sends program data.
             Self::Update(_) => u32::MAX,
             Self::Repair { board, .. }
             | Self::Info { board }
@@ -192,7 +196,7 @@ pub enum Outcome {
     Info(BoardSeen),
     /// Outcome of [`Request::SetStatus`], [`Request::XReset`] and [`Request::Stop`].
     Status {
-        /// The board.
+        /// Board number.
         board: u8,
         /// Answer to PC_INFO after the change.
         info: BoardInfo,
@@ -203,25 +207,25 @@ pub enum Outcome {
     Started(BoardSeen),
     /// Outcome of [`Request::Admin`].
     Admin {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// Flags after the change.
+        /// Flags of the board after the change.
         admin: Admin,
     },
     /// Outcome of [`Request::Update`], with a result for each board.
     Update(UpdateReport),
     /// Outcome of [`Request::Describe`].
     Description {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// The description.
+        /// Description of the board's inputs, outputs and parameters.
         description: IoDescription,
     },
     /// Outcome of [`Request::InitialInputs`].
     InitialInputs {
-        /// The board.
+        /// Board number.
         board: u8,
-        /// The words.
+        /// Initial values of the inputs, in the order of the buffer.
         values: Vec<u16>,
     },
     /// Outcome of [`Request::Run`].

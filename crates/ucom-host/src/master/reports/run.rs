@@ -2,12 +2,12 @@
 use crate::master::load::LoadForecast;
 use ucom::Admin;
 
-/// Value for an input or a parameter.
+/// Value that the user sets for an input or a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     /// Name or index of the signal.
     pub name: String,
-    /// The word.
+    /// Value of the signal as a 16-bit word.
     pub value: u16,
 }
 
@@ -16,18 +16,18 @@ pub struct Setting {
 pub struct RunBoard {
     /// Board number.
     pub board: u8,
-    /// Inputs whose values differ from the board's initial inputs.
+    /// Inputs that the user sets to other values than the board's initial inputs.
     pub ci: Vec<Setting>,
-    /// Parameters.
+    /// Parameters that the user sets.
     pub par: Vec<Setting>,
 }
 
 /// Options for a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunOptions {
-    /// The boards.
+    /// Boards to run, with their values.
     pub boards: Vec<RunBoard>,
-    /// `true` to enable the outputs at the end.
+    /// `true` to enable the outputs of the boards at the end.
     pub active: bool,
     /// Permission to run even if the bus load would be too high or another PC is on the bus.
     pub force: bool,
@@ -36,7 +36,7 @@ pub struct RunOptions {
 /// Result of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunReport {
-    /// Flags of each board.
+    /// Flags of each board after the start.
     pub boards: Vec<(u8, Admin)>,
     /// Forecast of the bus load with all running boards.
     pub load: LoadForecast,

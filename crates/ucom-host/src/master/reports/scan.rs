@@ -6,10 +6,10 @@ use crate::master::reports::seen::BoardSeen;
 use ucom::Report;
 use ucom::profile::Endian;
 
-/// Reports of the boards after PC_RESET or PC_REPORT.
+/// Reports that boards sent after PC_RESET or PC_REPORT.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reports {
-    /// Low bytes of the flash numbers. The low bytes distinguish the boards.
+    /// Low bytes of the flash numbers in the reports. The PC distinguishes the boards by these low bytes.
     pub ids: BTreeSet<u8>,
     /// Number of report frames from each board.
     pub frames: BTreeMap<u8, u32>,
@@ -39,21 +39,21 @@ impl Reports {
 /// Result of a scan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ScanReport {
-    /// Reports of boards.
+    /// Reports that boards sent.
     pub reports: Reports,
-    /// Boards with a number.
+    /// Boards that have a number.
     pub boards: Vec<BoardSeen>,
-    /// Findings.
+    /// Findings about the chain.
     pub findings: Vec<ScanFinding>,
 }
 
-/// A property of the chain that the user should know.
+/// Property of the chain that the user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScanFinding {
     /// A board has no number.
     #[error("board with UCoM id 0x{ucom_id:02X} has no number: `ucom init`")]
     Unnumbered {
-        /// Low byte of its flash number.
+        /// Low byte of the board's flash number.
         ucom_id: u8,
     },
     /// A board has a number but did not report.
@@ -69,15 +69,15 @@ pub enum ScanFinding {
         first: u8,
         /// Number of the second board.
         second: u8,
-        /// The flash number.
+        /// Flash number that both boards have.
         flash_number: u16,
     },
     /// Two boards have UCoM ids that use the same identifier.
     #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
     Ambiguous {
-        /// The lower id.
+        /// The lower UCoM id.
         low: u8,
-        /// The higher id.
+        /// The higher UCoM id.
         high: u8,
     },
     /// A report has different UCoM ids in identifier and data.
@@ -86,13 +86,13 @@ pub enum ScanFinding {
          cause"
     )]
     Disagrees {
-        /// UCoM id in the data.
+        /// UCoM id in the data of the report.
         ucom_id: u8,
     },
-    /// The flash numbers match the reports only after their bytes are swapped (D-10).
+    /// The flash numbers of boards match the boards' reports only after their bytes are swapped (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
-        /// Byte order of the profile.
+        /// Byte order that the profile defines.
         endian: Endian,
     },
     /// The answers of a board contradict each other.
@@ -104,11 +104,11 @@ pub enum ScanFinding {
     /// Two boards have the same number (D-24).
     #[error("{}", shared(*board, [*first, *second]))]
     NumberShared {
-        /// The number.
+        /// Number that the boards share.
         board: u8,
         /// Flash number of the first board.
         first: u16,
-        /// Flash number of the second board. Equal to `first` if the boards cannot be distinguished.
+        /// Flash number of the second board. This number is equal to `first` if the boards cannot be distinguished.
         second: u16,
     },
     /// A board reports an impossible status.
@@ -116,10 +116,10 @@ pub enum ScanFinding {
     Status {
         /// Board number.
         board: u8,
-        /// Explanation.
+        /// Explanation why the status is impossible.
         problem: &'static str,
     },
-    /// No description of the board was received completely.
+    /// The PC did not receive any description of the board completely.
     #[error("the description of board {board} was not received completely")]
     NoDescription {
         /// Board number.
@@ -132,7 +132,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// Returns the error that other commands report when they refuse such a chain; returns `None` if they accept the chain.
+    /// Returns the error that other commands report if they refuse such a chain; returns `None` if they accept the chain.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

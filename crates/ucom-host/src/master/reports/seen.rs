@@ -1,4 +1,4 @@
-//! Answer of a board.
+//! Answer of a board to PC_INFO.
 use ucom::BoardInfo;
 
 /// Answer of a board to PC_INFO.
@@ -6,8 +6,8 @@ use ucom::BoardInfo;
 pub struct BoardSeen {
     /// Board number.
     pub number: u8,
-    /// Values of the first frame.
+    /// Values in the first frame of the answer.
     pub info: BoardInfo,
-    /// Description; `None` if it was not received completely.
+    /// Description of the board; `None` if the PC did not receive it completely.
     pub description: Option<String>,
 }

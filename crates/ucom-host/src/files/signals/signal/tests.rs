@@ -1,4 +1,4 @@
-//! Conversion of words to values and back (D-11).
+//! Tests of the conversion between words and values (D-11).
 use proptest::prelude::*;
 
 use super::*;
@@ -21,7 +21,7 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
         (word(&signal, "32767"), word(&signal, "-32768"), word(&signal, "0xFFEC")),
         (Ok(32767), Ok(32768), Ok(65516))
     );
-    // A number that would be read back as another number is refused.
+    // The conversion refuses a number that would be read back as another number.
     for wrong in ["32768", "40000", "65535", "-32769", "1.5", "3 deg", "on"] {
         assert!(word(&signal, wrong).is_err(), "{wrong}");
     }
@@ -29,7 +29,7 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
     assert!(word(&unsigned, "-1").is_err() && word(&unsigned, "65536").is_err());
 }
 
-/// If the table has no entry for the program, numbers have no meaning.
+/// If the signal table has no entry for the program, only raw words are accepted, because numbers have no meaning.
 #[test]
 fn d11_without_meaning_only_the_word_itself_is_taken() {
     let signal = Signal { raw_only: true, ..Signal::bare(&Profile::default()) };
@@ -46,11 +46,11 @@ fn d11_scale_offset_and_unit() {
     assert_eq!(word(&angle, "-15.504 deg"), Ok(-1550_i16 as u16));
     assert_eq!(angle.text_with_unit(0xFFFF), "-0.01 deg");
     assert_eq!(angle.json(1550), json!(15.5));
-    // The number could be the raw word or a value in the unit.
+    // The number could be the raw word or a value in the signal's unit, so it is refused.
     let message = word(&angle, "15").unwrap_err().to_string();
     assert_eq!(message, "15: the unit is missing: give `15deg`, or give the word as 0x0000");
     assert!(word(&angle, "0").is_err());
-    // A raw word is never scaled.
+    // The conversion never scales a raw word.
     assert_eq!(word(&angle, "0x0010"), Ok(16));
     let message = word(&angle, "400 deg").unwrap_err().to_string();
     assert_eq!(message, "400 deg is outside -327.68..327.67 deg");
@@ -59,7 +59,7 @@ fn d11_scale_offset_and_unit() {
     assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
     let down = signal(SignalType::Int16, -0.5, 0.0, "");
     assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
-    // Without the table the number would be the raw word. The signal has no unit, so only a raw word is accepted.
+    // Without the signal table, the number would be the raw word. The signal has no unit, so only a raw word is accepted.
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
         message.starts_with("2: the table has a scale but no unit for this signal")
@@ -93,7 +93,7 @@ fn d11_rounding_never_leaves_the_limits() {
     );
     let down = Signal { min: Some(-150.0), ..signal(SignalType::Int16, -100.0, 0.0, "A") };
     assert_eq!((word(&down, "-150A"), word(&down, "-151A").is_err()), (Ok(1), true));
-    // Rounding errors of fractions do not violate a limit.
+    // The rounding errors of fractions do not make a value exceed its limit.
     let tenths = Signal { max: Some(0.3), ..signal(SignalType::Int16, 0.1, 0.0, "A") };
     assert_eq!((word(&tenths, "0.3A"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
     let odd = Signal { min: Some(-0.125), max: Some(3276.65), ..signal(SignalType::Int16, 0.1, 0.0, "") };
@@ -128,7 +128,7 @@ fn d11_switches_and_bits() {
 }
 
 proptest! {
-    /// The word that is sent is within the limits, and no allowed word is nearer.
+    /// The word that is sent is within the limits, and no allowed word is nearer to the requested value.
     #[test]
     fn d11_the_sent_word_keeps_the_limits(scale in prop::sample::select(vec![-7.0, -0.3, 0.01, 0.3, 1.5, 100.0]), offset in -50..50_i32, a in -2000..2000_i32, b in -2000..2000_i32, value in -2500..2500_i32) {
         let (min, max) = (f64::from(a.min(b)) / 8.0, f64::from(a.max(b)) / 8.0);
@@ -148,7 +148,7 @@ proptest! {
         }
     }
 
-    /// The displayed text of a word is read back as that word.
+    /// The conversion of a word's displayed text results in the same word again.
     #[test]
     fn d11_text_gives_the_word_again(w: u16, kind in 0..4_usize, exponent in -6..4_i32, mantissa in 1..100_u32, negative: bool, offset in -1000..1000_i32) {
         let kind = [SignalType::Int16, SignalType::Uint16, SignalType::Hex, SignalType::Bool][kind];

@@ -1,4 +1,4 @@
-//! Tests that start the application and its control loop. The outputs are never enabled.
+//! Conformance tests that start the application and its control loop. These tests never enable the outputs of a board.
 use crate::master::engine::MS;
 use crate::master::error::Error;
 use crate::master::procedures::conformance::ask::dimensions;
@@ -6,7 +6,7 @@ use crate::master::procedures::conformance::bench::{Bench, list, verdict};
 use crate::master::reports::Verdict;
 use ucom::{Frame, Function, Status};
 
-/// Ends the test early if a step did not succeed.
+/// Ends the test early if the previous step did not succeed.
 macro_rules! need {
     ($result:expr) => {
         if let Err(verdict) = $result {
@@ -19,7 +19,7 @@ fn is(frame: &Frame, function: Function, board: u8) -> bool {
     frame.address().is_ok_and(|(f, n)| f == function && n.number() == board)
 }
 
-/// Stops the loop. The stop is sent three times, and the answers are discarded.
+/// Stops the control loop of a board. The function sends the stop command three times and discards the answers.
 async fn halt(bench: &mut Bench<'_>, board: u8) {
     for _ in 0..3 {
         bench.send(Function::Admin, board, &[0; 4]).await;
@@ -88,7 +88,7 @@ pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
         return Ok(Verdict::Fail(format!("at the dimension {}: {}", d.ci, list(&came))));
     }
     if let Some(last) = d.ci.checked_sub(1) {
-        // Inputs of zero are harmless: the loop does not run, and it begins with the initial inputs.
+        // Inputs of zero are harmless: the control loop does not run, and it begins with the initial inputs.
         bench.send(Function::Ci, board, &package(last)).await;
         let came = bench.receive(100 * MS).await;
         if !came.is_empty() {
@@ -130,7 +130,7 @@ async fn judge_alone(
         return Verdict::Fail("the board sent no flags: it continues to run without a PC".into());
     };
     let after = (at - start) / MS;
-    // The tolerance is 20 %, as for all times in the acceptance tests.
+    // The tolerance of the time is 20 %, as for all times in the acceptance tests.
     if flags.data().get(..2) != Some(&[0, 0]) || after * MS < lost * 4 / 5 || after * MS > lost * 6 / 5 {
         return Verdict::Fail(format!("the board sent {flags} after {after} ms"));
     }
@@ -165,7 +165,7 @@ pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
     Ok(result)
 }
 
-/// Sends a last heartbeat and then no heartbeats for `us` µs.
+/// Sends a last heartbeat and then sends no heartbeats for `us` µs.
 async fn pause(bench: &mut Bench<'_>, us: u64) {
     bench.heartbeats(false);
     bench.heartbeats(true);

@@ -1,4 +1,4 @@
-//! Tests that do not change anything.
+//! Conformance tests that do not change any board.
 use crate::master::engine::MS;
 use crate::master::error::{Error, MasterError};
 use crate::master::procedures::conformance::bench::{Bench, list, verdict};
@@ -6,7 +6,7 @@ use crate::master::reports::{BoardSeen, Verdict};
 use ucom::profile::{Endian, ReportMode};
 use ucom::{Dimensions, Frame, FromBoard, Function, Report, Status, package_count};
 
-/// Returns the reports among the frames, sorted.
+/// Returns the report frames among the given frames, sorted.
 pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
     let report = |f: &&Frame| f.address().is_ok_and(|(function, _)| (16..20).contains(&function.number()));
     let mut all: Vec<Frame> = frames.iter().filter(report).copied().collect();
@@ -41,7 +41,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
     if first != second {
         return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
     }
-    // The number of reports may be higher, because a board of the chain may be excluded from the test.
+    // The boards may send more reports than expected, because a board of the chain may be excluded from the test.
     if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {
@@ -67,7 +67,7 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
         }
         other => other?,
     }
-    // If a board has rebooted in the meantime, it would accept any number.
+    // If a board has rebooted since the previous step, the board would accept any number.
     if bench.info(board).await.is_none() {
         return Ok(Verdict::Fail(
             "the board does not answer PC_INFO; it may have rebooted: `ucom scan`".into(),
@@ -96,8 +96,8 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     let answers = move |all: Vec<Frame>| -> Vec<Frame> {
         all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
     };
-    // A frame of this function with data is always a board's answer, never a request (D-12). Only the board itself may send this frame with
-    // its number. An answer of the board must therefore not be pending now.
+    // An MCA_DUMP_IO_DESCRIPTION frame with data is always a board's answer, never a request (D-12). Only the board itself may send an
+    // MCA_DUMP_IO_DESCRIPTION frame with its number. Therefore no answer of the board may be pending when the test sends its frame.
     bench.send(Function::DumpIo, board, &[0]).await;
     let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {
@@ -118,7 +118,7 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     })
 }
 
-/// Counts the strings of a description, using only their headers.
+/// Counts the strings of a description from the headers of the strings only.
 fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
     let profile = bench.profile();
     let Some((head, rest)) = came.split_first() else { return Err("silence".into()) };
@@ -180,18 +180,18 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
             continue;
         };
         wrong |= usize::from(profile.endian.word([*a, *b])) != first;
-        // With `pd.short_last`, a package may end with the last word.
+        // With `pd.short_last`, a package may end with the last word of the buffer.
         let surplus = 2 * usize::from(dimensions.ci).saturating_sub(first).min(3);
         wrong |= words.len() < surplus || words.iter().skip(surplus).any(|byte| *byte != 0);
     }
     Ok(verdict(!wrong, &packages))
 }
 
-/// Returns the dimensions of a board from the first frame of its description.
+/// Returns the buffer dimensions of a board from the first frame of its description.
 pub(super) async fn dimensions(bench: &mut Bench<'_>, board: u8) -> Option<Dimensions> {
     bench.send(Function::DumpIo, board, &[]).await;
     let first = bench.wait(Function::DumpIo, board, bench.link.times().info).await;
-    // Waits for the remaining frames of this answer, so that they are not mistaken for another answer.
+    // Waits for the remaining frames of the description, so that they are not mistaken for another answer.
     while !bench.receive(bench.link.times().gap).await.is_empty() {}
     let endian: Endian = bench.profile().endian;
     Dimensions::parse(&first?.payload(), endian)

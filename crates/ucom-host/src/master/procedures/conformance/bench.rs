@@ -1,4 +1,4 @@
-//! Sends and receives the frames of a test, and stores them for the report.
+//! Sends and receives the frames of a conformance test, and stores the frames for the report.
 
 use crate::master::engine::{Forget, Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, SignalError};
@@ -9,17 +9,17 @@ use ucom::{BoardInfo, Frame, Function, Profile, Sequence, Status};
 /// Functions that boards send without a request.
 const NOISE: [Function; 3] = [Function::So, Function::Alive, Function::Debug];
 
-/// Largest number of stored frames per test.
+/// Largest number of frames that are stored for a test.
 const KEPT: usize = 64;
 
 /// State of the boards before the first test.
 pub(super) struct Found {
     pub boards: Vec<BoardSeen>,
-    /// `true` if a board that is not tested could take a number.
+    /// `true` if a board that is not tested could take a board number.
     pub strangers: bool,
 }
 
-/// Exchange of frames during one test.
+/// Exchange of frames with the boards during one test.
 pub(super) struct Bench<'a> {
     pub link: &'a Link,
     pub options: &'a ConformanceOptions,
@@ -37,12 +37,12 @@ impl<'a> Bench<'a> {
         self.link.profile()
     }
 
-    /// Returns the sent and the received frames.
+    /// Returns the frames that the test sent, and the frames that it received.
     pub(super) fn log(self) -> (Vec<String>, Vec<String>) {
         (self.sent, self.came)
     }
 
-    /// Sends a frame. Frames that were received earlier are discarded.
+    /// Sends a frame of the test. `send` discards the frames that were received earlier.
     pub(super) async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
@@ -60,7 +60,7 @@ impl<'a> Bench<'a> {
         all.into_iter().map(|(_, f)| f).filter(answer).collect()
     }
 
-    /// Like `receive`, but includes all functions and the time of each frame.
+    /// Like `receive`, but returns frames of all functions, with the time of each frame.
     pub(super) async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
         let until = self.link.now() + us;
         let mut all = Vec::new();
@@ -100,7 +100,7 @@ impl<'a> Bench<'a> {
         for _ in 0..3 {
             self.send(Function::Info, board, &[]).await;
             let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
-            // Waits for the description that follows, so that it is not mistaken for the next answer.
+            // Waits for the description that follows the first frame, so that the description is not mistaken for the next answer.
             self.receive(self.link.times().gap).await;
             if let Some(frame) = first {
                 return BoardInfo::parse(&frame.payload(), self.profile().endian);
@@ -109,7 +109,7 @@ impl<'a> Bench<'a> {
         None
     }
 
-    /// Checks that a board has the expected status bits. The bits of the pins and of autostart are ignored.
+    /// Checks that a board has the expected status bits after a step. The check ignores the status bits of the pins and of autostart.
     pub(super) async fn status_is(&mut self, board: u8, bits: u8, step: &str) -> Result<(), Verdict> {
         let mask = !(Status::IPINIT | Status::OPINIT | Status::ASTART);
         match self.info(board).await {
@@ -122,7 +122,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Ends or resumes the heartbeats of this PC.
+    /// Ends or resumes the heartbeats that this PC sends.
     pub(super) fn heartbeats(&self, on: bool) {
         self.link.with(|core| match on {
             true => core.start_session(),
@@ -130,7 +130,7 @@ impl<'a> Bench<'a> {
         });
     }
 
-    /// Starts the application, but does not start its loop.
+    /// Starts the application of a board, but does not start its control loop.
     pub(super) async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
         match start_application(self.link, board).await {
             Ok(_) => {}
@@ -152,7 +152,7 @@ fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     }
 }
 
-/// Returns frames as text.
+/// Returns the given frames as text.
 pub(super) fn list(frames: &[Frame]) -> String {
     let texts: Vec<String> = frames.iter().take(8).map(ToString::to_string).collect();
     match frames.len() {
@@ -162,7 +162,7 @@ pub(super) fn list(frames: &[Frame]) -> String {
     }
 }
 
-/// Returns a pass, or a failure that lists the received frames.
+/// Returns a passed verdict, or a failed verdict that lists the received frames.
 pub(super) fn verdict(pass: bool, came: &[Frame]) -> Verdict {
     if pass { Verdict::Pass } else { Verdict::Fail(list(came)) }
 }

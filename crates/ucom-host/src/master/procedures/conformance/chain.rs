@@ -1,4 +1,4 @@
-//! Tests that renumber the chain, and tests of the status byte.
+//! Conformance tests that renumber the chain, and tests of the status byte.
 use crate::master::engine::MS;
 use crate::master::error::Error;
 use crate::master::procedures::conformance::ask::{expected_reports, only_reports};
@@ -6,7 +6,7 @@ use crate::master::procedures::conformance::bench::{Bench, list, verdict};
 use crate::master::reports::Verdict;
 use ucom::{Function, Status};
 
-/// Sends PC_RESET to all boards, and waits until all are ready.
+/// Sends PC_RESET to all boards, and waits until all boards are ready.
 async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
     bench.send(Function::Reset, bench.link.broadcast_number().number(), &[]).await;
     bench.link.with(|core| {
@@ -50,7 +50,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
             return Ok(Verdict::Fail(format!("the board answers {}: {}", function.name(), list(&came))));
         }
     }
-    // The request is also sent by broadcast, which a board without a number ignores (D-04, D-06).
+    // The test also sends the request by broadcast, which a board without a number ignores (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.receive(150 * MS).await;
     Ok(verdict(came.is_empty(), &came))
@@ -70,7 +70,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
         if !pass {
             return Ok(Verdict::Fail(format!("PC_INIT({n}): {}", list(&came))));
         }
-        // At this point, no board after this one in the chain may take a number.
+        // At this point, no board after the numbered board in the chain may take a number.
         if let Some(next) = numbers.get(i + 1) {
             for function in [Function::Init, Function::Info] {
                 bench.send(function, *next, &[]).await;
@@ -94,7 +94,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
     Ok(Verdict::Pass)
 }
 
-/// Sends one PC_SETSTATUS and returns the status afterwards.
+/// Sends one PC_SETSTATUS and returns the status of the board afterwards.
 async fn set(bench: &mut Bench<'_>, board: u8, mask: u8, value: u8) -> Option<Status> {
     bench.send(Function::SetStatus, board, &[mask, value]).await;
     bench.receive(10 * MS).await;
@@ -133,8 +133,8 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// Tests the autostart. In this test the first board on the wire takes the number `board` after a reset. Therefore the chain must have been
-/// renumbered immediately before, and `board` must be the first board.
+/// Tests the automatic start of an application. In this test, the first board of the chain takes the number `board` after a reset.
+/// Therefore the chain must have been renumbered immediately before, and `board` must be the first board.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("this board does not exist".into()));
@@ -157,7 +157,7 @@ pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdic
     let acknowledged = bench.wait(Function::InitAck, board, bench.link.times().init_ack).await.is_some();
     bench.link.sleep(100 * MS).await;
     bench.send(Function::XReset, board, &[]).await;
-    // Waits for the hold-off and the time that an application needs to start.
+    // Waits for the hold-off of the automatic start and for the time that an application needs to start.
     let holdoff = u64::from(bench.profile().autostart_holdoff) * MS;
     let came = bench.receive(holdoff + bench.link.times().start).await;
     let now = bench.info(board).await;

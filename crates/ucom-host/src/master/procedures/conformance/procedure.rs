@@ -1,4 +1,4 @@
-//! Sequence of the tests: identifies the boards, runs every allowed test, and restores the boards.
+//! Sequence of the conformance tests: identify the boards, run every allowed test, and restore the boards.
 use crate::master::engine::Link;
 use crate::master::error::{AddressError, Error, ExchangeError, IdentityError, MasterError, RunningError};
 use crate::master::procedures::ask_reports::ask_reports;
@@ -45,7 +45,7 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
     Ok(Outcome::Conformance(report))
 }
 
-/// Identifies the boards, and checks that the tests are allowed with them. Changes nothing.
+/// Identifies the boards, and checks that the tests are allowed with these boards. This step does not change any board.
 async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error> {
     let mut boards = Vec::new();
     let asked: Vec<u8> = match options.boards.is_empty() {
@@ -73,7 +73,8 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
-        // U-2: program data have a higher priority than the process data of every running board, even if the board is not tested.
+        // U-2: on the bus, program data have a higher priority than the process data of every running board, even if the board is not
+        // tested.
         let states = board_states(link).await;
         running.extend(states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b));
         running.sort_unstable();
@@ -92,7 +93,8 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
     Ok(Found { boards, strangers: !all })
 }
 
-/// Returns the number of reports. Also returns `true` if the reports match the numbered boards and each flash id is unique.
+/// Returns the number of different reports from boards. Also returns `true` if the reports match the numbered boards and if the low byte of
+/// each flash number is unique.
 async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
     let mut reports = Reports::default();
     for _ in 0..2 {

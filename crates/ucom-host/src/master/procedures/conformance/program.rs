@@ -1,4 +1,4 @@
-//! Tests that program boards.
+//! Conformance tests that program boards.
 use crate::master::engine::{Forget, MS};
 use crate::master::error::Error;
 use crate::master::procedures::conformance::bench::{Bench, list};
@@ -7,7 +7,7 @@ use crate::master::reports::{ConformanceProgram, Verdict};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, Frame, Function, Header, checksum, data_block};
 
-/// Returns the reason why these tests cannot run with this profile; returns `None` if they can run.
+/// Returns the reason why the programming tests cannot run with this profile; returns `None` if they can run.
 fn unfit(bench: &Bench<'_>) -> Option<Verdict> {
     let profile = bench.profile();
     let fits = profile.prog_plan == Plan::VerifyWrite && profile.prog_header == HeaderForm::V1;
@@ -27,7 +27,7 @@ fn header(bench: &Bench<'_>, program: &ConformanceProgram, cycle: u16) -> Header
     }
 }
 
-/// Sends one block with the frame gap of the profile.
+/// Sends one block of program data with the frame gap of the profile.
 async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     for data in block.chunks(8) {
         bench.send(Function::Prog, board, data).await;
@@ -35,7 +35,7 @@ async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     }
 }
 
-/// Returns a board's answer to a block: DSP_READY, DSP_PROGFINISHED or an error.
+/// Returns a board's answer to a block of program data: DSP_READY, DSP_PROGFINISHED or an error.
 async fn answer(bench: &mut Bench<'_>, us: u64) -> Option<Frame> {
     let until = bench.link.now() + us;
     loop {
@@ -139,7 +139,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     })
 }
 
-/// Sends one faulty transfer. `good` is a correct header.
+/// Sends one faulty transfer to a board. `good` is a correct header for the image.
 async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, good: Header, case: &Case) {
     let endian = bench.profile().prog_endian;
     match case {
@@ -147,7 +147,8 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
         Case::Pause => {
             bench.send(Function::Prog, board, &[0x43; 8]).await;
             bench.link.sleep(300 * MS).await;
-            // A board may notice the pause only when the next frame arrives. Frames received during the pause are also evaluated.
+            // A board may detect the pause only when the next frame arrives. The test also evaluates the frames that arrive during the
+            // pause.
             bench.link.with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
             bench.link.flush().await;
         }
@@ -171,7 +172,7 @@ fn next_frame(board: u8) -> Frame {
     Frame::of(Function::Prog, number, [0x43; 8].into())
 }
 
-/// Program data of a test.
+/// Program data that a test sends.
 enum Case {
     Short,
     Pause,

@@ -1,4 +1,4 @@
-//! Returns boards to their state before the tests, even if the tests end early.
+//! Returns boards to their state before the conformance tests, even if the tests end early.
 use crate::master::engine::{Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, IdentityError, StatusError};
 use crate::master::procedures::conformance::bench::Found;
@@ -9,9 +9,9 @@ use crate::master::procedures::repair::repair;
 use crate::master::reports::{BoardSeen, ConformanceOptions, InitOptions, Outcome};
 use ucom::{Admin, BoardInfo, Status, ToBoard};
 
-/// Renumbers the chain. Every board must get its previous number again.
+/// Assigns numbers to the chain again. Every board must get its previous number again.
 pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
-    // This PC is already the master of the bus.
+    // The init needs no check for another master, because this PC is already the master of the bus.
     let outcome = init(link.clone(), InitOptions { force: true, ..Default::default() }).await?;
     let Outcome::Init(report) = outcome else { return Ok(()) };
     for before in &found.boards {
@@ -27,8 +27,8 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     Ok(())
 }
 
-/// Restores all boards after the tests. Failures are added to `left`, and the other boards are still restored. `at` is the board whose test
-/// ended early.
+/// Restores all boards after the tests. The function adds failures to `left`, and still restores the other boards. `at` is the board whose
+/// test ended early.
 pub(super) async fn put_all_back(
     link: &Link,
     found: &Found,
@@ -54,7 +54,8 @@ pub(super) async fn put_all_back(
     Ok(())
 }
 
-/// Restores one board. Ends its control loop, then restores ASTART, PROG and its application.
+/// Restores one board to its state before the tests. The function ends the control loop of the board, and then restores ASTART, PROG and
+/// the application.
 pub(super) async fn put_back(
     link: &Link,
     before: &BoardSeen,
@@ -67,7 +68,7 @@ pub(super) async fn put_back(
     if now.status.has(Status::MSTART) {
         halt(link, n).await?;
     }
-    // The board may start soon, either by itself or because PC_START was the last command that it received.
+    // The board may start its application soon, either by itself or because PC_START was the last command that it received.
     let coming = now.status.has(Status::ASTART) || in_work;
     if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
         now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;
@@ -90,7 +91,7 @@ pub(super) async fn put_back(
         }
         return Ok(());
     }
-    // PROG is cleared first, so that the board discards a transfer in progress.
+    // PROG is cleared even if it was set before the tests, so that the board discards a transfer in progress.
     set_status(link, n, Status::MSTART | Status::PROG, Status(0)).await?;
     if was.has(Status::PROG) {
         set_status(link, n, Status::PROG, Status::PROG).await?;
@@ -112,7 +113,7 @@ async fn answering(
     let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
         Ok(info) => info,
         Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
-            // The board may still be running.
+            // The control loop of the board may still be running.
             halt(link, n).await?;
             repair(link, n, before.info.flash_number).await?.info
         }
@@ -133,7 +134,7 @@ async fn answering(
     }
 }
 
-/// Ends the control loop. Sends the stop three times, because a frame can be lost.
+/// Ends the control loop of a board. The function sends the stop command three times, because a frame can be lost.
 async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     let to = link.board(board)?;
     for _ in 0..3 {
@@ -143,7 +144,7 @@ async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     Ok(())
 }
 
-/// If the application should not run but may be starting, waits until it has started.
+/// Waits until the application has started, if the application should not run but may be starting.
 async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Result<BoardInfo, Error> {
     if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
         return Ok(now);

@@ -1,4 +1,4 @@
-//! Runs the tests one after the other.
+//! Runs the conformance tests one after the other.
 use crate::master::engine::{Event, Link};
 use crate::master::error::Error;
 use crate::master::procedures::conformance::bench::{Bench, Found};
@@ -8,19 +8,19 @@ use crate::master::procedures::exchange::set_status;
 use crate::master::reports::{ConformanceOptions, ConformanceReport, ConformanceTest, Verdict};
 use ucom::Status;
 
-/// Test and its board; `None` for the whole chain.
+/// A test and the board to test; `None` for a test of the whole chain.
 type Planned = (&'static Test, Option<u8>);
 
-/// State of the running tests.
+/// State of the series of tests.
 pub(super) struct Runner<'a> {
     link: &'a Link,
     options: &'a ConformanceOptions,
-    /// State to restore.
+    /// State of the boards before the tests, which the runner restores.
     found: &'a Found,
     pub report: ConformanceReport,
     /// `true` if boards may have lost their numbers.
     pub unnumbered: bool,
-    /// Board of the running test.
+    /// Board of the current test.
     pub at: Option<u8>,
 }
 
@@ -29,7 +29,7 @@ impl<'a> Runner<'a> {
         Self { link, options, found, report: Default::default(), unnumbered: false, at: None }
     }
 
-    /// Returns all requested tests in their order.
+    /// Returns all requested tests in the order in which they run.
     fn planned(&self) -> Vec<Planned> {
         let only = &self.options.only;
         let wanted = |test: &&Test| only.is_empty() || only.iter().any(|o| o.eq_ignore_ascii_case(test.id));
@@ -48,7 +48,7 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // If the permission is missing, the test is listed only once, not once per board.
+            // If the user has not allowed the tests that need `--init`, each of these tests is listed only once, not once for each board.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),
@@ -60,7 +60,7 @@ impl<'a> Runner<'a> {
         programmed.is_none_or(|program| Some(program.board) == board)
     }
 
-    /// Runs every allowed test. Other tests are skipped, with the reason.
+    /// Runs every test that the user allowed. The runner skips the other tests and records the reason.
     pub(super) async fn all(&mut self) -> Result<(), Error> {
         let planned = self.planned();
         for (i, (test, board)) in planned.iter().copied().enumerate() {
@@ -116,7 +116,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Assigns the number of every board again.
+    /// Assigns numbers again, so that every board has the number that it had before the tests.
     async fn numbered(&mut self) -> Result<(), Error> {
         if self.unnumbered {
             // The flag `unnumbered` stays set until all boards have their numbers.

@@ -1,4 +1,4 @@
-//! Table of all tests: name, required permission, scope, expectation, and function.
+//! Table of all conformance tests: name, required permission, scope, expectation, and function.
 use core::pin::Pin;
 
 use crate::master::error::Error;
@@ -6,21 +6,21 @@ use crate::master::procedures::conformance::bench::Bench;
 use crate::master::procedures::conformance::{application, ask, chain, program};
 use crate::master::reports::{ConformanceOptions, Verdict};
 
-/// Effect of a test on boards. The effect determines which permission the test needs.
+/// Effect of a conformance test on boards. This effect determines which permission the test needs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     /// The test does not change any board.
     Ask,
-    /// The test resets and numbers boards, or sets bits of their status.
+    /// The test resets and numbers boards, or changes bits of their status.
     Init,
     /// The test starts the application and its control loop.
     Run,
-    /// The test writes a program.
+    /// The test writes a program to a board.
     Program,
 }
 
 impl Level {
-    /// Returns the option that the test needs; `None` if the test is already allowed.
+    /// Returns the name of the option that the test needs; returns `None` if the test is already allowed.
     pub(super) fn needs(self, options: &ConformanceOptions) -> Option<&'static str> {
         match self {
             Self::Init if !options.init => Some("--init"),
@@ -31,45 +31,45 @@ impl Level {
     }
 }
 
-/// Boards that a test covers.
+/// Boards that a conformance test covers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scope {
-    /// The whole chain.
+    /// The test covers the whole chain once.
     Chain,
-    /// The whole chain. Before and after the test, boards may have no number.
+    /// The test covers the whole chain once. Boards may have no number before and after the test.
     Numbers,
-    /// Each board.
+    /// The test covers each board.
     Board,
-    /// The board with the first number. After the test, boards may have no number.
+    /// The test covers the board with the first number. After the test, boards may have no number.
     First,
-    /// The board to be programmed.
+    /// The test covers the board that the user allowed the tests to program.
     Programmed,
 }
 
-/// Function that exchanges frames with a board. For a test of the whole chain the board number is not used.
+/// Function that performs a test by exchanging frames with a board. For a test of the whole chain the board number is not used.
 pub(super) type Talk =
     for<'a> fn(&'a mut Bench<'_>, u8) -> Pin<Box<dyn Future<Output = Result<Verdict, Error>> + Send + 'a>>;
 
-/// Function of a test.
+/// Implementation of a test.
 pub(super) enum Run {
-    /// An exchange with a board.
+    /// The test exchanges frames with a board.
     Talk(Talk),
-    /// The test cannot be run on this bus, for this reason.
+    /// The test cannot be run on this bus, for the given reason.
     Elsewhere(&'static str),
 }
 
-/// A test.
+/// A conformance test.
 pub(super) struct Test {
     pub id: &'static str,
     pub level: Level,
     pub scope: Scope,
-    /// Expected behaviour, in words.
+    /// Behaviour that the test expects, in words.
     pub expects: &'static str,
     pub run: Run,
 }
 
 impl Test {
-    /// Returns `true` if a board must finish both tests before the next board begins them.
+    /// Returns `true` if a board must finish this test and the `next` test before another board begins this test.
     pub(super) fn goes_with(&self, next: &Self) -> bool {
         let board = |test: &Self| matches!(test.scope, Scope::Board | Scope::Programmed);
         board(self) && board(next) && (self.level == next.level || next.level == Level::Program)
@@ -134,7 +134,7 @@ pub(super) static TESTS: [Test; 21] = [
         run: Run::Elsewhere("needs two boards with one flash id: use `ucom sim --flash-ids 0x21,0x21`") },
 ];
 
-/// Returns the names of all tests, for a command line.
+/// Returns the names of all conformance tests, for a command line.
 pub fn test_names() -> impl Iterator<Item = &'static str> {
     let mut names: Vec<&str> = TESTS.iter().map(|test| test.id).collect();
     names.sort_by_key(|name| (name.len(), *name));

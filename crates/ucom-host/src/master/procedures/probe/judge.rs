@@ -1,5 +1,5 @@
-//! Derives a profile from the received frames. If an observation determines the value of a key, the value is reported; other keys keep
-//! their values.
+//! Derives a profile from the frames that a probe received. If an observation determines the value of a profile key, the value is reported;
+//! other keys keep their values.
 
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
@@ -8,10 +8,10 @@ use std::sync::Arc;
 use ucom::profile::{AliveMode, Broadcast, Endian, KEYS, ReportMode};
 use ucom::{Checksum, Payload, Profile, Report, Sequence, Status, checksum};
 
-/// Answers of one board to PC_INFO. Each answer is a list of frames.
+/// Answers of one board to PC_INFO. Each answer is a list of frame payloads.
 pub(super) type Answers = Vec<Vec<Payload>>;
 
-/// Received frames and answers.
+/// Frames and answers that a probe received.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     pub before: Profile,
@@ -40,13 +40,13 @@ impl Seen {
         self.infos.iter().filter(|(_, a)| started(a)).filter_map(|(n, _)| Sequence::new(*n)).collect()
     }
 
-    /// Returns the first frames of the answers.
+    /// Returns the first frames of the answers to PC_INFO.
     fn heads(&self) -> impl Iterator<Item = [u8; 8]> + '_ {
         let first = |a: &Vec<Payload>| a.first().filter(|p| p.len() == 8).map(Payload::padded);
         self.infos.values().flatten().filter_map(first)
     }
 
-    /// Returns the headers of strings: the two count bytes, and the number of packages that followed.
+    /// Returns the headers of strings: the two count bytes, and the number of packages that followed the header.
     fn headers(&self) -> Vec<([u8; 2], usize)> {
         let header = |frames: &Vec<Payload>| match frames.as_slice() {
             [_, header, rest @ ..] => match header.bytes() {
@@ -65,7 +65,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// Adds a row to the table. `value` is the measured value, or `None` without a measurement.
+    /// Adds a row to the table of the report. `value` is the measured value, or `None` if the probe has no measurement.
     fn add(
         &mut self,
         key: &'static str,
@@ -80,7 +80,7 @@ impl Rows {
     }
 }
 
-/// Returns the status byte of a first frame of DSP_INFO. The position of this byte does not depend on the profile.
+/// Returns the status byte of the first frame of DSP_INFO. The position of the status byte does not depend on the profile.
 pub(super) fn status_of(payload: &Payload) -> Option<Status> {
     payload.bytes().get(3).filter(|_| payload.len() >= 8).map(|byte| Status(*byte))
 }
@@ -132,7 +132,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     let broadcast = match (zero, top) {
         (1.., _) => Some(Broadcast::Zero),
         (0, 1..) => Some(Broadcast::ThirtyOne),
-        // Silence is evidence only if there are boards that could have answered.
+        // Silence on the broadcast number is evidence only if there are boards that could have answered.
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
@@ -141,7 +141,8 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // Determined after the broadcast number, because 0 cannot be both the broadcast number and the number of the first board.
+    // `addr.first` is determined after the broadcast number, because 0 cannot be both the broadcast number and the number of the first
+    // board.
     let first = if seen.zero_answers {
         Some("0")
     } else {
@@ -156,8 +157,8 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
 
 fn strings(rows: &mut Rows, seen: &Seen) {
     let headers = seen.headers();
-    // Number of headers that match an interpretation. An interpretation consists of a byte order and of a count that includes or excludes
-    // the header. The best interpretation must match more headers than any other.
+    // Number of string headers that match an interpretation. An interpretation consists of a byte order and of a count that includes or
+    // excludes the header. The best interpretation must match more headers than any other interpretation.
     let fits = |endian: Endian, inclusive: bool| {
         let fit = |(count, packages): &&([u8; 2], usize)| {
             usize::from(endian.word(*count)) == packages + usize::from(inclusive) && (count[0] != count[1])
@@ -170,7 +171,7 @@ fn strings(rows: &mut Rows, seen: &Seen) {
         let n = fits(*e, *i);
         n > 0 && readings.iter().filter(|(oe, oi)| fits(*oe, *oi) == n).count() == 1
     });
-    // The second package of a dump must have offset 3.
+    // The second package of an MCA_DUMP_CI answer must have offset 3.
     let second = |offsets: &Vec<u16>| offsets.get(1).copied();
     let read = seen.before.endian;
     let other = if read == Endian::Little { Endian::Big } else { Endian::Little };

@@ -1,4 +1,4 @@
-//! Queries of a probe. The answers are stored as raw payloads, because their interpretation is being measured.
+//! Queries that a probe sends. The probe stores the answers as raw payloads, because the probe measures how they must be interpreted.
 
 use crate::master::engine::{Core, Link, MS, Times};
 use crate::master::error::{Error, MasterError, RunningError};
@@ -14,10 +14,11 @@ use std::collections::BTreeMap;
 use ucom::profile::AliveMode;
 use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
 
-/// Number of queries to each board. Several queries are sent, so that the loss of one frame does not determine the result.
+/// Number of queries that the probe sends to each board. The probe sends several queries, so that the loss of one frame does not determine
+/// the result.
 const ROUNDS: usize = 3;
 
-/// Returns the findings of a probe, or the error that ended it. In both cases, the profile of the session does not change, and every board
+/// Returns the findings of a probe, or the error that ended it. In each case, the profile of the session does not change, and every board
 /// that the probe started is stopped again.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let (before, mut begun) = (link.profile(), None);
@@ -35,7 +36,7 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     result.map(Outcome::Probe)
 }
 
-/// While control loops run, refuses steps that end control loops or interrupt their heartbeats.
+/// Refuses steps that end control loops or interrupt their heartbeats while control loops run.
 fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     let running = |core: &mut Core| {
         let running = core.boards.iter().filter(|(_, board)| board.is_known() && board.running(core.now));
@@ -48,14 +49,14 @@ fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     }
 }
 
-/// Collects the observations. If a board is started, `begun` stores the board and the level of the stop that undoes the start.
+/// Collects the observations of a probe. If the probe starts a board, `begun` stores the board and the stop level that undoes the start.
 async fn measure(
     link: &Link,
     options: &ProbeOptions,
     begun: &mut Option<(u8, StopLevel)>,
 ) -> Result<ProbeReport, Error> {
     let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
-    // All frames must be received in raw form, so no frame may be refused because of its length.
+    // The probe must receive all frames in raw form, so it must not refuse a frame because of its length.
     use_profile(link, Profile { dlc_strict: false, ..seen.before });
     seen.reports = all_reports(link).await;
     let mut numbered = None;
@@ -63,7 +64,7 @@ async fn measure(
         no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
         seen.raised = pin_raised(link).await?;
-        // All boards of the chain get numbers. Values that the present profile interprets wrongly are corrected below.
+        // All boards of the chain get numbers in this step. Values that the present profile interprets wrongly are corrected below.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
         if let Outcome::Init(report) = init(link.clone(), whole).await? {
@@ -118,7 +119,8 @@ fn use_profile(link: &Link, profile: Profile) {
     });
 }
 
-/// Collects the raw reports of all boards. Requests the reports several times, because a board may be booting and a frame may be lost.
+/// Collects the raw reports of all boards. The function requests the reports several times, because a board may be booting and a frame may
+/// be lost.
 async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     let mut reports = Vec::new();
     for _ in 0..ROUNDS {
@@ -137,8 +139,8 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     reports
 }
 
-/// Sends PC_RESET, then PC_INIT to the first board. Returns `true` if the board's status then already shows OPINIT; returns `None` if no
-/// board took the number.
+/// Sends PC_RESET, and then PC_INIT to the first board. The function returns `true` if the board's status already shows OPINIT after
+/// PC_INIT; it returns `None` if no board took the number.
 async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Reset).await;
@@ -156,8 +158,8 @@ async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     Ok(status.map(|status| status.has(Status::OPINIT)))
 }
 
-/// Sends PC_INFO with `padding` additional bytes to some numbers. Returns the frames of each answer. An answer ends after 100 ms of
-/// silence.
+/// Sends PC_INFO with `padding` additional bytes to some numbers. The function returns the frames of each answer. The function considers an
+/// answer complete after 100 ms of silence.
 async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8, Vec<Payload>> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let mut answers: BTreeMap<u8, Vec<Payload>> = BTreeMap::new();

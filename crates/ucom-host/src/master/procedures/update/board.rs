@@ -1,4 +1,4 @@
-//! Update of one board. Each attempt begins in the exloader and ends with the read-back (U-4 to U-10).
+//! Update of the firmware of one board. Each attempt begins in the exloader of the board and ends with the read-back (U-4 to U-10).
 use crate::master::engine::{Event, Link};
 use crate::master::error::{Error, IdentityError, StatusError};
 use crate::master::procedures::control::{enter_exloader, start_application};
@@ -9,7 +9,7 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::{UpdateFailure, UpdateOutcome, UpdatePlan};
 use ucom::{BoardInfo, ErrorCode, Status, ToBoard};
 
-/// Returns `true` if the board shows the program of the plan.
+/// Returns `true` if the board reports the program of the plan in its answer to PC_INFO.
 pub(super) fn has(known: &BoardInfo, plan: &UpdatePlan) -> bool {
     known.has_application() && plan.expected.is_some_and(|expected| expected.is(known))
 }
@@ -18,7 +18,7 @@ pub(super) async fn shows(link: &Link, board: u8, plan: &UpdatePlan) -> bool {
     confirmed(link, board).await.is_ok_and(|seen| has(&seen.info, plan))
 }
 
-/// Updates one board. The first attempt has the number `first`.
+/// Updates the firmware of one board. The number of the first attempt is `first`.
 pub(super) async fn one(
     link: &Link,
     session: &mut UpdateSession,
@@ -40,7 +40,7 @@ pub(super) async fn one(
         }
         match again {
             None => break,
-            // After an overrun, the pause between frames is increased.
+            // After an overrun on the board, the pause between frames is increased.
             Some(Broken::Device { code: ErrorCode::Overrun | ErrorCode::CanOverrun, .. }) => {
                 gap_us = (gap_us * 2).max(500);
             }
@@ -54,15 +54,16 @@ pub(super) async fn one(
     Ok(())
 }
 
-/// Puts a board that has been checked into its exloader, with programming enabled.
+/// Puts a checked board into its exloader, with programming enabled.
 ///
-/// Reads the board before each XRESET, because another board may have its number since the check or the previous attempt.
+/// The function reads the board before each XRESET, because another board may have taken its number since the check or since the previous
+/// attempt.
 pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
     let flash_number = session.flash_number(board);
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
         && seen.flash_number != wanted
     {
-        // A single damaged answer must not be interpreted as another board.
+        // The function reads the flash number twice, because a single damaged answer must not be interpreted as another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -74,7 +75,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
     }
     let entered = enter_exloader(link, board, flash_number).await;
     if entered.is_err() {
-        // If the board has executed the XRESET, it must not accept program data for another board.
+        // If the board has executed the XRESET, it must not accept program data that are for another board.
         leave_programming(link, board).await;
     }
     entered.map(drop)
@@ -86,7 +87,8 @@ async fn leave_programming(link: &Link, board: u8) {
     }
 }
 
-/// Makes one attempt with one board. Returns `Some` if another attempt may succeed. The result of the board contains the failure.
+/// Makes one attempt to update one board. The function returns `Some` if another attempt may succeed. The result of the board contains the
+/// reason of the failure.
 async fn attempt(
     link: &Link,
     session: &mut UpdateSession,
@@ -107,7 +109,7 @@ async fn attempt(
     judge(link, session, board, plan, number, broken.first().map(|(_, b)| *b)).await
 }
 
-/// Determines the result from a read-back, or from the reason why the attempt ended early.
+/// Determines the result of an attempt from a read-back, or from the reason why the attempt ended early.
 pub(super) async fn judge(
     link: &Link,
     session: &mut UpdateSession,
@@ -123,7 +125,7 @@ pub(super) async fn judge(
             return None;
         }
         Some(Broken::NoFinish { .. }) if shows(link, board, plan).await => {
-            // U-9: only the frame DSP_PROGFINISHED was lost.
+            // U-9: the board has written the program, and only the frame DSP_PROGFINISHED was lost.
             verify(link, session, board, plan).await;
             return None;
         }
@@ -138,29 +140,32 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The board must not interpret the next program data as the remainder of this transfer. The command is sent while the board is still
-    // listed as in progress. Therefore a cancel at this moment also sends the command.
+    // The command is necessary because the board must not interpret the next program data as the remainder of this transfer. The PC sends
+    // the command while the board is still listed as in progress. Therefore the command is also sent if the user cancels the update at this
+    // moment.
     leave_programming(link, board).await;
-    // If another board has taken the number in the meantime, it reports errors about program data, or receives the data in the wrong order.
+    // If another board has taken the number since the transfer began, that board reports errors about program data, or receives the data in
+    // the wrong order.
     if let Err(error) = one_board_each(link, &[board]).await {
         session.fail_with(board, error.into());
         return None;
     }
     session.fail(board, failure);
-    // U-7: the image or the board is wrong, so another attempt would fail in the same way.
+    // U-7: the error means that the image or the board is wrong, so another attempt would fail in the same way.
     let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
     broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
 }
 
-/// U-10: checks that the board shows the new program. Starts the program if the options require this.
+/// U-10: checks that the board reports the new program in its answer to PC_INFO. The function starts the program if the options require
+/// this.
 pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) {
     session.reach(board, Stage::Written);
     let known = match confirmed(link, board).await {
         Ok(seen) => seen.info,
-        // The board reported that the program is written. Only the read-back failed.
+        // The board reported that the program is written. Only the read-back of the program failed.
         Err(e) => return session.fail_with(board, e),
     };
-    // If another board shares the number, that board was also written, or the last answer may come from that board.
+    // If another board shares the number, that other board was also written, or may have sent the last answer.
     if let Err(error) = one_board_each(link, &[board]).await {
         return session.fail_with(board, error.into());
     }
@@ -180,7 +185,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
             let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
             return session.fail(board, failure);
         }
-        // The expected program is not known. The board must at least show an application and must be in its exloader.
+        // The program that the board must report is not known. The board must at least report an application and must be in its exloader.
         None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
         None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };
@@ -190,7 +195,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
     }
 }
 
-/// Starts the application of a board that shows `known`, and checks that it runs.
+/// Starts the application of a board that reported `known`, and checks that the application runs.
 pub(super) async fn start(link: &Link, session: &mut UpdateSession, board: u8, known: &BoardInfo) {
     session.begin(board);
     session.starting = Some(board);

@@ -1,5 +1,5 @@
-//! Update of several boards at once by broadcast PC_PROG. Every board with PROG = 1 accepts the data, so all other boards must have PROG =
-//! 0.
+//! Update of several boards at once by broadcast PC_PROG frames. Every board with PROG = 1 accepts the program data, so all boards outside
+//! the group must have PROG = 0.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::exchange::TRIES;
@@ -11,10 +11,10 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Updates all boards that are not done yet by one broadcast transfer. A board that leaves the group gets further attempts on its own.
+/// Updates all boards whose update is not done yet by one broadcast transfer. A board that leaves the group is then updated alone.
 ///
-/// If a board outside the group keeps PROG = 1, the update is refused. If a selected board fails before the transfer and may still accept
-/// program data, the procedure does not send a broadcast. The other boards are then updated one by one.
+/// If a board outside the group keeps PROG = 1, the PC refuses the update. If a selected board fails before the transfer and may still
+/// accept program data, the procedure does not send a broadcast. The PC then updates the other boards one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("the boards are updated one by one, because `addr.broadcast` is none".into());
@@ -33,7 +33,7 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
             "a board that does not answer may receive a broadcast: the other boards are updated one by one"
                 .into(),
         );
-        // The boards in their exloaders stay listed as in progress, so that a cancel ends their programming mode.
+        // The boards in their exloaders stay listed as in progress, because a cancel must end their programming mode.
         return Ok(());
     }
     for board in &boards {
@@ -70,9 +70,10 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Checks a board whose READY was lost: it may have received the whole transfer together with the other boards. If the board is done,
-/// verifies it. If the board is not done, the session stores whether the flash was erased, as far as the answer shows this. If the board
-/// already had this program, its answer does not show whether it is done.
+/// Checks a board whose DSP_READY was lost: the board may have received the whole transfer together with the other boards. If the update of
+/// the board is done, the function verifies the program. If the update is not done, the session stores whether the flash was erased, as far
+/// as the answer of the board shows this. If the board already had this program before the update, its answer does not show whether the
+/// update is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));
@@ -89,9 +90,10 @@ async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, 
     false
 }
 
-/// Ends the programming mode of every number that is not selected, and reads the status back.
+/// Ends the programming mode of every board that is not selected, and reads the status back.
 ///
-/// The command is sent three times to each number, even if no board answers. Boards without a number ignore PC_PROG.
+/// The function sends PC_SETSTATUS with PROG = 0 to each of these numbers three times, even if no board answers. Boards without a number
+/// ignore PC_PROG.
 async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     let others: Vec<Sequence> =
         link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
@@ -103,15 +105,16 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     }
     for (board, status) in statuses(link, &others).await {
         if status?.has(Status::PROG) {
-            // The function makes three more attempts and reads the status back each time. If all attempts fail, the update is refused.
+            // `set_status` makes three more attempts and reads the status back each time. If all attempts to clear PROG fail, the PC
+            // refuses the update.
             set_status(link, board, Status::PROG, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// Starts the exloaders of the selected boards. Returns `true` if a board failed and did not confirm that its programming mode has ended.
-/// Frames to the group would then erase that board without any report.
+/// Starts the exloaders of the selected boards. The function returns the boards whose exloaders run, and `true` if a board failed and did
+/// not confirm that its programming mode has ended. Frames to the group would then erase that board without any report.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

@@ -1,4 +1,5 @@
-//! Sequence of an update: checks U-1 to U-3, then the transfer to single boards or to a group. Cleans up if the update ends early.
+//! Sequence of an update: the checks U-1 to U-3, and then the transfer to single boards or to a group. If an update ends early, the
+//! procedure cleans up.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError, MasterError, RunningError, TargetError};
@@ -14,7 +15,7 @@ use crate::master::reports::update::{UpdateFailure, UpdateMode, UpdateOptions, U
 use std::collections::BTreeSet;
 use ucom::{BoardInfo, Status};
 
-/// Updates all boards that need the program.
+/// Updates all boards that need the program of the image.
 pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome, Error> {
     let mut seen = BTreeSet::new();
     if options.targets.is_empty() {
@@ -43,12 +44,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     }
     match end {
         Ok(()) => {}
-        // After a second cancel, the remaining steps of the clean-up are skipped.
+        // After a second cancel, the procedure skips the remaining steps of the clean-up.
         Err(Error::Master(MasterError::Cancelled)) => {
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
-        // Frames can no longer be sent, but the report still contains the known state of the boards.
+        // The PC can no longer send frames, but the report still contains the known state of the boards.
         Err(error @ Error::Master(MasterError::Bus { .. })) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
@@ -70,8 +71,8 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// Commands the boards in progress to discard the transfer. A partly written image is never valid. `why` is the cause: a cancel by the
-/// user, or two boards with the same number.
+/// Commands the boards whose update is in progress to discard the transfer. A partly written image is never valid. `why` is the cause of
+/// the early end: a cancel by the user, or two boards with the same number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
         // The board may have received PC_START already. The update stops boards whose application it has started.
@@ -101,8 +102,8 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
     Ok(())
 }
 
-/// Ends the programming mode of boards that already show the program. A board may still be in that mode because an earlier update tool was
-/// killed. The board would then accept program data for other boards.
+/// Ends the programming mode of boards that already report the program of the image. A board may still be in programming mode because an
+/// earlier update tool was killed. In programming mode, the board would accept program data for other boards.
 async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.programming.first().copied() {
         let ended = match link.become_master(session.options.force).await {
@@ -120,8 +121,8 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// The update ends early. If this PC is already the master, ends the programming mode of boards that were found in it. If this PC is not
-/// the master, it may not send frames to these boards (D-08), so they are reported.
+/// Handles boards that were found in programming mode, if the update ends early. If this PC is already the master, the function ends the
+/// programming mode of these boards. If this PC is not the master, it may not send frames to these boards (D-08), so it reports them.
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
@@ -153,7 +154,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         link.become_master(session.options.force).await?;
         return start_rest(link, session).await;
     }
-    // D-10: with the wrong byte order, the bytes of the numbers in the header would be swapped.
+    // D-10: with the wrong byte order, the bytes of the flash numbers in the header would be swapped.
     let flash_numbers: Vec<u16> = session.results.iter().filter_map(|result| result.flash_number).collect();
     if !session.options.force
         && let Err(error) = right_order(link, &flash_numbers).await
@@ -161,14 +162,14 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         session.refuse(&error.into());
         return Ok(());
     }
-    // U-2: program data have a higher priority than the process data of running boards.
+    // U-2: on the bus, program data have a higher priority than the process data of running boards.
     let states = board_states(link).await;
     let running: Vec<u8> = states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b).collect();
     if !running.is_empty() && !session.options.force {
         session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
-    // D-08: a dry run checks this too, because its report must show the result of a real update.
+    // D-08: a dry run checks this too, because the report of a dry run must show the result of a real update.
     if let Err(error) = link.look_for_master(session.options.force).await {
         session.refuse(&error);
         return Ok(());
@@ -191,10 +192,10 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     start_rest(link, session).await
 }
 
-/// Starts the boards that already showed the program.
+/// Starts the boards that already reported the program before the update.
 async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.to_start.first().copied() {
-        // PC_INFO has already shown the program.
+        // The answer to PC_INFO has already shown the program.
         session.reach(board, Stage::Verified);
         session.begin(board);
         session.to_start.retain(|b| *b != board);
@@ -206,9 +207,10 @@ async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Erro
     Ok(())
 }
 
-/// Returns the outcome of a board that needs no transfer (U-3 and D-62); `None` if the board must be written.
+/// Returns the outcome of a board that needs no transfer (U-3 and D-62); returns `None` if the board must be written.
 ///
-/// PC_INFO shows only the Program ID and date of program memory. The answer does not show the load address or a second image.
+/// PC_INFO returns only the Program ID and the date of program memory. The answer to PC_INFO does not contain the load address or data
+/// about a second image.
 fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<UpdateOutcome> {
     let options = &session.options;
     let expected = session.plan(link, None).ok()?.expected?;
@@ -225,12 +227,12 @@ fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<Up
     if other_date && !options.any_date {
         return None;
     }
-    // If the board's answer differs from its answer after the recorded update, the board has received another program in the meantime.
+    // If the board's answer differs from its answer after the recorded update, the board has received another program since that update.
     let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
     Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }
 
-/// Checks U-1 and U-3. Sends only questions.
+/// Performs the checks U-1 and U-3. The function sends only queries.
 async fn check(link: &Link, session: &mut UpdateSession) {
     for target in session.options.targets.clone() {
         let board = target.board;

@@ -1,4 +1,4 @@
-//! State of all boards of an update, which is kept if the update is cancelled or the bus fails.
+//! State of all boards of an update; the state is kept if the update is cancelled or the bus fails.
 
 use crate::master::engine::Link;
 use crate::master::error::Error;
@@ -7,19 +7,19 @@ use host_kit::{Diagnose, ErrorKind};
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
 
-/// Extent to which a board's memory has changed. The stage only increases, except in [`UpdateSession::proved_untouched`].
+/// Extent to which a board's memory has changed. The stage of a board only increases, except in [`UpdateSession::proved_untouched`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
-    /// The memory is unchanged.
+    /// The memory of the board is unchanged.
     #[default]
     Untouched,
-    /// Frames that erase the memory were sent, and the board may have received them.
+    /// Frames that erase the memory were sent, and the board may have received these frames.
     MaybeErased,
-    /// The board was commanded to erase its memory.
+    /// The PC commanded the board to erase its memory.
     Erased,
     /// The board reported that the program is written.
     Written,
-    /// PC_INFO showed the program.
+    /// The board's answer to PC_INFO contained the new program.
     Verified,
 }
 
@@ -29,11 +29,11 @@ pub(super) struct UpdateSession {
     pub results: Vec<UpdateResult>,
     /// Boards to which an XRESET was sent and whose update has not ended.
     pub active: Vec<u8>,
-    /// Board that is commanded to start its application.
+    /// Board to which the update sends the command to start its application.
     pub starting: Option<u8>,
-    /// Boards that already show the program and will be started at the end.
+    /// Boards that already report the program and will be started at the end.
     pub to_start: Vec<u8>,
-    /// Boards that already show the program and are in programming mode.
+    /// Boards that already report the program and are in programming mode.
     pub programming: Vec<u8>,
     stages: BTreeMap<u8, Stage>,
 }
@@ -49,7 +49,7 @@ impl UpdateSession {
         self.results.iter_mut().find(|r| r.board == board)
     }
 
-    /// Marks the board as in progress. Other boards in the group of this board may be in progress as well.
+    /// Marks the update of the board as in progress. The updates of other boards in the same group may be in progress as well.
     pub(super) fn begin(&mut self, board: u8) {
         if !self.active.contains(&board) {
             self.active.push(board);
@@ -60,7 +60,7 @@ impl UpdateSession {
         self.stages.get(&board).copied().unwrap_or_default()
     }
 
-    /// Returns `true` if the old application is, or may be, completely or partly erased.
+    /// Returns `true` if the old application of the board is, or may be, completely or partly erased.
     pub(super) fn may_be_erased(&self, board: u8) -> bool {
         self.stage(board) > Stage::Untouched
     }
@@ -70,14 +70,15 @@ impl UpdateSession {
         *known = stage.max(*known);
     }
 
-    /// Records that PC_INFO shows the same state as before the update. The frames that could have erased the board therefore had no effect.
+    /// Records that PC_INFO returns the same program as before the update. The frames that could have erased the memory of the board
+    /// therefore had no effect.
     pub(super) fn proved_untouched(&mut self, board: u8) {
         if self.stage(board) == Stage::MaybeErased {
             self.stages.remove(&board);
         }
     }
 
-    /// Records that the board shows the program and that this tool has written it.
+    /// Records that the board reports the program and that this tool has written the program.
     pub(super) fn prove(&mut self, board: u8) {
         if let Some(result) = self.result(board) {
             result.verified = true;
@@ -96,7 +97,7 @@ impl UpdateSession {
         }
     }
 
-    /// Records a failure. The outcome is derived from the change of the board's memory so far.
+    /// Records a failure of a board. The outcome is derived from the change of the board's memory so far.
     pub(super) fn fail(&mut self, board: u8, failure: UpdateFailure) {
         let outcome = match self.stage(board) {
             Stage::Untouched if matches!(failure, UpdateFailure::Cancelled { .. }) => {
@@ -112,7 +113,7 @@ impl UpdateSession {
         self.end(board, outcome, Some(failure));
     }
 
-    /// Records an error of a step. The kind of failure depends on the state of the board's memory.
+    /// Records an error that occurred in a step of the update. The kind of failure depends on the state of the board's memory.
     pub(super) fn fail_with(&mut self, board: u8, error: Error) {
         let (kind, error) = (error.kind(), Box::new(error));
         let failure = match self.stage(board) {
@@ -127,7 +128,8 @@ impl UpdateSession {
         self.fail(board, failure);
     }
 
-    /// Records a cancel by the user. If a start command was sent to the board and it is not known to be stopped, it may be running.
+    /// Records that the user cancelled the update of a board. If a start command was sent to the board, and the board is not known to be
+    /// stopped, its application may be running.
     pub(super) fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);
@@ -137,7 +139,7 @@ impl UpdateSession {
         }
     }
 
-    /// Cancels the starts of boards whose update is done except for the start.
+    /// Cancels the start of each board whose update is done except for the start.
     pub(super) fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);
@@ -155,7 +157,7 @@ impl UpdateSession {
         self.results.iter().filter(open).map(|r| r.board).collect()
     }
 
-    /// Refuses the update of all boards that have not begun.
+    /// Refuses the update of all boards whose update has not begun.
     pub(super) fn refuse(&mut self, error: &Error) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Refused(Box::new(error.clone())));
@@ -169,7 +171,7 @@ impl UpdateSession {
         }
     }
 
-    /// Returns the boards that are in progress or have not begun.
+    /// Returns the boards whose update is in progress or has not begun.
     pub(super) fn unfinished(&self) -> Vec<u8> {
         let mut boards = self.active.clone();
         boards.extend(self.open().iter().filter(|b| !self.active.contains(b)));
@@ -180,12 +182,12 @@ impl UpdateSession {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.flash_number)
     }
 
-    /// Returns the board's state before the update.
+    /// Returns the answer of the board to PC_INFO before the update.
     pub(super) fn before(&self, board: u8) -> Option<BoardInfo> {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.before)
     }
 
-    /// Returns the plan for one board, or for a group of boards.
+    /// Returns the update plan for one board, or for a group of boards.
     pub(super) fn plan(&self, link: &Link, board: Option<u8>) -> Result<UpdatePlan, Error> {
         let named = board.and_then(|b| self.flash_number(b)).filter(|_| self.options.name_target);
         Ok(UpdatePlan::new(&self.options, named.unwrap_or(Header::ANY_BOARD), &link.profile())?)

@@ -1,9 +1,10 @@
-//! Attempt to transfer both cycles to the boards, block by block. Each block must be answered before the next one is sent (U-5).
+//! An attempt to transfer both cycles to the boards, block by block. The boards must answer each block before the PC sends the next block
+//! (U-5).
 use crate::master::engine::{Event, Link, MS};
 use crate::master::reports::update::{Progress, UpdatePlan};
 use ucom::{BLOCK_LEN, ErrorCode, FromBoard, Function, Sequence, ToBoard};
 
-/// Reasons why the attempt with a board ended early.
+/// Reasons why the attempt to update a board ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Broken {
     Device {
@@ -16,15 +17,15 @@ pub(super) enum Broken {
         block: usize,
         waited_ms: u64,
     },
-    /// No answer to the very last block arrived. PC_INFO must show the result (U-9).
+    /// The board did not answer the very last block. The answer to PC_INFO must then show the result (U-9).
     NoFinish {
         waited_ms: u64,
     },
 }
 
 impl Broken {
-    /// Returns `true` if the board discards the following frames (D-43), because it has reported a programming error. After any other
-    /// error, and after silence, the board may still accept frames.
+    /// Returns `true` if the board discards the following program data (D-43), because it has reported a programming error. After any other
+    /// error, and after silence, the board may still accept program data.
     pub(super) fn ended_transfer(self) -> bool {
         use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
         let Self::Device { code, .. } = self else { return false };
@@ -32,11 +33,11 @@ impl Broken {
     }
 }
 
-/// Boards that take part in an attempt, and their state.
+/// State of one attempt and of the boards that take part in it.
 pub(super) struct Attempt<'a> {
     pub link: &'a Link,
     pub plan: &'a UpdatePlan,
-    /// Number to which the blocks are sent.
+    /// Number to which the PC sends the blocks.
     pub to: Sequence,
     pub boards: Vec<u8>,
     pub number: u32,
@@ -53,8 +54,8 @@ pub(super) struct Transferred {
 }
 
 impl Attempt<'_> {
-    /// Sends both cycles. Calls `erasing` before the first frame of a cycle that may erase. The arguments are the boards that still take
-    /// part, and the boards that do not take part any more.
+    /// Sends the blocks of both cycles. The function calls `erasing` before the first frame of a cycle that may erase memory. The arguments
+    /// of `erasing` are the boards that still take part in the attempt, and the boards that have left it.
     pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);
@@ -84,8 +85,8 @@ impl Attempt<'_> {
         out
     }
 
-    /// Sends the eight frames of a block. A frame that was received before the last of these frames left the queue is not an answer to the
-    /// block.
+    /// Sends the eight frames of a block of program data. A frame that was received before the last of these frames left the queue is not
+    /// an answer to the block.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
         let mut next = 0;
@@ -96,7 +97,8 @@ impl Attempt<'_> {
         }
     }
 
-    /// Waits for the answers of all boards. A board that reports an error or stays silent does not take part in the attempt any more.
+    /// Waits until all boards have answered the block. A board that reports an error or stays silent does not take part in the attempt any
+    /// more.
     async fn wait(&mut self, cycle: u32, block: usize, slow: bool, last: bool, out: &mut Transferred) {
         let times = self.link.times();
         let timeout = if slow { times.erase } else { times.ready };
@@ -109,7 +111,7 @@ impl Attempt<'_> {
                 continue;
             }
             match received.message {
-                // A READY after the last block of the update is ignored, because PROGFINISHED must follow.
+                // A DSP_READY after the last block of the update is ignored, because DSP_PROGFINISHED must follow.
                 FromBoard::Ready if !last => waiting.retain(|b| *b != received.from),
                 FromBoard::ProgFinished if last => waiting.retain(|b| *b != received.from),
                 FromBoard::Error(code) => {

@@ -7,27 +7,27 @@ use ucom::{ErrorCode, Status};
 /// Reasons why a board was not updated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UpdateFailure {
-    /// A check refused the update. Nothing was erased.
+    /// A check refused the update. No memory of the board was erased.
     #[error("{0}")]
     Refused(Box<Error>),
-    /// The board did not answer. Nothing was erased.
+    /// The board did not answer. No memory of the board was erased.
     #[error("{0}")]
     NoAnswer(Box<Error>),
-    /// The board answered but did not carry out a request. Nothing was erased.
+    /// The board answered but did not carry out a request. No memory of the board was erased.
     #[error("{0}")]
     Reported(Box<Error>),
     /// The board reported an error.
     #[error("{code} in cycle {cycle}, block {block}, after {attempts} attempts: {}", code.meaning())]
     Device {
-        /// The code.
+        /// Reported error code.
         code: ErrorCode,
-        /// Cycle, 1 or 2.
+        /// Cycle in which the error occurred, 1 or 2.
         cycle: u32,
-        /// Number of the block. Block 0 contains the header.
+        /// Number of the block to which the error belongs. Block 0 of each cycle contains the header.
         block: usize,
-        /// Number of attempts.
+        /// Number of attempts to update the board.
         attempts: u32,
-        /// `true` if memory was erased.
+        /// `true` if memory of the board was erased.
         erased: bool,
     },
     /// The board did not confirm a block in time.
@@ -35,52 +35,52 @@ pub enum UpdateFailure {
         "no DSP_READY for block {block} of cycle {cycle} within {waited_ms} ms, after {attempts} attempts"
     )]
     Timeout {
-        /// Cycle, 1 or 2.
+        /// Cycle in which the answer is missing, 1 or 2.
         cycle: u32,
-        /// Number of the block. Block 0 contains the header.
+        /// Number of the block that has no answer. Block 0 of each cycle contains the header.
         block: usize,
-        /// Time waited, ms.
+        /// Time that the PC waited for the answer, ms.
         waited_ms: u64,
-        /// Number of attempts.
+        /// Number of attempts to update the board.
         attempts: u32,
-        /// `true` if memory was erased.
+        /// `true` if memory of the board was erased.
         erased: bool,
     },
-    /// The board reported, or should have reported, that it is done, but it shows another program.
+    /// The board reported, or should have reported, that programming is complete, but its answer to PC_INFO contains another program.
     #[error(
         "the board shows Program ID 0x{program_id:04X}, date 0x{date:04X} instead of 0x{wanted_id:04X}{}",
         wanted_date.map_or_else(String::new, |date| format!(", 0x{date:04X}"))
     )]
     NotVerified {
-        /// Program ID that the board shows.
+        /// Program ID in the board's answer.
         program_id: u16,
-        /// Flash date that the board shows.
+        /// Flash date in the board's answer.
         date: u16,
         /// Program ID of the image.
         wanted_id: u16,
-        /// Flash date of the image; `None` if it is not known.
+        /// Flash date of the image; `None` if the date is not known.
         wanted_date: Option<u16>,
     },
-    /// The board reported that it is done, but it is in its exloader and shows no application.
+    /// The board reported that programming is complete, but it is in its exloader and has no valid application.
     #[error(
         "the board reports that programming is complete, but shows no valid application in its exloader: \
          Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
     )]
     NotValid {
-        /// Program ID that the board shows.
+        /// Program ID in the board's answer.
         program_id: u16,
-        /// Flash date that the board shows.
+        /// Flash date in the board's answer.
         date: u16,
         /// Status of the board.
         status: Status,
     },
-    /// The board shows the program, but the application did not start.
+    /// The board reports the new program, but the application did not start.
     #[error("the board shows the program, but the start failed: {0}")]
     NotRunning(Box<Error>),
-    /// The board already showed the program, but it was in programming mode, and this mode could not be ended.
+    /// The board already had the program, but it was in programming mode, and the PC could not end this mode.
     #[error("the board already shows the program, but may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
-    /// A step failed after memory was erased.
+    /// A step of the update failed after memory of the board was erased.
     #[error("{0}")]
     After(Box<Error>),
     /// The board was removed from the group and does not answer. Frames to the group may have erased the board.
@@ -89,13 +89,13 @@ pub enum UpdateFailure {
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
-        /// State after the cancel. The state is the outcome of the board, or `Running` if the application may be running.
+        /// State of the board after the cancel. The state is the outcome of the board, or `Running` if the application may be running.
         left: UpdateOutcome,
     },
-    /// An earlier board of the list failed, so this board was skipped.
+    /// An earlier board of the list failed, so the update of this board was skipped.
     #[error("not started, because the update of board {after} failed")]
     Skipped {
-        /// Board that failed.
+        /// Number of the board that failed.
         after: u8,
     },
 }
@@ -107,7 +107,7 @@ impl Diagnose for UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Returns the kind of failure. If memory may have been erased before, every failure or cancel is a fault.
+    /// Returns the kind of failure of the update. If memory of the board may have been erased, every failure or cancel is a fault.
     fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {
@@ -189,7 +189,7 @@ impl UpdateFailure {
     }
 }
 
-/// Returns a text about the state after a cancel.
+/// Returns a text about the state of the board after a cancel.
 fn left_behind(outcome: UpdateOutcome) -> &'static str {
     match outcome {
         UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",

@@ -1,13 +1,13 @@
-//! Options for an update, including boards and images.
+//! Options for an update, with the boards and the images.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::files::{FlashRecord, Image};
 
-/// Image and its load address.
+/// Image and the address to which it is loaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateImage {
-    /// Bytes in wire order. All plans and cycles share these bytes.
+    /// Bytes of the image in the order in which they are sent. All plans and cycles share the bytes of the image.
     pub bytes: Arc<[u8]>,
     /// Load address in words.
     pub address_words: u32,
@@ -19,7 +19,7 @@ impl From<Image> for UpdateImage {
     }
 }
 
-/// Board to be updated.
+/// Board to update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UpdateTarget {
     /// Board number.
@@ -34,51 +34,51 @@ pub enum UpdateMode {
     /// Updates one board after the other.
     #[default]
     OneByOne,
-    /// All boards at once by broadcast. Boards that are removed from the group are updated one by one afterwards.
+    /// Updates all boards at once by broadcast. A board that leaves the group is then updated alone.
     Group,
 }
 
 /// Options for an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateOptions {
-    /// The boards.
+    /// Boards to update.
     pub targets: Vec<UpdateTarget>,
-    /// The image.
+    /// Image to write.
     pub image: UpdateImage,
-    /// Image of the other cycle. With the plan `exloader-app`, this image is sent in the first cycle. With `pmem-xmem` and `raw`, it is
-    /// sent in the second cycle.
+    /// Second image, which is sent in the other cycle. With the plan `exloader-app`, this image is sent in the first cycle. With the plans
+    /// `pmem-xmem` and `raw`, this image is sent in the second cycle.
     pub second: Option<UpdateImage>,
-    /// Program ID. If the image does not determine the Program ID (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must
-    /// show this ID at the end. If the image determines the Program ID, the image must have this ID.
+    /// Program ID that the user expects. If the image does not determine the Program ID (plan `raw`, `prog.header` or `prog.checksum`
+    /// `none`), the board must report this ID at the end. If the image determines the Program ID, the image must have this ID.
     pub expect_program_id: Option<u16>,
     /// Flash date as a 16-bit word, see [`DateForm`](ucom::DateForm).
     pub date: u16,
-    /// `true` if no date was requested. A board that shows the program with another date is then up to date (U-3).
+    /// `true` if the user did not request a date. A board that reports the program with another date is then up to date (U-3).
     pub any_date: bool,
     /// Flash records of the boards, by flash number (D-62). The flash content of boards without a record is not known.
     pub records: BTreeMap<u16, FlashRecord>,
     /// `true` if the header contains the board's flash number, so that other boards refuse the image.
     pub name_target: bool,
-    /// Order of the updates.
+    /// Order in which the boards are updated.
     pub mode: UpdateMode,
-    /// `true` to perform only the checks, including the check for another PC. Only queries are sent.
+    /// `true` to perform only the checks, including the check for another PC. In a dry run, the PC sends only queries.
     pub dry_run: bool,
-    /// Permission to update even if boards are running (U-2), another PC is on the bus, or the board already shows the program (U-3).
+    /// Permission to update even if boards are running (U-2), another PC is on the bus, or the board already has the program (U-3).
     pub force: bool,
-    /// Permission to update even if the board already shows the program (U-3). Other checks still apply.
+    /// Permission to update even if the board already has the program (U-3). The other checks of an update still apply.
     pub rewrite: bool,
-    /// `true` to start the application at the end.
+    /// `true` to start the application at the end of the update.
     pub start: bool,
-    /// `true` to report no failure for an image that cannot be verified: with plan `raw`, or with `prog.header` or `prog.checksum` `none`,
-    /// and without [`expect_program_id`](Self::expect_program_id). This also applies to a board that already shows the program but whose flash
-    /// content is not known (D-62).
+    /// `true` to report no failure for an image that cannot be verified. This is the case with plan `raw`, or with `prog.header` or
+    /// `prog.checksum` `none`, and without [`expect_program_id`](Self::expect_program_id). The option also applies to a board that already
+    /// reports the program but whose flash content is not known (D-62).
     pub accept_unverified: bool,
-    /// `true` to continue with the next board after a failure.
+    /// `true` to continue with the next board after a failure of one board.
     pub keep_going: bool,
 }
 
 impl UpdateOptions {
-    /// Creates options for one image and some boards. The boards are updated one by one, with all checks.
+    /// Creates options for one image and some boards. With these options, the boards are updated one by one, with all checks.
     pub fn new(targets: Vec<UpdateTarget>, image: UpdateImage, date: u16) -> Self {
         Self {
             targets,

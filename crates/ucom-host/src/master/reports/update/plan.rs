@@ -7,7 +7,7 @@ use crate::master::reports::update::options::{UpdateImage, UpdateOptions};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, BoardInfo, Checksum, Header, Memory, Profile, block_count, checksum, data_block};
 
-/// Content of a cycle.
+/// Content of one cycle of an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Cycle {
     pub header: Option<[u8; BLOCK_LEN]>,
@@ -15,12 +15,12 @@ pub(crate) struct Cycle {
 }
 
 impl Cycle {
-    /// Returns the number of blocks, including the header block.
+    /// Returns the number of blocks of the cycle, including the header block.
     pub(crate) fn blocks(&self) -> usize {
         block_count(self.bytes.len()) + usize::from(self.header.is_some())
     }
 
-    /// Returns the `i`-th block.
+    /// Returns the `i`-th block of the cycle.
     pub(crate) fn block(&self, i: usize) -> Option<[u8; BLOCK_LEN]> {
         match (self.header, i.checked_sub(1)) {
             (Some(header), None) => Some(header),
@@ -30,28 +30,28 @@ impl Cycle {
     }
 }
 
-/// Program that a board must show at the end of an update.
+/// Program that a board must report at the end of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expected {
-    /// Program ID.
+    /// Program ID that the board must report.
     pub program_id: u16,
-    /// Flash date; `None` if it is not known, because no header with a date is sent.
+    /// Flash date; `None` if the date is not known, because the update sends no header with a date.
     pub date: Option<u16>,
 }
 
 impl Expected {
-    /// Returns `true` if the board shows this program.
+    /// Returns `true` if the board reports this program.
     pub fn is(&self, known: &BoardInfo) -> bool {
         known.program_id == self.program_id && self.date.is_none_or(|date| date == known.date)
     }
 }
 
-/// Reasons why the program that a board must show after the update is not known.
+/// Reasons why the program that a board must report after the update is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unverifiable {
-    /// With plan `raw`, the files do not show the Program ID.
+    /// With plan `raw`, the Program ID of the files is not known.
     RawPlan,
-    /// With `prog.header = none`, the board itself determines Program ID and date.
+    /// With `prog.header = none`, the board itself determines the Program ID and the date.
     NoHeader,
     /// With `prog.checksum = none`, a Program ID is not the checksum of an image.
     NoChecksum,
@@ -68,29 +68,29 @@ impl fmt::Display for Unverifiable {
 }
 
 impl Unverifiable {
-    /// Returns the change that makes a verification possible.
+    /// Returns the option that makes a verification possible.
     pub fn hint(&self) -> &'static str {
         "for a verification, give the Program ID that the board must show: `--expect-program-id 0x…`"
     }
 }
 
-/// Image in the form in which it is sent.
+/// Image in the form in which the update sends it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedImage {
     /// First and last cycle in which the image is sent: 1, 2 or both.
     pub cycles: (u32, u32),
-    /// Target memory; `None` with the plan `raw`, because only the content of the file determines the memory.
+    /// Memory to which the image is written; `None` with the plan `raw`, because only the content of the file determines the memory.
     pub memory: Option<Memory>,
-    /// Load address in words; `None` if no address is sent.
+    /// Load address in words; `None` if the update sends no address.
     pub address_words: Option<u32>,
-    /// Length in bytes.
+    /// Length of the image in bytes.
     pub bytes: usize,
-    /// Program ID (D-44); `None` if it is not visible or not computed.
+    /// Program ID of the image (D-44); `None` if the ID is not visible or not computed.
     pub program_id: Option<u16>,
 }
 
 impl Unverifiable {
-    /// Returns the reason why PC_INFO cannot verify an update with this profile; returns `None` if PC_INFO can verify it.
+    /// Returns the reason why PC_INFO cannot verify an update with this profile; returns `None` if PC_INFO can verify the update.
     fn by_profile(profile: &Profile) -> Option<Self> {
         match (profile.prog_plan, profile.prog_header, profile.prog_checksum) {
             (Plan::Raw, ..) => Some(Self::RawPlan),
@@ -102,7 +102,7 @@ impl Unverifiable {
 }
 
 impl UpdateImage {
-    /// Checks that the image can be sent. The image must consist of complete words, except with the plan `raw`.
+    /// Checks that the update can send the image. The image must consist of complete words, except with the plan `raw`.
     fn check(&self, plan: Plan) -> Result<(), PlanError> {
         match self.bytes.len() {
             0 => Err(PlanError::Empty),
@@ -117,7 +117,7 @@ pub fn has_header(profile: &Profile) -> bool {
     profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
 }
 
-/// Returns image and target memory of each cycle.
+/// Returns the image and the target memory of each cycle.
 fn parts<'a>(
     plan: Plan,
     image: &'a UpdateImage,
@@ -133,22 +133,23 @@ fn parts<'a>(
     })
 }
 
-/// Data to send to a board, and the program that the board must show afterwards.
+/// Data that an update sends to a board, and the program that the board must report afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
     pub(crate) cycles: [Cycle; 2],
-    /// Images of the user, the main image first.
+    /// Images that the user gave, the main image first.
     pub images: Vec<PlannedImage>,
-    /// Program that the board must show at the end; `None` if it is not known.
+    /// Program that the board must report at the end; `None` if the program is not known.
     pub expected: Option<Expected>,
     /// Reason why the expected program is not known.
     pub unverifiable: Option<Unverifiable>,
-    /// First cycle that may erase flash, 1 or 2. Earlier cycles do not erase any data.
+    /// First cycle that may erase flash, 1 or 2. Earlier cycles do not erase any memory.
     pub erases_from: u32,
 }
 
 impl UpdatePlan {
-    /// Creates the plan for a board. The header contains `target`.
+    /// Creates the update plan for one board or for a group. The header contains `target`: the flash number of the board, or the value for
+    /// any board.
     pub fn new(options: &UpdateOptions, target: u16, profile: &Profile) -> Result<Self, PlanError> {
         let plan = profile.prog_plan;
         let image = &options.image;
@@ -158,9 +159,10 @@ impl UpdatePlan {
         let other = options.second.as_ref();
         let [first, last] = parts(plan, image, other)?;
         let erases_from = match plan {
-            // The first cycle only checks the image or fills RAM. The application in flash stays valid.
+            // The first cycle of these plans only checks the image or fills RAM. The application in flash stays valid during this cycle.
             Plan::VerifyWrite | Plan::ExloaderApp => 2,
-            // The first cycle writes program flash. Only the author of raw files knows their effect.
+            // With `pmem-xmem`, the first cycle writes program flash. With `raw`, only the author of the files knows which cycle erases
+            // memory.
             Plan::PmemXmem | Plan::Raw => 1,
         };
         let unverifiable = Unverifiable::by_profile(profile);
@@ -211,17 +213,17 @@ impl UpdatePlan {
         Ok(Self { cycles: [cycle(1, first), cycle(2, last)], images, expected, unverifiable, erases_from })
     }
 
-    /// Returns the Program ID that the board must show; `None` if it is not known.
+    /// Returns the Program ID that the board must report; returns `None` if the ID is not known.
     pub fn program_id(&self) -> Option<u16> {
         self.expected.map(|expected| expected.program_id)
     }
 
-    /// Returns the number of bytes that both cycles send.
+    /// Returns the number of bytes that the PC sends in both cycles.
     pub fn total_bytes(&self) -> u64 {
         self.cycles.iter().map(|c| (c.blocks() * BLOCK_LEN) as u64).sum()
     }
 
-    /// Returns the number of PC_PROG frames of one cycle, 0 or 1.
+    /// Returns the number of PC_PROG frames of one cycle; the cycles have the indices 0 and 1.
     pub fn frames(&self, cycle: usize) -> usize {
         self.cycles.get(cycle).map_or(0, |c| c.blocks() * 8)
     }
@@ -237,7 +239,7 @@ mod tests {
         UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1)
     }
 
-    /// Golden update: 1000 bytes, 17 blocks and 136 frames per cycle, Program ID 0x4B3F.
+    /// The golden update has 1000 bytes, 17 blocks and 136 frames per cycle, and the Program ID 0x4B3F.
     #[test]
     fn d41_golden_plan() {
         let bytes: Vec<u8> = (0..1000).map(|i| (37 * i + 11) as u8).collect();

@@ -1,4 +1,4 @@
-//! Results of an update, and the kind of failure.
+//! Results of an update, and the kind of its failure.
 use crate::date_text;
 use crate::master::reports::update::failure::UpdateFailure;
 use crate::master::reports::update::outcome::UpdateOutcome;
@@ -11,7 +11,7 @@ use ucom::{BoardInfo, Profile};
 pub struct UpdateResult {
     /// Board number.
     pub board: u8,
-    /// Flash number, if the board answered.
+    /// Flash number of the board; `None` if the board did not answer.
     pub flash_number: Option<u16>,
     /// Answer to PC_INFO before the update.
     pub before: Option<BoardInfo>,
@@ -19,14 +19,14 @@ pub struct UpdateResult {
     pub after: Option<BoardInfo>,
     /// Outcome of the update.
     pub outcome: UpdateOutcome,
-    /// `true` if PC_INFO shows the Program ID and date of the image, and this tool has written exactly this image to this address. The
-    /// image was written in this update, or earlier according to the flash record.
+    /// `true` if PC_INFO returns the Program ID and date of the image, and this tool has written exactly this image to this address. The
+    /// image was written in this update, or in an earlier update according to the flash record.
     pub verified: bool,
-    /// Number of attempts.
+    /// Number of attempts to update the board.
     pub attempts: u32,
     /// Reason of the failure; `None` if the update succeeded.
     pub failure: Option<UpdateFailure>,
-    /// Time from the XRESET to the last answer, µs.
+    /// Time from the XRESET to the last answer of the board, µs.
     pub time_us: u64,
 }
 
@@ -46,29 +46,29 @@ impl UpdateResult {
     }
 }
 
-/// Results of an update.
+/// Results of an update for all boards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UpdateReport {
     /// Results in the order of the boards in the options.
     pub boards: Vec<UpdateResult>,
-    /// `true` if only queries were sent.
+    /// `true` if the PC sent only queries.
     pub dry_run: bool,
-    /// Program ID that the boards must show; `None` if it is not known.
+    /// Program ID that the boards must report; `None` if the ID is not known.
     pub program_id: Option<u16>,
     /// Reason why this Program ID is not known, so that the written program cannot be verified.
     pub unverifiable: Option<Unverifiable>,
-    /// `true` if programs that were written but not verified are accepted.
+    /// `true` if the options accept programs that were written but not verified.
     pub accept_unverified: bool,
     /// Images that were sent, the main image first.
     pub images: Vec<PlannedImage>,
     /// Flash date of the image.
     pub date: u16,
-    /// Number of bytes that both cycles send.
+    /// Number of bytes that the PC sends in both cycles.
     pub bytes: u64,
 }
 
 impl UpdateReport {
-    /// Returns the most serious kind of failure of all boards. Returns `None` if the update succeeded.
+    /// Returns the most serious kind of failure of all boards. The function returns `None` if the update succeeded.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
         let unproven = self.boards.iter().filter(|b| !self.accept_unverified && b.failure.is_none());
@@ -95,7 +95,7 @@ impl UpdateReport {
         (message, "`rewrite` writes it")
     }
 
-    /// Returns the flash date of a board that already shows the program, if it differs from the date of the image.
+    /// Returns the flash date of a board that already has the program, if this date differs from the date of the image.
     fn flashed(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let before = result.before.filter(|before| has_header(profile) && before.date != self.date)?;
         let is_shown = matches!(result.outcome, UpdateOutcome::UpToDate | UpdateOutcome::ProgramUpToDate);
@@ -109,7 +109,7 @@ impl UpdateReport {
         self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))
     }
 
-    /// Returns the evidence that a board already has the program; returns `None` for boards that did not already show the program.
+    /// Returns the evidence that a board already has the program; returns `None` for boards that did not have the program before.
     pub fn shown_already(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let same = match self.flashed(result, profile) {
             Some(flashed) => format!("same Program ID, {flashed}"),
@@ -128,16 +128,16 @@ impl UpdateReport {
 pub struct Progress {
     /// Boards that receive the image now.
     pub boards: Vec<u8>,
-    /// Attempt, 1 to `prog.attempts`.
+    /// Number of the attempt, from 1 to `prog.attempts`.
     pub attempt: u32,
-    /// Cycle, 1 or 2.
+    /// Number of the cycle, 1 or 2.
     pub cycle: u32,
     /// Number of bytes, of both cycles, that the boards have confirmed in this attempt.
     pub bytes: u64,
-    /// Number of bytes that both cycles send.
+    /// Number of bytes that the PC sends in both cycles.
     pub total: u64,
-    /// Average rate so far, in bytes per second.
+    /// Average transfer rate so far, in bytes per second.
     pub rate: u64,
-    /// Remaining time at this rate, µs.
+    /// Estimated remaining time at this rate, µs.
     pub remaining_us: u64,
 }

@@ -1,16 +1,16 @@
-//! Application of a simulated board, connected to the words of the protocol.
+//! Application of a simulated board, connected to the CI, SO and PAR words of the protocol.
 use super::file::BoardConfig;
 use super::model::Model;
 use super::texts::{Texts, latin1};
 use ucom::Dimensions;
 use ucom::node::{Application, Text};
 
-/// Time in µs from the start of the program until it accepts requests.
+/// Time in µs from the start of the application until it accepts requests.
 const UP_US: u64 = 60_000;
 /// Longest time, in s, for which one call simulates the axes.
 const MOST_S: f64 = 5.0;
 
-/// Program of a board: its model, connected to the words of the protocol.
+/// Application of a simulated board: its model, connected to the CI, SO and PAR words of the protocol.
 #[derive(Clone, Debug)]
 pub(super) struct SimApplication {
     model: Model,
@@ -46,9 +46,9 @@ impl SimApplication {
         }
     }
 
-    /// Simulates the axes up to `now_us`, even if no program runs.
+    /// Simulates the axes up to `now_us`, even if the application does not run.
     pub(crate) fn pass(&mut self, now_us: u64) {
-        // An axis without drive is at rest after that time.
+        // After `MOST_S`, an axis without drive is at rest, so a longer simulation is not necessary.
         let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
         self.moved_us = self.moved_us.max(now_us);
         let driven = self.running && self.active;
@@ -57,14 +57,14 @@ impl SimApplication {
         }
     }
 
-    /// Handles a power loss. The axes are not driven any more, and the program loses its state.
+    /// Handles a power loss. The axes are not driven any more, and the application loses its state.
     pub(crate) fn power_lost(&mut self, now_us: u64) {
         self.pass(now_us);
         self.stop();
         self.debug.clear();
     }
 
-    /// Returns `true` if the axes are driven.
+    /// Returns `true` if the outputs of the board drive the axes.
     pub(crate) fn is_driven(&self) -> bool {
         self.running && self.active
     }

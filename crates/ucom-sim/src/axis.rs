@@ -1,8 +1,8 @@
 //! Motor axis that a board's application moves in a simulated chain.
 use serde::Deserialize;
 
-/// Step of the integration, s. The step is small compared with the time constants of the largest gains that the words of the protocol can
-/// represent.
+/// Step of the numerical integration, s. The step is small compared with the time constants of the largest gains that the words of the
+/// protocol can represent.
 const STEP_S: f64 = 0.000_5;
 /// Speed below which friction stops the axis, °/s.
 const STANDS_DEG_S: f64 = 0.5;
@@ -11,23 +11,23 @@ pub(super) const AMBIENT_C: f64 = 24.0;
 /// Temperature above which the axis limits its current, °C.
 const HOT_C: f64 = 80.0;
 
-/// Properties of an axis.
+/// Mechanical properties of an axis.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisConfig {
     /// Prefix of the names of the inputs and outputs of the axis; empty on a board with one axis.
     pub name: String,
-    /// Lower stop, degrees.
+    /// Position of the lower mechanical stop, degrees.
     pub min_deg: f64,
-    /// Upper stop, degrees.
+    /// Position of the upper mechanical stop, degrees.
     pub max_deg: f64,
-    /// Position at power-up, degrees.
+    /// Position of the axis at power-up, degrees.
     pub start_deg: f64,
-    /// Acceleration by current, °/s² per mA.
+    /// Acceleration of the axis by the motor current, °/s² per mA.
     pub acceleration_per_ma: f64,
-    /// Viscous friction, 1/s.
+    /// Coefficient of viscous friction, 1/s.
     pub damping_per_s: f64,
-    /// Dry friction, °/s².
+    /// Deceleration by dry friction, °/s².
     pub friction_deg_s2: f64,
     /// Acceleration by gravity at 90°, in °/s²; negative if gravity moves the axis to the upright position.
     pub gravity_deg_s2: f64,
@@ -48,36 +48,36 @@ impl Default for AxisConfig {
     }
 }
 
-/// Command to the controller of an axis.
+/// Command to the position controller of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Command {
     /// Set position, degrees.
     pub set_position: f64,
-    /// Share of the largest current, 0 to 1.
+    /// Share of the largest current that the controller may use, 0 to 1.
     pub stiffness: f64,
-    /// Speed limit, °/s.
+    /// Speed limit of the axis, °/s.
     pub speed_limit: f64,
-    /// Proportional gain, mA/°.
+    /// Proportional gain of the controller, mA/°.
     pub kp: f64,
-    /// Derivative gain, mA·s/°.
+    /// Derivative gain of the controller, mA·s/°.
     pub kd: f64,
-    /// Limits of the set position, degrees.
+    /// Lower and upper limit of the set position, degrees.
     pub limits: (f64, f64),
-    /// Largest current, mA.
+    /// Largest motor current, mA.
     pub current_max: f64,
 }
 
-/// State of an axis.
+/// State of a simulated axis.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     config: AxisConfig,
-    /// Position, degrees.
+    /// Position of the axis, degrees.
     pub position: f64,
-    /// Velocity, °/s.
+    /// Velocity of the axis, °/s.
     pub velocity: f64,
-    /// Current, mA.
+    /// Motor current, mA.
     pub current: f64,
-    /// Temperature, °C.
+    /// Temperature of the motor, °C.
     pub temperature: f64,
     /// Set point, in degrees, that moves to the set position within the speed limit.
     pub reference: f64,
@@ -99,7 +99,7 @@ impl Axis {
         &self.config
     }
 
-    /// Advances the axis. Without a command the outputs are safe: the current is 0, and the set point follows the axis.
+    /// Advances the simulation of the axis. Without a command the outputs are safe: the current is 0, and the set point follows the axis.
     pub(crate) fn advance(&mut self, seconds: f64, command: Option<&Command>) {
         let mut rest = seconds;
         while rest > 0.0 {
@@ -121,7 +121,7 @@ impl Axis {
             self.velocity = 0.0;
         } else {
             let way = if self.velocity.abs() < STANDS_DEG_S { push } else { self.velocity };
-            // The damping is integrated implicitly, so the integration is stable for every step.
+            // The simulation integrates the damping implicitly, so the integration is stable for every step.
             let free = self.velocity + dt * (push - c.friction_deg_s2 * way.signum());
             self.velocity = free / (1.0 + dt * c.damping_per_s);
         }
@@ -130,12 +130,12 @@ impl Axis {
             self.position = self.position.clamp(c.min_deg, c.max_deg);
             self.velocity = 0.0;
         }
-        // With 2 A, the temperature rises to about 60 K above ambient, with a time constant of 40 s.
+        // With a current of 2 A, the temperature rises to about 60 K above ambient, with a time constant of 40 s.
         let heat = 15.0 * (self.current / 1000.0).powi(2);
         self.temperature += dt * (heat - (self.temperature - AMBIENT_C)) / 40.0;
     }
 
-    /// Returns the current of a position controller. The set point of the controller moves at most at the speed limit.
+    /// Returns the motor current that the position controller commands. The set point of the controller moves at most at the speed limit.
     fn control(&mut self, dt: f64, c: &Command) -> f64 {
         let goal = c.set_position.max(c.limits.0).min(c.limits.1);
         let way = (goal - self.reference).clamp(-c.speed_limit * dt, c.speed_limit * dt);
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!((axis.velocity, axis.reference), (0.0, axis.position));
     }
 
-    /// Extreme gains within the words of the protocol never cause values that are not finite.
+    /// Extreme gains within the range of the protocol's words never cause values that are not finite.
     #[test]
     fn wild_gains_stay_finite_and_within_the_stops() {
         let mut axis = Axis::new(&AxisConfig { gravity_deg_s2: 5000.0, ..Default::default() });

@@ -1,4 +1,4 @@
-//! Board of the simulated chain: the node that real boards run, with simulated parts and faults around the node.
+//! Board of the simulated chain: the same node that real boards run, with simulated hardware parts and faults around it.
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
@@ -11,7 +11,7 @@ use ucom::node::{Node, NodeConfig, Phase, Pins, Record};
 use ucom::profile::{Endian, HeaderForm};
 use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard, checksum};
 
-/// Time step inside the board while one of its frames waits for the bus, µs.
+/// Time step of the board while one of its frames waits for the bus, µs.
 const WAIT_US: u64 = 500;
 /// Delay of a board relative to another board with the same number, µs. Two boards that answer in one bit time would destroy each other's
 /// frames.
@@ -21,21 +21,21 @@ pub(super) struct Board {
     node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
     /// `true` for the first board of the chain, whose incoming pin is strapped active.
     strapped: bool,
-    /// `true` while the fault of this name is active; the next three fields have the same meaning for their faults.
+    /// `true` while the board has no power; each of the next three fields is `true` while the fault of its name is active.
     pub unpowered: bool,
     pub silent: bool,
     pub deaf: bool,
     pub ack_held: bool,
     /// Delay of received frames, µs.
     behind_us: u64,
-    /// Delayed frames, with the time of their reception.
+    /// Received frames that are delayed, with the time at which the board receives them.
     coming: VecDeque<(u64, u32, Format, Payload)>,
-    /// Frame that waits for the bus.
+    /// Frame of the board that waits for the bus.
     waiting: Option<Frame>,
-    /// INITACK that the board does not send because of a fault.
+    /// INITACK that the board does not send because of the fault `ack_held`.
     held: Option<Frame>,
     next_us: u64,
-    /// Contradictory status of the board, if it has occurred.
+    /// Contradiction in the status of the board, if the status was contradictory.
     pub violation: Option<&'static str>,
 }
 
@@ -80,7 +80,7 @@ impl Board {
         if self.unpowered { u64::MAX } else { self.next_us }
     }
 
-    /// Advances the time to `now_us`. Returns the frame that the board puts into its controller.
+    /// Advances the time of the board to `now_us`. The function returns the frame that the board puts into its CAN controller.
     pub(crate) fn poll(&mut self, now_us: u64) -> Option<Frame> {
         if self.unpowered {
             return None;
@@ -92,7 +92,7 @@ impl Board {
             return Some(frame);
         }
         while let Some((_, id, format, payload)) = self.coming.pop_front_if(|(at, ..)| *at <= now_us) {
-            // Frames that are not of this protocol are counted and ignored (D-02).
+            // The node counts and ignores frames that are not of this protocol (D-02).
             let _ = self.node.receive_any(now_us, id, format, payload.bytes());
         }
         let frame = self.node.poll(now_us);
@@ -104,7 +104,7 @@ impl Board {
     /// Applies the active faults to a frame that the board sends.
     fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
-            // The board's controller assumes that another member has acknowledged the frame.
+            // The board's controller assumes that another node on the bus has acknowledged the frame.
             self.node.sent(now_us, &frame);
             return None;
         }
@@ -120,7 +120,7 @@ impl Board {
     fn schedule(&mut self, now_us: u64) {
         self.violation = self.violation.or(self.node.status().contradiction());
         self.next_us = match (&self.held, &self.waiting) {
-            // The fault may end at any time, so the held frame is checked every `WAIT_US`.
+            // The fault may end at any time, so the board checks the held frame every `WAIT_US`.
             (Some(_), _) => now_us + WAIT_US,
             (None, Some(_)) => self.node.next_deadline().max(now_us + WAIT_US),
             (None, None) => self.node.next_deadline().max(now_us + 1),
@@ -130,7 +130,7 @@ impl Board {
         }
     }
 
-    /// Reports that the board's frame was on the bus.
+    /// Reports to the board that its frame was on the bus.
     pub(crate) fn sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -141,7 +141,7 @@ impl Board {
         }
     }
 
-    /// Reports that the board's controller discarded the frame.
+    /// Reports to the board that its CAN controller discarded the frame.
     pub(crate) fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -152,7 +152,7 @@ impl Board {
         }
     }
 
-    /// Receives a frame of another member from the bus.
+    /// Passes a frame of another bus member to the board.
     pub(crate) fn receive(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
         if !self.unpowered && !self.deaf {
             if let (1.., Some(payload)) = (self.behind_us, Payload::new(data)) {
@@ -160,18 +160,19 @@ impl Board {
                 self.next_us = self.next_us.min(now_us + self.behind_us);
                 return;
             }
-            // Frames that are not of this protocol are counted and ignored (D-02).
+            // The node counts and ignores frames that are not of this protocol (D-02).
             let _ = self.node.receive_any(now_us, id, format, data);
             self.next_us = now_us;
         }
     }
 
-    /// Returns the level of the outgoing pin.
+    /// Returns the level of the board's outgoing pin.
     pub(crate) fn outgoing(&self) -> bool {
         !self.unpowered && self.node.pins.output.load(Ordering::SeqCst)
     }
 
-    /// Sets the level of the wire from the previous board. The level is inactive if the wire is broken or the previous board has no power.
+    /// Sets the level of the init wire from the previous board. The level is inactive if the init wire is broken or the previous board has
+    /// no power.
     pub(crate) fn set_incoming(&mut self, now_us: u64, level: bool) {
         let level = self.strapped || level;
         if self.node.pins.input.swap(level, Ordering::SeqCst) != level {
@@ -196,7 +197,7 @@ impl Board {
         }
     }
 
-    /// Simulates a crash of the application. The watchdog then reboots the board (D-26).
+    /// Simulates a crash of the application. After the crash, the watchdog reboots the board (D-26).
     pub(crate) fn crash(&mut self, now_us: u64) {
         if !self.unpowered {
             self.waiting = None;
@@ -206,7 +207,7 @@ impl Board {
         }
     }
 
-    /// Assigns to the board a number that another board has already taken, as if both boards had received one PC_INIT.
+    /// Assigns a number that another board has already taken to this board, as if both boards had received one PC_INIT.
     pub(crate) fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
@@ -217,7 +218,7 @@ impl Board {
             let forget = ToBoard::SetStatus { mask: Status::INIT.0, value: 0 };
             self.node.receive(now_us, &forget.encode(own, &profile));
         }
-        // The incoming pin is active only during this assignment.
+        // The incoming pin is active only during this assignment of the number.
         let level = self.node.pins.input.swap(true, Ordering::SeqCst);
         self.node.receive(now_us, &ToBoard::Init.encode(number, &profile));
         self.node.pins.input.store(level, Ordering::SeqCst);
@@ -240,31 +241,31 @@ impl Board {
     }
 }
 
-/// State of a board of the chain, for tests and displays. This state is not visible on the bus.
+/// State of a board in the chain, for tests and displays. A PC on the bus cannot see this state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardState {
     /// `true` if the board has power.
     pub powered: bool,
     /// Phase of the board: S1 to S6.
     pub phase: Phase,
-    /// Status byte.
+    /// Status byte of the board.
     pub status: Status,
-    /// Sequence number.
+    /// Sequence number of the board.
     pub number: Option<u8>,
-    /// Program ID and date of the valid application.
+    /// Program ID and flash date of the valid application.
     pub program: Option<(u16, u16)>,
-    /// `true` if the axes are driven.
+    /// `true` if the outputs of the board drive the axes.
     pub driven: bool,
 }
 
-/// Returns the application that the factory programs into a board. The image is derived from the description, so that boards have
+/// Returns the application that the factory programs into a board. The function derives the image from the description, so that boards have
 /// different applications.
 fn image(config: &BoardConfig) -> Vec<u8> {
     let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();
     image.extend([0, 0]);
     let Some(wanted) = config.program_id else { return image };
-    // The last word is selected so that the checksum has the value in the file.
+    // The last word of the image is selected so that the checksum has the value in the chain file.
     for word in 0..=u16::MAX {
         image.truncate(254);
         image.extend(word.to_le_bytes());

@@ -1,13 +1,13 @@
-//! Faults of a simulated chain, with kind, trigger and duration.
+//! Faults of a simulated chain, each with its kind, trigger and duration.
 use serde::Deserialize;
 
 /// Text of `ucom help faults`.
 pub const FAULT_HELP: &str = include_str!("fault.txt");
 
-/// Kinds of faults.
+/// Kinds of faults of a simulated chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
-    /// A board has no power.
+    /// The board has no power.
     PowerLoss,
     /// No frame of the board reaches the bus.
     Silent,
@@ -17,60 +17,60 @@ pub enum FaultKind {
     Crash,
     /// The init wire after a board is broken.
     WireBroken,
-    /// A board takes the number of the previous board, as after PC_INIT was repeated without a query (D-24).
+    /// A board takes the number of the previous board, as after PC_INIT was repeated without a PC_INFO (D-24).
     SameNumber,
     /// The board does not send the acknowledgement of its number (D-24).
     AckHeld,
-    /// A board's flash memory cannot be written.
+    /// The flash memory of a board cannot be written.
     FlashBroken,
-    /// Another PC is master of the bus (D-08).
+    /// Another PC is the master of the bus (D-08).
     CompetingMaster,
-    /// Frames of other protocols (D-02).
+    /// Frames of other protocols are on the bus (D-02).
     ForeignFrames,
-    /// A share of the frames between chain and clients is lost.
+    /// A share of the frames between the chain and its clients is lost.
     Lost(f64),
-    /// A bit is flipped in a share of the frames.
+    /// A bit is flipped in a share of the frames between the chain and its clients.
     Corrupted(f64),
-    /// A share of the frames is doubled.
+    /// A share of the frames between the chain and its clients is doubled.
     Doubled(f64),
-    /// A share of the frames is destroyed on the wire. Error counters increase, up to bus-off.
+    /// A share of the frames is destroyed on the wire. The error counters of the CAN controllers increase, up to bus-off.
     Disturbed(f64),
 }
 
-/// Trigger of a fault.
+/// Trigger that begins a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// Time after the start, µs.
+    /// The fault begins at this time after the start, µs.
     At(u64),
-    /// The n-th frame with this identifier on the bus.
+    /// The fault begins with the n-th frame that has this identifier on the bus.
     Frame {
-        /// Identifier.
+        /// Identifier of the frame.
         id: u16,
-        /// Count, from 1.
+        /// Number of the frame with this identifier, from 1.
         count: u64,
     },
 }
 
-/// Fault of the chain or of the bus.
+/// Fault of the simulated chain or of its bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// Kind.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// Position of the board in the chain, from 1; 0 for faults of the bus.
     pub board: usize,
-    /// Trigger.
+    /// Trigger of the fault.
     pub trigger: Trigger,
-    /// Duration in µs; `None` if the fault does not end.
+    /// Duration of the fault in µs; `None` if the fault does not end.
     pub duration_us: Option<u64>,
 }
 
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// The text is not TOML in the form of a fault file; the message shows the place and the reason.
+    /// The text is not TOML in the form of a fault file; the message contains the position and the reason.
     #[error("{0}")]
     Form(String),
-    /// The kind of fault does not exist.
+    /// The simulation has no fault of this kind.
     #[error("fault {fault}: unknown kind `{kind}`, expected one of {}", kinds().join(", "))]
     Kind {
         /// Number of the fault in the file, from 1.
@@ -83,9 +83,9 @@ pub enum FaultError {
     Missing {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// The kind.
+        /// Kind of the fault.
         kind: String,
-        /// The key.
+        /// Name of the missing key.
         key: &'static str,
     },
     /// A key has no meaning for this kind of fault.
@@ -93,24 +93,24 @@ pub enum FaultError {
     Superfluous {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// The kind.
+        /// Kind of the fault.
         kind: String,
-        /// The key.
+        /// Name of the key that has no meaning.
         key: &'static str,
     },
-    /// A value is out of range.
+    /// The value of a key is out of range.
     #[error("fault {fault}: {key} must be {range}")]
     Range {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// The key.
+        /// Name of the key.
         key: &'static str,
-        /// Allowed values.
+        /// Allowed values of the key.
         range: &'static str,
     },
 }
 
-/// Kinds that concern one board.
+/// Kinds of faults that concern one board.
 const OF_A_BOARD: [(&str, FaultKind); 8] = [
     ("power-loss", FaultKind::PowerLoss),
     ("silent", FaultKind::Silent),
@@ -122,14 +122,14 @@ const OF_A_BOARD: [(&str, FaultKind); 8] = [
     ("flash-broken", FaultKind::FlashBroken),
 ];
 
-/// Kinds that concern the bus.
+/// Kinds of faults that concern the bus.
 const OF_THE_BUS: [(&str, FaultKind); 2] =
     [("foreign-master", FaultKind::CompetingMaster), ("foreign-frames", FaultKind::ForeignFrames)];
 
-/// Function that creates a kind of fault from its share, 0 to 1.
+/// Function that creates a fault kind from the share of affected frames, 0 to 1.
 type OfAShare = fn(f64) -> FaultKind;
 
-/// Kinds that concern a share of the frames.
+/// Kinds of faults that concern a share of the frames.
 const OF_A_SHARE: [(&str, OfAShare); 4] = [
     ("lost", FaultKind::Lost),
     ("corrupted", FaultKind::Corrupted),
@@ -137,7 +137,7 @@ const OF_A_SHARE: [(&str, OfAShare); 4] = [
     ("disturbed", FaultKind::Disturbed),
 ];
 
-/// Returns the names of all kinds.
+/// Returns the names of all kinds of faults.
 fn kinds() -> Vec<&'static str> {
     let whole = OF_A_BOARD.iter().chain(&OF_THE_BUS).map(|(name, _)| *name);
     whole.chain(OF_A_SHARE.map(|(name, _)| name)).collect()
@@ -163,7 +163,7 @@ struct Entry {
 }
 
 impl Fault {
-    /// Reads the faults of a file.
+    /// Reads the faults in a fault file.
     pub fn from_toml(text: &str) -> Result<Vec<Self>, FaultError> {
         let file: File = toml::from_str(text).map_err(|e| FaultError::Form(e.to_string()))?;
         file.fault.into_iter().enumerate().map(|(i, entry)| entry.checked(i + 1)).collect()
@@ -228,7 +228,7 @@ impl Entry {
 }
 
 impl FaultKind {
-    /// Returns `true` if the kind concerns one board.
+    /// Returns `true` if faults of this kind concern one board.
     pub fn of_a_board(self) -> bool {
         OF_A_BOARD.iter().any(|(_, kind)| *kind == self)
     }

@@ -10,65 +10,65 @@ use ucom::profile::{Profile, ProfileError};
 pub const HEAD: &str = include_str!("head.toml");
 /// Text of `ucom help sim` before the built-in chain.
 const FORM: &str = include_str!("file.txt");
-/// Largest number of boards: a bus has numbers for 31 boards.
+/// Largest number of boards of a chain: a bus has numbers for 31 boards.
 const MOST_BOARDS: usize = 31;
-/// Largest number of axes of a board. A DSP of the original boards could not process more words.
+/// Largest number of axes of a board. The processor (DSP) of the original boards could not process the words of more axes.
 const MOST_AXES: usize = 8;
 
-/// Board of a chain.
+/// Board of a simulated chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardConfig {
-    /// Flash number of the board; DSP_REPORT carries its low byte.
+    /// Flash number of the board; DSP_REPORT contains the low byte of this number.
     pub flash_id: u16,
-    /// Description in DSP_INFO.
+    /// Description of the board in DSP_INFO.
     pub description: String,
-    /// Program ID of the board's application. If `None`, it is computed from the image, which is derived from the description.
+    /// Program ID of the board's application. If `None`, the Program ID is computed from the image, which is derived from the description.
     pub program_id: Option<u16>,
-    /// Flash date as a number.
+    /// Flash date of the application as a number.
     pub date: u16,
     /// `true` if the board has an application.
     pub application: bool,
-    /// `true` if autostart is enabled.
+    /// `true` if the automatic start of the application is enabled.
     pub autostart: bool,
-    /// Axes that the board's application moves.
+    /// Axes that the application of the board moves.
     pub axes: Vec<AxisConfig>,
-    /// Profile of the board.
+    /// Compatibility profile of the board.
     pub profile: Profile,
 }
 
-/// Boards of a chain.
+/// Boards of a simulated chain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChainConfig {
-    /// Boards in the order of the wire.
+    /// Boards in the order of the init wire.
     pub boards: Vec<BoardConfig>,
 }
 
 /// Reasons why a chain file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ChainFileError {
-    /// The file cannot be read.
+    /// The chain file cannot be read.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the chain file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error that the system reported.
         source: std::io::Error,
     },
-    /// The text is not TOML in the form of a chain file; the message shows the place and the reason.
+    /// The text is not TOML in the form of a chain file; the message contains the position and the reason.
     #[error("{0}")]
     Form(String),
-    /// The chain has more boards than a bus has numbers.
+    /// The chain has more boards than a bus has board numbers.
     #[error("the chain has {count} boards, expected at most {MOST_BOARDS}")]
     Boards {
-        /// Number of boards.
+        /// Number of boards in the chain file.
         count: usize,
     },
-    /// A board has no axis, or more axes than its words allow.
+    /// The board has no axis, or more axes than its words allow.
     #[error("board {board}: {count} axes are out of range, expected 1 to {MOST_AXES}")]
     Axes {
         /// Position of the board in the file, from 1.
         board: usize,
-        /// Number of axes.
+        /// Number of axes of the board.
         count: usize,
     },
     /// The values of an axis cannot be simulated.
@@ -76,19 +76,19 @@ pub enum ChainFileError {
     Axis {
         /// Position of the board in the file, from 1.
         board: usize,
-        /// Position among the board's axes, from 1.
+        /// Position of the axis among the board's axes, from 1.
         axis: usize,
-        /// Reason.
+        /// Reason why the axis cannot be simulated.
         what: &'static str,
     },
-    /// The protocol cannot carry a description.
+    /// The protocol cannot carry the description of a board.
     #[error(
         "board {board}: the description has {count} characters, expected at most 512 characters of Latin-1"
     )]
     Description {
         /// Position of the board in the file, from 1.
         board: usize,
-        /// Characters.
+        /// Number of characters in the description.
         count: usize,
     },
     /// A key of the board's profile is not valid.
@@ -96,9 +96,9 @@ pub enum ChainFileError {
     Profile {
         /// Position of the board in the file, from 1.
         board: usize,
-        /// The key.
+        /// Name of the key in the profile.
         key: String,
-        /// Reason.
+        /// Reason why the key is not valid.
         source: ProfileError,
     },
 }
@@ -133,7 +133,7 @@ fn nameless() -> String {
     "UCoM2".into()
 }
 
-/// Returns 2008-03-14 as a FAT date.
+/// Returns the date 2008-03-14 in the FAT encoding.
 const fn some_day() -> u16 {
     0x386E
 }
@@ -152,7 +152,7 @@ pub fn help() -> String {
 }
 
 impl ChainConfig {
-    /// Reads a chain from a text. `profile` applies to boards without a profile of their own.
+    /// Reads a chain from the text of a chain file. `profile` applies to boards that have no profile of their own in the text.
     pub fn from_toml(text: &str, profile: &Profile) -> Result<Self, ChainFileError> {
         let file: File = toml::from_str(text).map_err(|e| ChainFileError::Form(e.to_string()))?;
         let count = file.board.len();
@@ -176,11 +176,11 @@ impl ChainConfig {
 
     /// Returns the built-in head with ten boards.
     pub fn head(profile: &Profile) -> Self {
-        // The file is part of the program, and a test reads it, so reading cannot fail.
+        // The chain file is part of the program, and a test reads it, so reading cannot fail.
         Self::from_toml(HEAD, profile).unwrap_or_default()
     }
 
-    /// Returns the chain with `count` boards. Boards above this number are removed from the end; additional boards have one axis each.
+    /// Returns this chain with `count` boards. Surplus boards are removed from the end of the chain; additional boards have one axis each.
     #[must_use]
     pub fn with_boards(mut self, count: usize, profile: &Profile) -> Self {
         self.boards.truncate(count);
@@ -201,7 +201,8 @@ impl ChainConfig {
         self
     }
 
-    /// Returns the chain with these flash ids, in the order of the wire. Boards after the end of the list keep their flash ids.
+    /// Returns this chain with the given flash ids, in the order of the init wire. Boards for which the list has no flash id keep their
+    /// flash ids.
     #[must_use]
     pub fn with_flash_ids(mut self, ids: &[u16]) -> Self {
         for (board, id) in self.boards.iter_mut().zip(ids) {

@@ -1,11 +1,11 @@
-//! Code of the fuzz targets.
+//! Code of the fuzz targets for simulated boards.
 
 use ucom::node::{Application, Flash, Node, NodeConfig, Phase, Pins, Store};
 use ucom::{Frame, FromBoard, Profile};
 
-/// Runs a board through a sequence of steps. The first byte of a step defines the time that passes, the length of a frame, and whether the
-/// board is polled in that time. Two bytes of identifier and up to eight bytes of data follow. The status of the board must never be
-/// contradictory, and the board must send only allowed frames.
+/// Runs a simulated board through a sequence of steps. The first byte of each step defines the time that passes, the length of a frame, and
+/// whether the board is polled in that time. After the first byte of a step, two bytes of identifier and up to eight bytes of data follow.
+/// The status of the board must never be contradictory, and the board must send only allowed frames.
 pub fn node(data: &[u8]) {
     use crate::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
@@ -36,7 +36,7 @@ pub fn node(data: &[u8]) {
     }
 }
 
-/// Advances the time. Polls the board at its deadlines, and puts its frames on the bus.
+/// Advances the time of the board. The function polls the board at its deadlines, and puts its frames on the bus.
 fn pass<F: Flash, P: Pins, S: Store, A: Application>(
     board: &mut Node<F, P, S, A>,
     now: &mut u64,

@@ -1,5 +1,5 @@
-//! Board in memory, for tests, examples and simulations: flash with times and faults, a pin on a wire, a store, and an application that
-//! records its calls.
+//! Parts of a board in memory, for tests, examples and simulations: flash with times and faults, a pin on a wire, a store, and an
+//! application that records its calls.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,10 +9,10 @@ use ucom::{Dimensions, Memory};
 
 use crate::texts::Texts;
 
-/// Flash, data flash and exloader RAM in memory.
+/// Program flash, data flash and exloader RAM in memory.
 ///
-/// Writing can only clear bits, as in a real flash. `fail_after` makes operations fail. `cut_after` cuts the power during one operation.
-/// Half of that operation is performed, and all other operations fail until [`MemoryFlash::power_up`].
+/// A write can only clear bits, as in a real flash. The field `fail_after` makes operations fail. The field `cut_after` cuts the power
+/// during one operation. Half of that operation is performed, and all later operations fail until [`MemoryFlash::power_up`].
 #[derive(Clone, Debug)]
 pub struct MemoryFlash {
     /// Application area of the program flash.
@@ -25,13 +25,13 @@ pub struct MemoryFlash {
     pub erase_us: u64,
     /// Duration of a write of one block, µs.
     pub write_us: u64,
-    /// First operation that fails, counted from 0. All later operations also fail.
+    /// Number of the first operation that fails, counted from 0. All operations after this operation also fail.
     pub fail_after: Option<u64>,
-    /// Operation during which the power is lost, counted from 0.
+    /// Number of the operation during which the power is lost, counted from 0.
     pub cut_after: Option<u64>,
-    /// Byte of the program flash that stays erased after every write. Only a read-back detects this fault.
+    /// Byte of the program flash that stays erased after every write. Only a read-back of the flash detects this fault.
     pub stuck_byte: Option<usize>,
-    /// Number of operations started so far.
+    /// Number of flash operations that were started so far.
     pub operations: u64,
     cells: [Vec<u8>; 3],
     record: [u8; RECORD_LEN],
@@ -41,7 +41,7 @@ pub struct MemoryFlash {
 }
 
 impl Default for MemoryFlash {
-    /// Returns 32 Ki words of program flash from word 0, 4 Ki words of data flash, and 2 Ki words of RAM.
+    /// Returns a memory with 32 Ki words of program flash from word 0, 4 Ki words of data flash, and 2 Ki words of RAM.
     fn default() -> Self {
         let area = |words| Area { start: 0, words };
         Self::new(area(0x8000), area(0x1000), area(0x800))
@@ -49,7 +49,7 @@ impl Default for MemoryFlash {
 }
 
 impl MemoryFlash {
-    /// Creates erased flash with the given areas.
+    /// Creates an erased flash with the given areas.
     pub fn new(program: Area, data: Area, ram: Area) -> Self {
         let cells = [program, data, ram].map(|area| vec![0xFF; 2 * area.words as usize]);
         Self {
@@ -70,12 +70,12 @@ impl MemoryFlash {
         }
     }
 
-    /// Returns `true` if the power was lost during an operation.
+    /// Returns `true` if the power was lost during a flash operation.
     pub const fn is_dark(&self) -> bool {
         self.dark
     }
 
-    /// Restores the power; the flash keeps its contents.
+    /// Restores the power of the flash, which keeps its contents.
     pub fn power_up(&mut self) {
         self.dark = false;
         self.failed = false;
@@ -83,7 +83,7 @@ impl MemoryFlash {
         self.busy_until = 0;
     }
 
-    /// Returns the contents of a memory in wire order.
+    /// Returns the bytes of a memory in the order in which an update sends them.
     pub fn bytes(&self, memory: Memory) -> &[u8] {
         &self.cells[slot(memory)]
     }
@@ -97,7 +97,8 @@ impl MemoryFlash {
         }
     }
 
-    /// Starts an operation. Returns the extent to which the operation is performed: 2 for all, 1 for half, 0 for none.
+    /// Starts a flash operation. The function returns the extent to which the operation is performed: 2 for complete, 1 for half, 0 for not
+    /// at all.
     fn begin(&mut self, now_us: u64, duration: u64) -> Result<usize, FlashError> {
         if self.dark {
             return Err(FlashError);
@@ -192,17 +193,17 @@ impl Flash for MemoryFlash {
     }
 }
 
-/// Init pin on a wire. The outgoing pin of one board is the incoming pin of the next board.
+/// Init pins of a board, connected by wires. The outgoing pin of one board is the incoming pin of the next board.
 #[derive(Clone, Debug, Default)]
 pub struct WirePins {
-    /// Wire from the previous board.
+    /// Level of the wire from the previous board.
     pub input: Arc<AtomicBool>,
-    /// Wire to the next board.
+    /// Level of the wire to the next board.
     pub output: Arc<AtomicBool>,
 }
 
 impl WirePins {
-    /// Returns the pins of a chain; the first incoming pin is strapped active.
+    /// Returns the pins of the boards in a chain; the incoming pin of the first board is strapped active.
     pub fn chain(boards: usize) -> Vec<Self> {
         let mut input = Arc::new(AtomicBool::new(true));
         let next = |_| {
@@ -225,12 +226,12 @@ impl Pins for WirePins {
     }
 }
 
-/// Stored ASTART and description.
+/// Store of the status bit ASTART and of the description, in memory.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryStore {
-    /// ASTART.
+    /// Stored value of the status bit ASTART.
     pub autostart: bool,
-    /// Description, Latin-1.
+    /// Description of the board, in Latin-1.
     pub description: Vec<u8>,
 }
 
@@ -253,34 +254,34 @@ impl Store for MemoryStore {
 pub struct MemoryApplication {
     /// Time from the start until the application runs, µs.
     pub start_us: u64,
-    /// Description, and the names of the inputs, outputs and parameters.
+    /// Description of the application, and the names of its inputs, outputs and parameters.
     pub texts: Texts,
-    /// Initial inputs.
+    /// Initial values of the controller inputs.
     pub initial_ci: Vec<u16>,
-    /// Received inputs.
+    /// Received controller inputs.
     pub ci: Vec<u16>,
-    /// Inputs that have taken effect.
+    /// Controller inputs that have taken effect.
     pub latched_ci: Vec<u16>,
-    /// Outputs; the caller changes them.
+    /// Sensor outputs; the caller changes their values.
     pub so: Vec<u16>,
-    /// Outputs of the last snapshot.
+    /// Sensor outputs of the last snapshot.
     pub sampled_so: Vec<u16>,
-    /// Parameters.
+    /// Parameters of the application.
     pub par: Vec<u16>,
-    /// Waiting debug texts.
+    /// Debug texts that wait for transmission.
     pub debug: Vec<Vec<u8>>,
     /// `true` if the control loop runs.
     pub running: bool,
     /// `true` if the outputs are enabled.
     pub active: bool,
-    /// Number of control cycles so far.
+    /// Number of control cycles that were run so far.
     pub steps: u64,
-    /// Time at which the program was started; `None` if the program does not run.
+    /// Time at which the application was started; `None` if the application does not run.
     pub started_us: Option<u64>,
 }
 
 impl MemoryApplication {
-    /// Creates an application with one input, output or parameter for each text. All values are 0.
+    /// Creates an application with one input, output or parameter for each text. All values of the new application are 0.
     pub fn new(text: &str, ci: &[&str], so: &[&str], par: &[&str]) -> Self {
         Self {
             start_us: 10_000,
@@ -341,7 +342,7 @@ impl Application for MemoryApplication {
         self.sampled_so.clone_from(&self.so);
     }
 
-    // The trait names the snapshot `so`.
+    // The trait calls the snapshot of the outputs `so`.
     #[allow(clippy::misnamed_getters)]
     fn so(&self) -> &[u16] {
         &self.sampled_so

@@ -1,10 +1,10 @@
-//! Application of a simulated board: some axes, controlled by the words of CI, SO and PAR.
+//! Model of a simulated board's application: some axes, controlled by the words of CI, SO and PAR.
 use super::axis::{Axis, AxisConfig, Command};
 
-/// Words of an axis among the inputs, with name, unit and initial value.
+/// Controller inputs of an axis, with name, unit and initial value.
 const INPUTS: [(&str, &str, i16); 3] =
     [("set_position", "0.01 deg", 0), ("stiffness", "0.1 %", 1000), ("speed_limit", "0.1 deg/s", 900)];
-/// Words of an axis among the outputs, with name and unit.
+/// Sensor outputs of an axis, with name and unit.
 const OUTPUTS: [(&str, &str); 5] = [
     ("position", "0.01 deg"),
     ("velocity", "0.1 deg/s"),
@@ -12,8 +12,7 @@ const OUTPUTS: [(&str, &str); 5] = [
     ("temperature", "0.1 C"),
     ("reference", "0.01 deg"),
 ];
-/// Words of an axis among the parameters, with name, unit and default. For the position limits, the defaults are the mechanical stops of
-/// the axis.
+/// Parameters of an axis, with name, unit and default. For the position limits, the defaults are the mechanical stops of the axis.
 const PARAMETERS: [(&str, &str, i16); 5] = [
     ("kp", "mA/deg", 120),
     ("kd", "0.1 mA s/deg", 80),
@@ -22,7 +21,7 @@ const PARAMETERS: [(&str, &str, i16); 5] = [
     ("current_max", "mA", 2000),
 ];
 
-/// Axes and their words.
+/// Axes of a board, and their words.
 #[derive(Clone, Debug)]
 pub(super) struct Model {
     axes: Vec<Axis>,
@@ -83,7 +82,8 @@ impl Model {
         &self.initial_par
     }
 
-    /// Advances the simulation by `seconds`; the outputs are enabled if `active`. Returns a text to report, if any.
+    /// Advances the simulation of the axes by `seconds`; the outputs of the board are enabled if `active`. The function returns a text to
+    /// report, or `None`.
     pub(crate) fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
         let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {
@@ -101,7 +101,7 @@ impl Model {
         reported
     }
 
-    /// Returns the outputs in the order of their names.
+    /// Returns the sensor outputs in the order of their names.
     pub(crate) fn outputs(&self) -> impl Iterator<Item = u16> {
         self.axes.iter().flat_map(|a| {
             [
@@ -115,7 +115,7 @@ impl Model {
     }
 }
 
-/// Returns a value as a 16-bit word in two's complement. A value out of range results in the nearest word.
+/// Returns a value as a 16-bit word in two's complement. A value that is out of range results in the nearest word.
 fn word(value: f64) -> u16 {
     value.round() as i16 as u16
 }
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(model.advance(1.0, true, &ci, &par), None);
         let so: Vec<i16> = model.outputs().map(|w| w as i16).collect();
         assert!((so[5] + 1500).abs() < 60 && so[0].abs() < 60, "{so:?}");
-        // Limits are reported once, not in every cycle.
+        // The model reports a limited set point once, not in every cycle.
         ci[3] = 9000;
         assert!(model.advance(0.01, true, &ci, &par).unwrap().contains("90.00 deg"));
         assert_eq!(model.advance(0.01, true, &ci, &par), None);

@@ -1,4 +1,4 @@
-//! Simulated chain with a socketcand server, in real time.
+//! Server that connects a simulated chain with clients of socketcand, in real time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -11,26 +11,27 @@ use ucom::{Format, Frame};
 
 use crate::{ChainSim, Fault};
 
-/// Name of the bus.
+/// Name of the simulated bus.
 const CHANNEL: &str = "can0";
-/// If the computer was busy for longer than this, virtual time pauses. Without this pause, the boards would lose their PC.
+/// If the computer was busy for longer than this limit (µs), the virtual time pauses. Without this pause, the boards would detect the loss
+/// of their PC.
 const CATCH_UP_US: u64 = 200_000;
 
-/// Server that connects clients of the socketcand protocol with the boards of the chain, over a simulated bus and in real time.
+/// Server that connects socketcand clients with the boards of the chain, over a simulated bus and in real time.
 pub struct ChainServer<'a> {
     gateway: SocketcandGateway,
     bus: TimedBus,
     chain: ChainSim,
-    /// Bus members of the chain, in the order of the chain.
+    /// Bus members that belong to the chain, in the order of the chain.
     inside: Vec<MemberId>,
     clients: BTreeMap<ClientId, MemberId>,
     /// Disconnected clients whose frames still wait for the bus.
     leaving: Vec<MemberId>,
     started: Instant,
     start_us: u64,
-    /// Last frame on the wire: the time at which it ended in ns, the frame, and the frames that clients receive for it.
+    /// Last frame on the wire: the time in ns at which it ended, the frame, and the frames that clients receive for it.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
-    /// Clients that received a message about the bus-off of their controllers.
+    /// Clients that received a message that their CAN controller is bus-off.
     off: BTreeSet<ClientId>,
     /// Time of the last report that a controller has left the bus, ns.
     off_reported_ns: Option<u64>,
@@ -38,11 +39,11 @@ pub struct ChainServer<'a> {
 }
 
 impl<'a> ChainServer<'a> {
-    /// Listens for clients at an address; with port 0, the system selects a free port. The bus has `bitrate` bit/s and uses the seed
-    /// `seed`. `note` receives messages for the operator while the server runs.
+    /// Creates a server that listens for clients at an address; with port 0, the system selects a free port. The simulated bus has
+    /// `bitrate` bit/s and uses the random seed `seed`. `note` receives messages for the operator while the server runs.
     ///
     /// # Errors
-    /// The address cannot be used for listening.
+    /// Returns an error if the address cannot be used for listening.
     pub fn bind(
         address: &str,
         chain: ChainSim,
@@ -75,13 +76,13 @@ impl<'a> ChainServer<'a> {
         self.gateway.url(CHANNEL)
     }
 
-    /// Returns the counters of the bus.
+    /// Returns the counters of the simulated bus.
     pub fn stats(&self) -> BusStats {
         self.bus.stats()
     }
 
-    /// Serves clients and boards. Waits for an event of a client. Ends the wait at the next event of the chain or the bus, or after
-    /// `patience`.
+    /// Serves the clients and the boards. The function waits for an event of a client. This wait ends at the next event of the chain or the
+    /// bus, or after `patience`.
     pub fn turn(&mut self, patience: Duration) {
         let now_us = self.now_us();
         self.advance(now_us);
@@ -115,13 +116,13 @@ impl<'a> ChainServer<'a> {
         now
     }
 
-    /// Returns the time of the next event that is not caused by a client, µs.
+    /// Returns the time of the next event that does not come from a client, µs.
     fn due_us(&self) -> u64 {
         let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
         bus.min(self.chain.next_due_us())
     }
 
-    /// Advances virtual time.
+    /// Advances the virtual time of the chain and the bus.
     fn advance(&mut self, to_us: u64) {
         loop {
             let at_us = self.due_us().clamp(self.bus.now_ns() / 1000, to_us);
@@ -160,7 +161,7 @@ impl<'a> ChainServer<'a> {
                     };
                     self.chain.receive(i, frame.id().value(), format, frame.data());
                 }
-                // A client that is bus-off does not receive frames, like any controller.
+                // A client whose controller is bus-off does not receive frames, like any CAN controller.
                 None => {
                     let copies = self.carried.iter().flat_map(|(_, _, copies)| copies);
                     for (client, frame) in
@@ -177,7 +178,7 @@ impl<'a> ChainServer<'a> {
                 }
                 // Frames of several members that are equal bit for bit are one frame on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // The faults were already applied to frames of clients.
+                    // For frames of clients, the faults were already applied.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }
@@ -204,8 +205,8 @@ impl<'a> ChainServer<'a> {
         self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
     }
 
-    /// Handles a change of a controller's state. A client gets a message when its own controller leaves the bus and when its controller
-    /// returns.
+    /// Handles a change of a CAN controller's state. A client gets a message when its own controller leaves the bus and when this
+    /// controller returns to the bus.
     fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
         let off = state == ErrorState::BusOff;
         if let Some(client) = self.client_of(member)
@@ -218,8 +219,8 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Reports that a controller has left the bus. The controller recovers by itself. At most one report per second is made, because a bad
-    /// wire causes bus-off repeatedly.
+    /// Reports that a CAN controller has left the bus. The controller recovers from bus-off by itself. The server makes at most one report
+    /// per second, because a bad wire causes bus-off repeatedly.
     fn report_off(&mut self, member: MemberId, at_ns: u64) {
         if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
             return;
@@ -255,7 +256,8 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Injects the fault that a line such as `kill 3` describes. Reports the fault, or the error in the line, to the operator.
+    /// Injects the fault that a line of text such as `kill 3` describes. The function reports the fault, or the error in the line, to the
+    /// operator.
     pub fn fault(&mut self, line: &str) {
         if line.is_empty() {
             return;
@@ -270,18 +272,18 @@ impl<'a> ChainServer<'a> {
     }
 }
 
-/// Applies the faults between chain and clients to a frame.
+/// Applies the faults between the chain and its clients to a frame.
 fn through(chain: &mut ChainSim, frame: &CanFrame) -> Vec<CanFrame> {
     let id = frame.id();
     chain.through(frame.data()).iter().filter_map(|data| CanFrame::classic(id, data).ok()).collect()
 }
 
-/// Converts a frame of a board to a frame of the bus.
+/// Converts a frame of a board to a frame of the simulated bus.
 fn on_wire(frame: &Frame) -> Option<CanFrame> {
     CanFrame::classic(Id::standard(frame.id().into()).ok()?, frame.data()).ok()
 }
 
-/// Converts a frame of the bus to a frame of a board.
+/// Converts a frame of the simulated bus to a frame of a board.
 fn plain(frame: &CanFrame) -> Result<Frame, ()> {
     let id = u16::try_from(frame.id().value()).map_err(|_| ())?;
     Frame::new(id, frame.data()).ok_or(())

@@ -1,4 +1,4 @@
-//! Simulation of the chain: boards, init wires and faults.
+//! Simulation of a chain: boards, init wires and faults.
 
 use super::board::{Board, BoardState};
 use super::fault::{Fault, FaultKind, Trigger};
@@ -7,30 +7,31 @@ use std::collections::BTreeMap;
 use ucom::profile::Profile;
 use ucom::{Format, Frame, Sequence, ToBoard};
 
-/// Period of frames from another PC, µs.
+/// Period of the frames that another PC sends, µs.
 const MASTER_US: u64 = 250_000;
-/// Period of frames of another protocol, µs.
+/// Period of the frames of another protocol, µs.
 const FOREIGN_US: u64 = 40_000;
 
-/// Boards of a chain and the other senders on their bus. All boards and senders are members of a bus that the caller simulates.
+/// Boards of a chain and the other senders on their bus. All boards and other senders are members of a bus that the caller simulates.
 ///
-/// Member 0 is the first board. The last member is not a board: it sends all frames that faults add to the bus. Call
-/// [`advance`](Self::advance), then [`poll`](Self::poll) each member and put its frame on the bus. Report the result to the member with
-/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent). Then pass the frame to the other members with [`receive`](Self::receive).
+/// Bus member 0 is the first board. The last member is not a board: it sends all frames that faults add to the bus. The caller calls
+/// [`advance`](Self::advance), then [`poll`](Self::poll) for each member, and puts the frame of the member on the bus. The caller reports
+/// the result to the member with [`sent`](Self::sent) or [`not_sent`](Self::not_sent). Then the caller passes the frame to the other
+/// members with [`receive`](Self::receive).
 pub struct ChainSim {
     boards: Vec<Board>,
     profile: Profile,
     now_us: u64,
     random: u64,
-    /// Faults that have not begun.
+    /// Faults that have not begun yet.
     waiting: Vec<Fault>,
-    /// Active faults, and the times at which they end.
+    /// Active faults, each with the time at which it ends.
     holding: Vec<(u64, Fault)>,
-    /// Number of times that each identifier was on the bus, for faults that a frame triggers.
+    /// Number of times that a frame with each identifier was on the bus, for faults that a frame triggers.
     seen: BTreeMap<u16, u64>,
     /// `true` if the init wire after the board is broken.
     broken: Vec<bool>,
-    /// Members whose frames in transmission are void because their controllers were reset.
+    /// Members whose queued frames are void because their CAN controllers were reset.
     void: Vec<usize>,
     lost: f64,
     corrupted: f64,
@@ -41,7 +42,7 @@ pub struct ChainSim {
 }
 
 impl ChainSim {
-    /// Creates a chain at power-up. `profile` defines the frames of the fault `foreign-master`.
+    /// Creates a chain of boards at power-up. `profile` defines the frames of the fault `foreign-master`.
     pub fn new(config: &ChainConfig, faults: Vec<Fault>, seed: u64, profile: &Profile) -> Self {
         let board = |(i, board)| Board::new(board, i == 0, seed.wrapping_mul(31).wrapping_add(i as u64));
         let boards: Vec<Board> = config.boards.iter().enumerate().map(board).collect();
@@ -50,7 +51,7 @@ impl ChainSim {
             boards,
             profile: *profile,
             now_us: 0,
-            // The state of xorshift must not start at 0.
+            // The state of the xorshift generator must not start at 0.
             random: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
             waiting: faults,
             holding: Vec::new(),
@@ -67,7 +68,7 @@ impl ChainSim {
         sim
     }
 
-    /// Returns the number of members, which is the number of boards plus one.
+    /// Returns the number of bus members, which is the number of boards plus one.
     pub fn members(&self) -> usize {
         self.boards.len() + 1
     }
@@ -77,13 +78,13 @@ impl ChainSim {
         self.boards.iter().map(Board::state)
     }
 
-    /// Returns a status that no board can have, with the board's position. A status that no board can have shows an error in the node's
-    /// code (section 4.1).
+    /// Returns a status that no board can have, with the position of the board. Such a status shows an error in the code of the node
+    /// (section 4.1).
     pub fn violation(&self) -> Option<(usize, &'static str)> {
         self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
     }
 
-    /// Returns the time of the next event in µs. A time in the past means "at once".
+    /// Returns the time of the next event of the chain in µs. A time in the past means that the event is due at once.
     pub fn next_due_us(&self) -> u64 {
         let boards = self.boards.iter().map(Board::next_us);
         let begin = self.waiting.iter().filter_map(|fault| match fault.trigger {
@@ -95,7 +96,8 @@ impl ChainSim {
         boards.chain(begin).chain(end).chain(others).min().unwrap_or(u64::MAX)
     }
 
-    /// Advances the time, but never backwards. Returns the members whose queues on the bus must be emptied.
+    /// Sets the current time of the chain, which never moves backwards. The function returns the members whose queues on the bus must be
+    /// emptied.
     pub fn advance(&mut self, now_us: u64) -> Vec<usize> {
         self.now_us = self.now_us.max(now_us);
         self.faults();
@@ -103,7 +105,7 @@ impl ChainSim {
         std::mem::take(&mut self.void)
     }
 
-    /// Returns the next frame of a member, if the member has a frame to send now.
+    /// Returns the next frame of a bus member, if the member has a frame to send now.
     pub fn poll(&mut self, member: usize) -> Option<Frame> {
         match self.boards.get_mut(member) {
             Some(board) if board.next_us() > self.now_us => None,
@@ -112,7 +114,7 @@ impl ChainSim {
         }
     }
 
-    /// Reports that a member's frame was on the bus.
+    /// Reports to a bus member that its frame was on the bus.
     pub fn sent(&mut self, member: usize, frame: &Frame) {
         match self.boards.get_mut(member) {
             Some(board) => board.sent(self.now_us, frame),
@@ -120,32 +122,32 @@ impl ChainSim {
         }
     }
 
-    /// Reports that a member's controller discarded a frame.
+    /// Reports to a bus member that its CAN controller discarded a frame.
     pub fn not_sent(&mut self, member: usize, frame: &Frame) {
         if let Some(board) = self.boards.get_mut(member) {
             board.not_sent(self.now_us, frame);
         }
     }
 
-    /// Passes a frame of any format to a member.
+    /// Passes a frame of any format to a bus member.
     pub fn receive(&mut self, member: usize, id: u32, format: Format, data: &[u8]) {
         if let Some(board) = self.boards.get_mut(member) {
             board.receive(self.now_us, id, format, data);
         } else if let (Ok(id), true) = (u16::try_from(id), format == Format::BUS)
             && let Some(frame) = Frame::new(id, data)
         {
-            // The last member receives every frame of the other members exactly once. Therefore frames are counted here for the triggers of
-            // faults.
+            // The last bus member receives every frame of the other members exactly once. Therefore this member counts the frames that
+            // trigger faults.
             self.count(&frame);
         }
     }
 
-    /// Returns `true` if a member is active on the bus. A board without power does not even acknowledge frames.
+    /// Returns `true` if a bus member is active on the bus. A board without power does not even acknowledge frames of other bus members.
     pub fn is_powered(&self, member: usize) -> bool {
         self.boards.get(member).is_none_or(|board| !board.unpowered)
     }
 
-    /// Begins a fault now or when its trigger occurs. A trigger time is measured from the time of this call.
+    /// Begins a fault now, or when the trigger of the fault occurs. The time of a trigger is measured from the time of this call.
     pub fn inject(&mut self, mut fault: Fault) {
         match &mut fault.trigger {
             Trigger::At(at) => *at += self.now_us,
@@ -154,9 +156,10 @@ impl ChainSim {
         self.waiting.push(fault);
     }
 
-    /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients. Returns zero, one or two copies of the data.
+    /// Applies the faults `lost`, `corrupted` and `doubled` to data between the chain and its clients. The function returns zero, one or
+    /// two copies of the data.
     pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
-        // The number of random values per call is constant, so that the setting of one fault does not change the effect of the others.
+        // The number of random values per call is constant, so that the setting of one fault does not change the effect of other faults.
         let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
         if lost < self.lost {
             return Vec::new();
@@ -172,7 +175,7 @@ impl ChainSim {
         vec![data; times]
     }
 
-    /// Returns the share of frames to destroy on the wire, 0 to 1. The caller's bus destroys them.
+    /// Returns the share of frames that the bus must destroy on the wire, 0 to 1. The bus that the caller simulates destroys these frames.
     pub fn disturbance(&self) -> f64 {
         self.disturbed
     }
@@ -192,7 +195,7 @@ impl ChainSim {
         }
     }
 
-    /// Assigns the number of the previous board to a board, if the previous board has a number.
+    /// Assigns the number of the previous board in the chain to a board, if the previous board has a number.
     fn share_number(&mut self, i: usize) {
         let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
         if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {
@@ -202,14 +205,14 @@ impl ChainSim {
 
     /// Returns a random number that is at least 0 and below 1.
     fn chance(&mut self) -> f64 {
-        // xorshift64, Marsaglia 2003.
+        // The generator is xorshift64 (Marsaglia 2003).
         self.random ^= self.random << 13;
         self.random ^= self.random >> 7;
         self.random ^= self.random << 17;
         (self.random >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Returns the next frame of the other senders on the bus.
+    /// Returns the next frame of the other PC or of the other protocol.
     fn others(&mut self) -> Option<Frame> {
         if self.master_at.is_some_and(|at| at <= self.now_us) {
             self.master_at = Some(self.now_us + MASTER_US);
@@ -229,7 +232,7 @@ impl ChainSim {
         None
     }
 
-    /// Begins and ends faults that are due.
+    /// Begins and ends the faults that are due.
     fn faults(&mut self) {
         let (now, seen) = (self.now_us, &self.seen);
         let due = |fault: &Fault| match fault.trigger {

@@ -1,9 +1,9 @@
-//! Chains in virtual time on a simple test bus: one frame per 100 µs, the lowest identifier first.
+//! Tests of chains in virtual time on a simple test bus: one frame per 100 µs, the lowest identifier first.
 use super::*;
 use ucom::node::Phase;
 use ucom::{Format, Frame, Profile};
 
-/// Chain and the frames on its bus.
+/// Chain of boards, and the frames on its bus.
 struct Bench {
     sim: ChainSim,
     now_us: u64,
@@ -18,7 +18,7 @@ impl Bench {
         Self { sim: ChainSim::new(&chain, faults, seed, &profile), now_us: 0, received: Vec::new() }
     }
 
-    /// Lets time pass. Only one frame at a time is on the bus.
+    /// Advances the time of the chain by `ms` milliseconds. Only one frame at a time is on the bus.
     fn pass(&mut self, ms: u64) {
         let end = self.now_us + ms * 1000;
         let mut waiting: Vec<Option<Frame>> = vec![None; self.sim.members()];
@@ -51,7 +51,7 @@ impl Bench {
         }
     }
 
-    /// Sends a frame of the PC. Returns the frames that boards send within the given time.
+    /// Sends a frame of the PC. The function returns the frames that boards send within the given time.
     fn ask(&mut self, text: &str, ms: u64) -> Vec<String> {
         let frame: Frame = text.parse().unwrap();
         self.sim.advance(self.now_us);
@@ -85,11 +85,11 @@ fn the_same_seed_gives_the_same_frames() {
     };
     let first = run(1);
     assert!(first.len() > 300 && first == run(1));
-    // Only the back-off of flags that are sent without a request is random: the back-off depends on the seed.
+    // Only the back-off of flags that are sent without a request is random: it depends on the seed.
     assert_ne!(first, run(2));
 }
 
-/// D-26: a board that crashes sends a report without a request and loses its number. The wire after this board becomes inactive.
+/// D-26: a board that crashes sends a report without a request and loses its number. The init wire after this board becomes inactive.
 #[test]
 fn d26_a_crash_is_one_report_and_a_lost_number() {
     let mut bench = Bench::new(3, "", 1);
@@ -127,7 +127,7 @@ fn power_loss_leaves_the_flash() {
     assert_eq!(state.status.to_string(), "ASTART EXLRUN IPINIT", "ASTART is in lasting memory");
 }
 
-/// Section 8: the axes are not driven if the PC is lost.
+/// Section 8: the outputs do not drive the axes after the loss of the PC.
 #[test]
 fn d50_outputs_are_safe_when_the_pc_is_lost() {
     let mut bench = Bench::new(1, "", 1);
@@ -159,7 +159,7 @@ fn faults_between_chain_and_clients_follow_their_shares() {
     assert!(line("lost share=0").iter().all(|f| *f == [vec![0x55; 8]]));
 }
 
-/// D-24: a board that takes the number of the previous board also answers to it, until the chain is renumbered.
+/// D-24: a board that takes the number of the previous board also answers to this number, until the chain is renumbered.
 #[test]
 fn d24_two_boards_with_one_number() {
     let mut bench = Bench::new(3, "", 1);

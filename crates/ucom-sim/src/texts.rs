@@ -1,28 +1,28 @@
-//! Texts of a program: its description and the names of its inputs, outputs and parameters, in Latin-1.
+//! Texts of an application: its description and the names of its inputs, outputs and parameters, in Latin-1.
 
 use ucom::node::Text;
 
-/// Texts of a program, in Latin-1.
+/// Texts of an application, in Latin-1.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Texts {
     /// Description of the application.
     pub application: Vec<u8>,
-    /// Names of the inputs.
+    /// Names of the controller inputs.
     pub ci: Vec<Vec<u8>>,
-    /// Names of the outputs.
+    /// Names of the sensor outputs.
     pub so: Vec<Vec<u8>>,
     /// Names of the parameters.
     pub par: Vec<Vec<u8>>,
 }
 
 impl Texts {
-    /// Creates texts from a description and names. Characters that Latin-1 does not contain are replaced by `?`.
+    /// Creates the texts of an application from a description and names. Characters that Latin-1 does not contain are replaced by `?`.
     pub fn new<T: AsRef<str>>(application: &str, ci: &[T], so: &[T], par: &[T]) -> Self {
         let list = |names: &[T]| names.iter().map(|name| latin1(name.as_ref())).collect();
         Self { application: latin1(application), ci: list(ci), so: list(so), par: list(par) }
     }
 
-    /// Returns a text; returns an empty text if it does not exist.
+    /// Returns a text of the application; returns an empty text if the application has no such text.
     pub fn get(&self, text: Text) -> &[u8] {
         let (list, index) = match text {
             Text::Application => return &self.application,
@@ -34,7 +34,7 @@ impl Texts {
     }
 }
 
-/// Converts to Latin-1. Characters that Latin-1 does not contain are replaced by `?`.
+/// Converts a text to Latin-1. Characters that Latin-1 does not contain are replaced by `?`.
 pub(super) fn latin1(text: &str) -> Vec<u8> {
     text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect()
 }

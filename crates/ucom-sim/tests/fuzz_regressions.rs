@@ -1,4 +1,4 @@
-//! Runs the code of the fuzz targets with stored inputs, some manual inputs, and random inputs.
+//! Runs the code of the fuzz targets with stored inputs, some handwritten inputs, and random inputs.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};
@@ -11,8 +11,7 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// A history that consists of a number, a start and a run, and of a frame that is too short. The test also runs all truncations of this
-/// history.
+/// The input contains a number, a start, a run, and a frame that is too short. The test also runs all truncations of this input.
 #[test]
 fn a_history() {
     let mut history = Vec::new();

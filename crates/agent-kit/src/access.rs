@@ -1,9 +1,10 @@
 //! Access control: tokens, and checks of the origin of a request.
 //!
-//! A page of another site that is open in a browser can send requests to the address of this computer. The agent
-//! recognises such a request by the `Origin` header. A page can also point its own host name to this computer (DNS
-//! rebinding). The agent recognises a request of such a page by the `Host` header. The agent refuses both kinds of
-//! request, even with a valid token.
+//! A web page of another site that is open in a browser can send requests to the address of this computer. The agent
+//! recognises a request of a page of another site by the `Origin` header. A web page can also point its own host name
+//! to the address of this computer (DNS rebinding). After DNS rebinding, the agent recognises a request of the page
+//! by the `Host` header, which contains the page's host name. The agent refuses a request of a page of another site,
+//! even with a valid token, unless the page's origin has read-only access.
 mod paths;
 mod tokens;
 
@@ -28,8 +29,8 @@ pub enum Role {
     Operator,
 }
 
-/// Number of wrong tokens per minute that are reported as wrong, per address and from all addresses together. Further
-/// wrong tokens are refused with "too many".
+/// Largest number of wrong tokens per minute from one address. `ALL_WRONG_MAX` is the limit for all addresses
+/// together. If a limit for wrong tokens is reached, the agent answers a further wrong token with "too many".
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -37,7 +38,7 @@ const MINUTE: Duration = Duration::from_secs(60);
 /// Reason why a request is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// Request for a host name that this agent does not have.
+    /// Request for a host name that does not belong to this agent.
     #[error("host {0} does not belong to this agent: expected its address, or a name set with --name")]
     Host(String),
     /// Request from a web page of another site.
@@ -49,10 +50,11 @@ pub enum Refusal {
     /// Request without a token.
     #[error("token missing: expected the header `Authorization: Bearer …`")]
     NoToken,
-    /// Operator's token in a URL; the agent refuses it because URLs are stored in histories and logs.
+    /// Operator's token in a URL. The agent refuses an operator's token in a URL because URLs are stored in histories
+    /// and logs.
     #[error("the operator's token is not accepted in an address (URL)")]
     InAddress,
-    /// Too many wrong tokens from this address.
+    /// Too many wrong tokens from the address of the client.
     #[error("too many invalid tokens were sent from this address")]
     TooManyWrong,
 }
@@ -62,17 +64,19 @@ pub enum Refusal {
 pub struct Request<'a> {
     /// Address that the request comes from.
     pub peer: IpAddr,
-    /// `Host`.
+    /// `Host` header of the request.
     pub host: Option<&'a str>,
     /// `Origin` header, which browsers send.
     pub origin: Option<&'a str>,
     /// Token of the request, if it has one.
     pub token: Option<&'a str>,
-    /// Token in the URL, for clients that cannot send it in a header; only the viewer's token is accepted there.
+    /// Token in the URL, for clients that cannot send a token in a header. The agent accepts only the viewer's token
+    /// in a URL.
     pub address_token: Option<&'a str>,
-    /// `true` if the request cannot change anything, so that pages of allowed origins may read its answer.
+    /// `true` if the request cannot change anything. Pages of allowed origins may read the answer to a request that
+    /// cannot change anything.
     pub looks: bool,
-    /// `true` for a Stop or a Pause ([`halts`]), which need no token on this computer.
+    /// `true` for a Stop or a Pause ([`halts`]). A client on this computer needs no token for a Stop or a Pause.
     pub halts: bool,
 }
 
@@ -89,7 +93,7 @@ pub struct Entry {
 ///
 /// # Errors
 ///
-/// The text is not a valid origin, or is a wildcard for several origins. The error is a message for the user.
+/// The text is not a valid origin, or it is a wildcard for several origins. The error is a message for the user.
 pub fn origin(text: &str) -> Result<String, String> {
     let text = text.trim().to_lowercase();
     if text == "file://" {
@@ -116,8 +120,7 @@ pub struct Access {
 }
 
 impl Access {
-    /// Returns the rules of an agent that listens at `listen` and has the names in the argument in addition to its
-    /// address.
+    /// Returns the access rules of an agent that listens at `listen`. `names` are further host names of the agent.
     pub fn new(tokens: Tokens, listen: SocketAddr, names: &[String]) -> Self {
         let port = listen.port();
         let mut hosts: Vec<String> = names
@@ -131,7 +134,7 @@ impl Access {
         Self { tokens, hosts, origins: Vec::new(), wrong: Mutex::new(Vec::new()) }
     }
 
-    /// Allows read-only access for pages of these origins, in the form that [`origin`] returns.
+    /// Allows read-only access for web pages of `origins`, in the form that [`origin`] returns.
     pub fn allowing(self, origins: &[String]) -> Self {
         Self { origins: origins.to_vec(), ..self }
     }
@@ -140,11 +143,11 @@ impl Access {
     ///
     /// # Errors
     ///
-    /// [`Refusal`].
+    /// A [`Refusal`] if the request is not allowed.
     pub fn enter(&self, request: &Request<'_>) -> Result<Entry, Refusal> {
         let looks_only = self.is_foreign(request)?;
         let role = match self.role(request) {
-            // Without a token this request would be accepted, so an outdated token in a program's settings must not
+            // A Stop from this computer needs no token. An outdated token in a program's settings must therefore not
             // prevent a Stop.
             Err(_) if request.halts && request.peer.to_canonical().is_loopback() => Role::Viewer,
             role => role?,
@@ -152,7 +155,7 @@ impl Access {
         Ok(Entry { role: if looks_only { Role::Viewer } else { role }, looks_only })
     }
 
-    /// Returns the role of the token, without the check of the origin.
+    /// Returns the role of the token, without checking the origin of the request.
     fn role(&self, request: &Request<'_>) -> Result<Role, Refusal> {
         match (request.token, request.address_token) {
             (Some(token), _) => self.bearer(token, request.peer),
@@ -169,7 +172,7 @@ impl Access {
     ///
     /// # Errors
     ///
-    /// [`Refusal::Host`], [`Refusal::Origin`].
+    /// [`Refusal::Host`] or [`Refusal::Origin`].
     pub fn is_foreign(&self, request: &Request<'_>) -> Result<bool, Refusal> {
         let site = request.origin.map(str::to_lowercase);
         match self.is_own(request.host, request.origin) {
@@ -186,7 +189,7 @@ impl Access {
     ///
     /// # Errors
     ///
-    /// [`Refusal::Host`], [`Refusal::Origin`].
+    /// [`Refusal::Host`] or [`Refusal::Origin`].
     pub fn is_own(&self, host: Option<&str>, origin: Option<&str>) -> Result<(), Refusal> {
         let host = host.unwrap_or_default().to_lowercase();
         if !self.hosts.contains(&host) {
@@ -198,7 +201,7 @@ impl Access {
         }
         let Some(origin) = origin else { return Ok(()) };
         let site = origin.to_lowercase();
-        // The agent's own page, not a page of another agent on this computer.
+        // The request comes from the agent's own page, not from a page of another agent on this computer.
         match site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) {
             Some(own) if own == host => Ok(()),
             _ => Err(Refusal::Origin(cut(origin).into_owned())),
@@ -207,8 +210,8 @@ impl Access {
 
     fn bearer(&self, token: &str, peer: IpAddr) -> Result<Role, Refusal> {
         let is = |other: &str| bool::from(token.as_bytes().ct_eq(other.as_bytes()));
-        // Both tokens are compared before wrong tokens are counted, so that wrong tokens from other clients never
-        // prevent a Stop from a client with a valid token.
+        // Each token is compared with both valid tokens before wrong tokens are counted. Wrong tokens from other
+        // clients therefore never prevent a Stop from a client with a valid token.
         match (is(&self.tokens.operator), is(&self.tokens.viewer)) {
             (true, _) => return Ok(Role::Operator),
             (_, true) => return Ok(Role::Viewer),
@@ -359,7 +362,7 @@ mod tests {
             assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::WrongToken));
         }
         assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::TooManyWrong));
-        // Clients that send a valid token or need no token are still accepted.
+        // The agent still accepts clients that send a valid token or need no token.
         assert_eq!(from(Some(&"o".repeat(43))), Ok(Role::Operator));
         assert_eq!(role(&access, "127.0.0.1", Some(HERE), None, None), Ok(Role::Viewer));
     }
@@ -380,7 +383,7 @@ mod tests {
             (None, Some("0123456789abcdefghij")),
             (None, Some(operator.as_str())),
         ];
-        // The result is the same after too many wrong tokens.
+        // The results stay the same after too many wrong tokens: a Stop from this computer is still accepted.
         for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
             for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
                 assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");

@@ -1,4 +1,4 @@
-//! Parts that the APIs of agents share: errors, extractors for requests, and the identity of the caller.
+//! Parts that the APIs of agents share: errors, extractors for requests, and the identity of the client.
 use axum::Json;
 use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};

@@ -3,17 +3,18 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-/// Longest text from a client in a log or an answer (a path, a Host, an Origin), in characters.
+/// Longest text from a client (a path, a Host, an Origin) in a log line or an answer, in
+/// characters.
 const FOREIGN_MAX: usize = 200;
 /// Longest text in a line of the command log, in characters.
 const LOGGED_MAX: usize = 1000;
 
-/// Returns at most 200 characters of a text.
+/// Returns at most the first 200 characters of a text.
 pub(crate) fn cut(text: &str) -> Cow<'_, str> {
     cut_at(text, FOREIGN_MAX)
 }
 
-/// Returns the first and the last 200 characters of a message that contains text from a client.
+/// Returns the first and the last 200 characters of a message that may contain long text from a client.
 pub(crate) fn cut_middle(text: &str) -> Cow<'_, str> {
     let length = text.chars().count();
     if length <= 2 * FOREIGN_MAX {

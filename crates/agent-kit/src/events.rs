@@ -1,4 +1,4 @@
-//! Events as numbered lists, and a live stream of events together with the state of an agent.
+//! Events of an agent as numbered lists, and as a live stream together with the agent's state.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,13 +17,13 @@ use crate::socket::{ended, pass};
 const WAIT_MAX_S: f64 = 8.0;
 /// Largest number of events in one answer.
 const EVENTS_MAX: usize = 500;
-/// Number of requests that can wait for an event at the same time. More requests wait only [`NO_PLACE_S`], so that
+/// Number of requests that can wait for an event at the same time. Further requests wait only [`NO_PLACE_S`], so that
 /// connections remain free for other clients.
 const WAITING_MAX: usize = 64;
-/// Longest wait of a request when the maximum number of requests already waits, in seconds. This wait limits the load
-/// by clients that repeat the request immediately.
+/// Longest wait of a request for an event, in seconds, when the maximum number of requests already waits. The wait
+/// limits the load if clients repeat their request immediately.
 const NO_PLACE_S: f64 = 0.25;
-/// Shortest interval between two messages of a stream, if the messages are not events.
+/// Shortest interval between two messages of a stream that are not events.
 const PERIOD: Duration = Duration::from_millis(40);
 
 /// Selection of events.
@@ -57,14 +57,14 @@ pub struct EventsObject<E> {
     missed: bool,
 }
 
-/// Start of a stream of events.
+/// First message of a client that starts a stream of events.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StreamRequest {
-    /// Token, which the access gate has already checked.
+    /// Token of the client, which the access gate has already checked.
     #[serde(default, rename = "token")]
     _token: Option<serde::de::IgnoredAny>,
-    /// Number of the last event that the client has; missing: only new events.
+    /// Number of the last event that the client has received; if missing, the stream contains only new events.
     after: Option<u64>,
 }
 
@@ -72,18 +72,18 @@ pub struct StreamRequest {
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage<E> {
-    /// Events in order; only events that are reported as missed are omitted.
+    /// Events of the journal in order. If events were dropped from the journal, the message reports them as missed.
     Events(EventsObject<Entry<E>>),
 }
 
-/// Event requests of an agent.
+/// Requests for events of an agent.
 pub struct Events {
     agent: Arc<str>,
     waiting: Semaphore,
 }
 
 impl Events {
-    /// Creates the event requests for this run number of the agent.
+    /// Creates the event service for one run of the agent, with the run number `agent`.
     pub fn new(agent: Arc<str>) -> Self {
         Self { agent, waiting: Semaphore::new(WAITING_MAX) }
     }
@@ -93,12 +93,12 @@ impl Events {
         EventsObject { agent: self.agent.to_string(), events, last, missed }
     }
 
-    /// Returns the requested events. If the list is empty, waits for the first event; the number of waiting requests is
-    /// limited.
+    /// Returns the events that the client requests. If no such event exists yet, waits for the first event. The number
+    /// of requests that wait at the same time is limited.
     ///
     /// # Errors
     ///
-    /// The requested wait is longer than allowed.
+    /// The requested wait is outside 0 to 8 s.
     pub async fn ask<E: JournalEvent>(
         &self,
         journal: &Journal<E>,
@@ -125,9 +125,9 @@ impl Events {
         }
     }
 
-    /// Sends events on a socket as they occur, and the messages that `show` returns. `show` also returns the time of
-    /// its next call; `show` is called earlier if `changes` announces a change. Ends when the client disconnects, does
-    /// not read, or sends a message that is not expected.
+    /// Sends events on a WebSocket as they occur, and the messages that `show` returns. `show` also returns the time at
+    /// which it must be called again. If `changes` announces a change, `show` is called earlier. Ends when the client
+    /// disconnects, does not read, or sends an unexpected message.
     pub async fn stream<E: JournalEvent + Serialize, M: Serialize>(
         &self,
         (journal, request): (&Journal<E>, StreamRequest),
@@ -154,7 +154,8 @@ impl Events {
                     return;
                 }
             }
-            // Limits the rate of messages. During this wait, the client may only end the connection.
+            // The interval limits the rate of messages. During the interval between two messages, the client may only
+            // close the connection.
             let next = async {
                 period.tick().await;
                 tokio::select! {

@@ -32,17 +32,17 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Returns a gate with the rules `access`.
+    /// Creates a gate with the access rules `access`.
     pub fn new(access: Access, log: Arc<Mutex<CommandLog>>) -> Self {
         Self { access: Arc::new(access), log }
     }
 
-    /// Checks that a request uses a name of this agent and was not sent by a page of another site. Does not check
-    /// permissions.
+    /// Checks that a request uses a name of this agent and that no page of another site sent the request. Does not
+    /// check the permissions of the client.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Host`], [`Refusal::Origin`].
+    /// [`Refusal::Host`] or [`Refusal::Origin`].
     pub fn is_own(&self, headers: &HeaderMap) -> Result<(), Refusal> {
         let (host, origin) = (text_of(headers, header::HOST), text_of(headers, header::ORIGIN));
         self.access.is_own(host, origin)
@@ -53,8 +53,8 @@ impl Gate {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Writes a line to the command log about an address that can cause many lines. The first lines are written in
-    /// full; later lines are only counted.
+    /// Writes a line to the command log about a client address that can cause many lines. The first lines about an
+    /// address are written in full; later lines are only counted.
     pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         log.write_repeated(what, &from.ip().to_string(), facts);
@@ -77,7 +77,7 @@ pub struct Caller {
     pub peer: SocketAddr,
 }
 
-/// Client that sends a request, with the lease key in its request, if any.
+/// Client that sends a request, and the lease key in the request, if any.
 #[derive(Clone, Debug)]
 pub struct Asker {
     /// Client that sends the request.
@@ -93,7 +93,7 @@ impl Asker {
 }
 
 impl From<Caller> for Asker {
-    /// Returns the caller without a lease key.
+    /// Returns the client without a lease key.
     fn from(caller: Caller) -> Self {
         Self { caller, key: None }
     }
@@ -108,17 +108,17 @@ impl<S: Send + Sync> FromRequestParts<S> for Asker {
     }
 }
 
-/// Returns a name without control characters, at most 64 characters long.
+/// Returns a client's name without control characters, at most 64 characters long.
 pub fn plain(name: &str) -> String {
     name.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect()
 }
 
 impl Caller {
-    /// Checks that the client may send commands when it holds the lease.
+    /// Checks that the client has the permission to send commands while it holds the lease.
     ///
     /// # Errors
     ///
-    /// The client has only read-only access and Stop.
+    /// The client is a viewer: it may only read and stop.
     pub fn operator(&self) -> Result<(), Problem> {
         match self.role {
             Role::Operator => Ok(()),
@@ -138,7 +138,8 @@ impl Caller {
     }
 }
 
-/// Middleware in front of every handler: identifies the client and refuses requests that are not allowed.
+/// Middleware in front of every handler: identifies the client and refuses requests that the access rules do not
+/// allow.
 pub async fn let_in(
     State(gate): State<Gate>,
     ConnectInfo(peer): ConnectInfo<SocketAddr>,
@@ -159,7 +160,7 @@ pub async fn let_in(
         looks: looks(method, request.uri().path()),
         halts: halts(method, request.uri().path()),
     };
-    // A browser sends a preflight request without a token, to check if its page may send the actual request.
+    // A browser sends a preflight request without a token, to check whether its page may send the actual request.
     let origin = headers.get(header::ORIGIN).cloned();
     if preflight && gate.access.is_foreign(&asked) == Ok(true) {
         return may_read(StatusCode::NO_CONTENT.into_response(), origin);
@@ -192,13 +193,13 @@ pub async fn let_in(
     }
 }
 
-/// Returns method and path of a request without the query.
+/// Returns the method and the path of a request, without the query.
 fn line_of(request: &Request<Body>) -> String {
     format!("{} {}", cut(request.method().as_str()), cut(request.uri().path()))
 }
 
-/// Middleware after [`let_in`]: refuses clients that may not command before the body is read, so that slow bodies do
-/// not occupy the agent.
+/// Middleware after [`let_in`]: refuses commands of clients without permission to send commands. The command is
+/// refused before its body is read, so that slow bodies do not occupy the agent.
 pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     let (method, path) = (request.method(), request.uri().path());
     let commands = !method.is_safe() && !halts(method.as_str(), path);
@@ -209,8 +210,8 @@ pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     }
 }
 
-/// Returns the token of `Authorization: Bearer TOKEN`; the scheme is not case-sensitive (RFC 9110, 11.1). Returns an
-/// empty text for any other header; an empty text is never a valid token.
+/// Returns the token of the header `Authorization: Bearer TOKEN`; the scheme is not case-sensitive (RFC 9110, 11.1).
+/// Returns an empty text for a header of any other form; an empty text is never a valid token.
 fn bearer_token(value: &str) -> &str {
     match value.split_once(' ') {
         Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => token.trim(),
@@ -218,7 +219,7 @@ fn bearer_token(value: &str) -> &str {
     }
 }
 
-/// Adds the headers that permit a page of this origin to read the response.
+/// Adds the headers that permit a page of `origin` to read the response.
 fn may_read(mut response: Response, origin: Option<HeaderValue>) -> Response {
     let headers = response.headers_mut();
     if let Some(origin) = origin {
@@ -230,13 +231,13 @@ fn may_read(mut response: Response, origin: Option<HeaderValue>) -> Response {
     response
 }
 
-/// Token in a query.
+/// Token in the query of a URL.
 #[derive(serde::Deserialize)]
 struct InAddress {
     token: Option<String>,
 }
 
-/// Returns the token in the URL of a WebSocket, for clients that cannot send headers.
+/// Returns the token in the URL of a WebSocket request, for clients that cannot send headers.
 fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     let socket = headers.contains_key(header::SEC_WEBSOCKET_KEY);
     let looks = ["/", "/api/foxglove", "/api/stream"].contains(&uri.path());
@@ -244,15 +245,15 @@ fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     asked.and_then(|Query(asked)| asked.token)
 }
 
-/// Returns the token in the protocol list of a page's WebSocket. A page of a browser can set no other header of a
-/// WebSocket than this list, and browsers do not store the list in a history.
+/// Returns the token in the protocol list of a WebSocket that a web page opens. A page in a browser can set only
+/// this header of a WebSocket, and browsers do not store the header in a history.
 fn protocol_token(headers: &HeaderMap) -> Option<&str> {
     let protocols = text_of(headers, header::SEC_WEBSOCKET_PROTOCOL)?;
     protocols.split(',').find_map(|name| name.trim().strip_prefix(BEARER))
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // A header that is not text counts as present, but it is never valid.
+    // A header that is not text counts as present, but its value is never valid.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

@@ -1,5 +1,5 @@
-//! Numbered Stops and Pauses. A motion request that was issued before a Stop or Pause never moves the arm, even if it
-//! arrives later.
+//! Numbered Stops and Pauses. A motion request that a client sent before a Stop or Pause never moves the arm, even if
+//! the request arrives later.
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use host_kit::Facts;
@@ -9,7 +9,7 @@ use crate::api::{Asked, Problem};
 
 /// Counter of the Stops and Pauses that clients have requested.
 pub trait Halts {
-    /// Returns the number of the last Stop or Pause; 0 if there was none yet.
+    /// Returns the number of the last Stop or Pause; 0 before the first Stop or Pause.
     fn last_halt(&self) -> u64;
 }
 
@@ -25,13 +25,15 @@ pub struct KnownHalt {
     pub asked_after: Option<u64>,
 }
 
-/// Number of the last Stop or Pause before a request. If the client sends no number, the last Stop or Pause before the
-/// head of the request arrived applies. The number is read before the body, which may arrive slowly.
+/// Number of the last Stop or Pause before a motion request. If the client sends no number, the agent uses the last
+/// Stop or Pause before the head of the request arrived. The agent reads the number of the last Stop or Pause before
+/// it reads the body, which may arrive slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 
 impl KnownHalt {
-    /// Returns the last Stop or Pause before the request; `last` is the last one that was counted.
+    /// Returns the number of the last Stop or Pause before the request; `last` is the number of the last counted Stop
+    /// or Pause.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Journal of numbered events; a client that lost the connection requests the events after the last event that it
+//! Journal of numbered events. A client that lost its connection requests all events after the last event that it
 //! received.
 use std::collections::VecDeque;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -6,8 +6,8 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-/// Number of events that are stored. This number is enough for some hours of work, or for the last minutes of a device
-/// that reports often.
+/// Number of events that the journal stores. 4096 events are enough for some hours of work, or for the last minutes of
+/// a device that reports often.
 const KEPT: usize = 4096;
 
 /// Event of a journal.
@@ -33,9 +33,10 @@ pub struct Entry<E> {
 pub struct Excerpt<E> {
     /// Events, oldest first.
     pub events: Vec<Entry<E>>,
-    /// Number to continue from. The excerpt is complete up to this number.
+    /// Number of the event after which the next request continues. The excerpt contains every requested event up to
+    /// this number.
     pub last: u64,
-    /// `true` if some requested events were dropped from the journal.
+    /// `true` if the journal has already dropped some of the requested events.
     pub missed: bool,
 }
 
@@ -44,7 +45,7 @@ struct Kept<E> {
     last: u64,
 }
 
-/// Callback that receives each event when it is written.
+/// Callback that receives each event when the event is written.
 type Follower<E> = Box<dyn Fn(&E) + Send + Sync>;
 
 /// Stored events of an agent.
@@ -62,13 +63,13 @@ impl<E> Default for Journal<E> {
 }
 
 impl<E: JournalEvent> Journal<E> {
-    /// Sets the callback for each further event; the callback runs in the thread that writes the event. Only the first
-    /// call has an effect.
+    /// Sets the callback for all later events; the callback runs in the thread that writes the event. Only the first
+    /// call of `follow` has an effect.
     pub fn follow(&self, follower: impl Fn(&E) + Send + Sync + 'static) {
         let _ = self.follower.set(Box::new(follower));
     }
 
-    /// Writes an event.
+    /// Writes an event to the journal.
     pub fn write(&self, event: E) {
         if let Some(follower) = self.follower.get() {
             follower(&event);
@@ -81,11 +82,11 @@ impl<E: JournalEvent> Journal<E> {
             kept.events.pop_front();
         }
         kept.events.push_back(Entry { number, unix_s: unix.as_secs_f64(), event });
-        // The lock is held here, so that the numbers are announced in order.
+        // The lock of the journal is still held, so the numbers of events are announced in order.
         self.last.send_replace(number);
     }
 
-    /// Returns the number of the last event; 0 if there was none yet.
+    /// Returns the number of the last event; 0 before the first event.
     pub fn last(&self) -> u64 {
         *self.last.borrow()
     }
@@ -95,7 +96,7 @@ impl<E: JournalEvent> Journal<E> {
         self.last.subscribe()
     }
 
-    /// Returns at most `most` events after the number `after`; with `job`, only the events of this job.
+    /// Returns at most `most` events after the number `after`. If `job` is set, returns only the events of this job.
     pub fn after(&self, after: u64, job: Option<u64>, most: usize) -> Excerpt<E> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let oldest = kept.events.front().map_or(kept.last + 1, |event| event.number);
@@ -122,8 +123,7 @@ mod tests {
         }
     }
 
-    /// After any loss of the connection, a client that continues from its last number receives every event once and in
-    /// order.
+    /// A client that continues from its last number after a lost connection receives every event once and in order.
     #[test]
     fn events_are_resumed_by_their_numbers() {
         let journal = Journal::default();

@@ -1,4 +1,4 @@
-//! Lease for clients without a connection of their own: a request with the client's key shows that the client still
+//! Lease for clients without a permanent connection: each request with the client's key shows that the client still
 //! runs.
 mod held;
 
@@ -12,23 +12,23 @@ use utoipa::{IntoParams, ToSchema};
 use crate::api::Problem;
 pub use held::{Lease, Presence};
 
-/// Header with the key of a lease.
+/// HTTP header that contains the key of a lease.
 pub const KEY: &str = "lease-key";
-/// Allowed time until a lease without a request ends, in seconds.
+/// Allowed range of the time until a lease without a request lapses, in seconds.
 const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
-/// Default time until a lease without a request ends, in seconds.
+/// Default time until a lease without a request lapses, in seconds.
 const LASTS_DEFAULT_S: f64 = 10.0;
-/// Largest number of clients that are registered at the same time.
+/// Largest number of clients that the agent registers at the same time.
 const CLIENTS_MAX: usize = 32;
-/// Time from the end of the lease of a silent client until the client is removed.
+/// Time from the end of the lease of a silent client until the agent removes the client.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
-/// Returns the default time until a lease without a request ends, in seconds.
+/// Returns the default time until a lease without a request lapses, in seconds.
 pub fn default_lasts_s() -> f64 {
     LASTS_DEFAULT_S
 }
 
-/// Returns the time until a lease without a request ends.
+/// Returns the time until a lease without a request lapses.
 ///
 /// # Errors
 ///
@@ -66,18 +66,19 @@ pub struct LeaseState {
     pub wanted_by: Option<String>,
 }
 
-/// Number of a client; numbers are not used again.
+/// Number of a client; the agent does not use the number again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
 
-/// Client, and the rules of its lease. `P` is the policy for the client's work after the lease has lapsed.
+/// Client that is registered at an agent, and the rules of its lease. `P` is the type of the policy for the client's
+/// work after the lease has lapsed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Client<P> {
     /// Number of the client.
     pub id: ClientId,
-    /// Name of the client that users see.
+    /// Name of the client, which users see.
     pub name: String,
-    /// Time until the client's lease ends without a request.
+    /// Time until the client's lease lapses without a request.
     pub lasts: Duration,
     /// Policy for the client's work after its lease has lapsed.
     pub policy: P,
@@ -90,26 +91,26 @@ pub enum Denied {
     /// Another client holds the lease.
     #[error("{holder} has held the lease for {age_s} s: only one client can hold it at a time")]
     Held {
-        /// Name of the holder.
+        /// Name of the lease holder.
         holder: String,
-        /// Time since the holder took the lease, s.
+        /// Time since the lease holder took the lease, s.
         age_s: u64,
     },
     /// Another client already waits for the lease.
     #[error("{by} already waits for the lease of {holder}: only one client can wait for it")]
     Awaited {
-        /// Name of the holder.
+        /// Name of the lease holder.
         holder: String,
-        /// Name of the waiting client.
+        /// Name of the client that already waits for the lease.
         by: String,
     },
-    /// The client sends no key.
+    /// The request of the client contains no lease key.
     #[error("this request needs a lease")]
     NoKey,
-    /// The key belongs to no lease.
+    /// The lease key of the request is not registered.
     #[error("the lease key is unknown, or its lease lapsed long ago")]
     Unknown,
-    /// Too many clients are registered.
+    /// The maximum number of clients is registered.
     #[error("too many clients have requested a lease")]
     Full,
 }
@@ -148,7 +149,7 @@ impl From<Denied> for Problem {
 /// Clients of an agent. At most one client holds the lease. All times are measured by the agent's clock.
 pub struct Leases<P> {
     clients: BTreeMap<String, Client<P>>,
-    /// Lease, in which clients are identified by their keys.
+    /// Lease; the key of each client identifies the client.
     held: Option<Lease<String>>,
     last: u64,
 }
@@ -165,14 +166,15 @@ pub fn key_of(headers: &HeaderMap) -> Option<&str> {
 }
 
 impl<P: Clone> Leases<P> {
-    /// Registers a client, which takes the lease if it is free. If another client holds the lease, a client with `ask`
-    /// waits for it. Returns the client's number, and `true` if the client holds the lease. The first waiting client
-    /// stays first until it receives the lease, is removed, or is silent for the duration of its own lease.
+    /// Registers a client, which takes the lease if it is free. If another client holds the lease and `ask` is `true`,
+    /// the new client waits for the lease. Returns the client's number, and `true` if the client holds the lease. The
+    /// first waiting client keeps its position until it receives the lease or is removed. If the waiting client is
+    /// silent for the duration of its own lease, another client can take its position.
     ///
     /// # Errors
     ///
-    /// [`Denied`]: another client holds the lease or waits for it, or too many clients are registered. In these cases
-    /// the client is not registered.
+    /// [`Denied`]: another client holds the lease or waits for it, or the maximum number of clients is registered and
+    /// none of them can be removed. If an error is returned, the client is not registered.
     pub fn admit(
         &mut self,
         key: &str,
@@ -190,8 +192,8 @@ impl<P: Clone> Leases<P> {
             other => other.is_none(),
         };
         if self.clients.len() >= CLIENTS_MAX {
-            // The client that has been silent longest is removed, so that a program that restarts repeatedly does not
-            // block other clients.
+            // The agent removes the client that has been silent longest. A program that restarts repeatedly therefore
+            // does not block other clients.
             let holder = self.held.as_ref().map(|held| held.holder.clone());
             let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
             let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
@@ -209,22 +211,23 @@ impl<P: Clone> Leases<P> {
         Ok((id, held))
     }
 
-    /// Returns the client with this key, and records the time of this request.
+    /// Returns the client with this key, and stores the time of this request.
     ///
     /// # Errors
     ///
-    /// [`Denied::NoKey`], [`Denied::Unknown`].
+    /// [`Denied::NoKey`] or [`Denied::Unknown`].
     pub fn client(&mut self, key: Option<&str>, now: Duration) -> Result<Client<P>, Denied> {
         let client = self.clients.get_mut(key.ok_or(Denied::NoKey)?).ok_or(Denied::Unknown)?;
         client.seen = now;
         Ok(client.clone())
     }
 
-    /// Returns the client with this key. Renews the client's lease, or takes the lease for this client if it is free.
+    /// Returns the client with this key. Renews the client's lease. If no client holds the lease, this client takes
+    /// the lease.
     ///
     /// # Errors
     ///
-    /// [`Denied`].
+    /// [`Denied`] if the client cannot take the lease.
     pub fn command(&mut self, key: Option<&str>, now: Duration) -> Result<Client<P>, Denied> {
         let client = self.client(key, now)?;
         let key = key.unwrap_or_default();
@@ -235,7 +238,7 @@ impl<P: Clone> Leases<P> {
         Ok(client)
     }
 
-    /// Releases the lease and removes the client. The lease passes to the waiting client if there is one.
+    /// Releases the lease of a client and removes the client. A client that waits for the lease receives it.
     pub fn release(&mut self, key: &str, now: Duration) {
         self.clients.remove(key);
         if let Some(held) = self.held.take_if(|held| held.holder == key) {
@@ -243,10 +246,11 @@ impl<P: Clone> Leases<P> {
         }
     }
 
-    /// Ends a lease that has lapsed and returns its former holder. The lease passes to the waiting client if there is
-    /// one. Also removes clients that no longer send requests.
+    /// Ends a lease that has lapsed and returns its former holder. A client that waits for the lease receives it.
+    /// Also removes clients that have stopped sending requests.
     pub fn lapse(&mut self, now: Duration) -> Option<Client<P>> {
-        // The holder is never removed before its lease has lapsed, because the policy of the holder must be applied.
+        // The lease holder is never removed before its lease has lapsed, because the agent must apply the holder's
+        // policy.
         let holder = self.held.as_ref().map(|held| held.holder.clone());
         self.clients.retain(|key, client| {
             Some(key) == holder.as_ref() || now.saturating_sub(client.seen) < client.lasts + FORGOTTEN
@@ -262,7 +266,7 @@ impl<P: Clone> Leases<P> {
         held.and_then(|held| self.clients.get(&held.holder)).is_some_and(|holder| holder.id == client)
     }
 
-    /// Returns the key of the client that waits for the lease, if this client is still registered and not silent.
+    /// Returns the key of the client that waits for the lease, if this client is registered and not silent.
     fn first(&self, now: Duration) -> Option<&String> {
         self.held.as_ref()?.first(|key| {
             let client = self.clients.get(key);
@@ -274,12 +278,13 @@ impl<P: Clone> Leases<P> {
 
     fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
         self.held = held.next(|next| self.clients.get(next).map(|client| Some(client.lasts)), now);
-        // The new holder is treated as if it had just sent a request, so that the holder is not removed too early.
+        // The new lease holder is treated as if it had just sent a request, so that the agent does not remove it too
+        // early.
         let next = self.held.as_ref().and_then(|held| self.clients.get_mut(&held.holder));
         next.into_iter().for_each(|client| client.seen = now);
     }
 
-    /// Returns the lease with the names of the holder and of the waiting client.
+    /// Returns the lease with the names of the lease holder and of the waiting client.
     pub fn lease(&self) -> Option<Lease<String>> {
         let Lease { holder, since, until, wanted_by } = self.held.as_ref()?;
         let name = |key: &String| self.clients.get(key).map(|client| client.name.clone());
@@ -332,12 +337,12 @@ mod tests {
         );
         assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
         assert!(leases.holds(ClientId(2), s(13)));
-        // A command renews the lease; without further commands the lease lapses once.
+        // A command renews the lease. Without a further command, the lease lapses once.
         assert!(leases.command(Some("bob"), s(13)).is_ok());
         assert_eq!(leases.lapse(s(22)), None);
         assert_eq!(leases.lapse(s(23)).map(|client| client.name), Some("bob".into()));
         assert_eq!(leases.lapse(s(24)), None);
-        // A client that returns soon enough takes the lease again.
+        // A client that sends a command before the agent removes it can take the lease again.
         assert!(leases.command(Some("bob"), s(30)).is_ok());
         assert!(leases.lapse(s(40)).is_some() && leases.lapse(s(200)).is_none());
         assert_eq!(leases.command(Some("bob"), s(200)).err(), Some(Denied::Unknown));
@@ -352,7 +357,8 @@ mod tests {
         assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), Some(s(7)))));
         assert!(leases.admit("c", ("carl", s(5), ()), false, s(3)).is_err());
         assert!(leases.command(Some("b"), s(3)).is_ok() && leases.command(Some("a"), s(3)).is_err());
-        // No client waits any more; a waiting client that was removed does not receive the lease.
+        // After Bob's lease has lapsed, no client waits for the lease. Emil was removed while he waited, so he does
+        // not receive the lease.
         assert!(leases.lapse(s(8)).is_some() && leases.lease().is_none());
         leases.admit("d", ("dora", s(60), ()), false, s(8)).expect("nobody has it");
         leases.admit("e", ("emil", s(1), ()), true, s(8)).expect("he may wait");
@@ -360,7 +366,7 @@ mod tests {
         assert!(leases.lapse(s(68)).is_some() && leases.lease().is_none());
     }
 
-    /// The holder of a lapsed lease is returned exactly once, for any times of the request and of the check.
+    /// The holder of a lapsed lease is returned exactly once, for all times of the client's request and of the check.
     #[test]
     fn who_was_given_the_lease_is_not_forgotten_while_it_has_it() {
         for let_go in 1..=70 {
@@ -376,7 +382,7 @@ mod tests {
                 assert_eq!(leases.lease().map(|lease| lease.holder), had.then(|| "bob".into()), "{let_go}");
                 let lapsed = leases.lapse(s(looked)).map(|client| client.name);
                 assert_eq!(lapsed, had.then(|| "bob".into()), "{let_go}");
-                // The former holder may take the lease again, like every other client.
+                // The former lease holder may take the lease again, like every other client.
                 assert!(looked > let_go + 5 || leases.command(Some("b"), s(looked)).is_ok() == had);
             }
         }
@@ -419,7 +425,7 @@ mod tests {
     fn the_one_that_was_silent_longest_makes_room_and_never_the_one_who_commands() {
         let mut leases = Leases::default();
         for n in 0..3 * CLIENTS_MAX {
-            // Each client requests the lease after the previous client has stopped waiting.
+            // Each client requests the lease after the previous client was silent for too long.
             let now = s(2 * n as u64);
             let lasts = s(if n == 0 { 60 } else { 1 });
             leases.admit(&n.to_string(), ("x", lasts, ()), true, now).expect("there is room");

@@ -1,4 +1,5 @@
-//! Command log with client, command, time and result. Lines are only appended, never rewritten.
+//! Command log: lines with client, command, time and result. The agent only appends lines to the log and never
+//! rewrites them.
 mod repeats;
 mod rotate;
 
@@ -18,39 +19,40 @@ use rotate::{Rotated, Target};
 /// Default limit of the total size of the current and the previous log file, bytes.
 pub const LIMIT: u64 = 100_000_000;
 
-/// Largest number of lines that wait for a slow disk.
+/// Largest number of log lines that wait for a slow disk.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for the last lines when a program ends: a disk that does not respond must not prevent the end.
+/// Longest wait for the last log lines when a program ends. A disk that does not respond must not prevent the end of
+/// the program.
 const LAST_LINES: Duration = Duration::from_secs(3);
 
-/// File with one JSON object per line, which a separate thread writes, so that a Stop never waits for the disk.
+/// Log file with one JSON object per line. A separate thread writes the file, so that a Stop never waits for the disk.
 pub struct CommandLog {
     lines: Option<SyncSender<Value>>,
-    /// Channel that closes when all lines are written.
+    /// Channel that closes when all log lines are written.
     written: Receiver<()>,
-    /// Number of lines that wait for the disk.
+    /// Number of log lines that wait for the disk.
     waiting: Arc<AtomicUsize>,
-    /// Number of lines that were dropped since the last line that was queued.
+    /// Number of log lines that were dropped since the last line was queued.
     lost: u64,
     lost_in_all: u64,
-    /// Number of lines that could not be written to the disk.
+    /// Number of log lines that could not be written to the disk.
     unwritten: Arc<AtomicU64>,
     repeats: Repeats,
 }
 
-/// Kinds of lines about motions, Stops and leases. Other lines use at most half of the queue, so these lines are
-/// written even when other lines are dropped.
+/// Kinds of log lines about motions, Stops and leases. Log lines of other kinds use at most half of the queue. The
+/// lines of the needed kinds are therefore written even when other lines are dropped.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
 impl CommandLog {
-    /// Opens or creates this file; with `None`, no line is stored. When the file reaches half of `limit` bytes, it is
-    /// renamed to `FILE.1` and replaces the previous `FILE.1`. `failed` is called on the writer's thread with the first
-    /// write error, and again for each later failure after a successful write.
+    /// Opens or creates the log file `path`; with `None`, no line is stored. When the file reaches half of `limit`
+    /// bytes, it is renamed to `FILE.1` and replaces the previous `FILE.1`. The writer's thread calls `failed` with the
+    /// first write error. The writer's thread calls `failed` again for the first error after each successful write.
     ///
     /// # Errors
     ///
-    /// The file cannot be opened.
+    /// The log file cannot be opened.
     pub fn open(
         path: Option<&Path>,
         limit: u64,
@@ -83,7 +85,7 @@ impl CommandLog {
         Self { lines: Some(lines), written, waiting, lost: 0, lost_in_all: 0, unwritten, repeats }
     }
 
-    /// Writes a line with the name of the event and its data. Never waits.
+    /// Writes a log line with the name of the event and its data. Never waits for the disk.
     pub fn write(&mut self, what: &str, facts: Value) {
         for (what, facts) in self.repeats.due(Instant::now()) {
             self.line(what, facts);
@@ -91,9 +93,9 @@ impl CommandLog {
         self.line(what, facts);
     }
 
-    /// Writes a line about a `sender` that can cause many lines without a token. The first ten lines are written in
-    /// full. After that, the log contains one line per minute with the number of repetitions (`times`) and the data of
-    /// the last repetition.
+    /// Writes a log line about a `sender` that can cause many lines without a token. The first ten lines about a sender
+    /// are written in full. Later, the log contains one line per minute with the number of repetitions (`times`) and
+    /// the data of the last repetition.
     pub fn write_repeated(&mut self, what: &'static str, sender: &str, facts: Value) {
         if self.lines.is_none() {
             return;
@@ -130,7 +132,7 @@ impl CommandLog {
 }
 
 impl CommandLog {
-    /// Returns the number of lines that were dropped or could not be written to the disk.
+    /// Returns the number of log lines that were dropped or could not be written to the disk.
     pub fn lost_in_all(&self) -> u64 {
         self.lost_in_all + self.unwritten.load(Ordering::Relaxed)
     }
@@ -142,8 +144,8 @@ impl Drop for CommandLog {
             self.line(what, facts);
         }
         self.lines = None;
-        // The channel transmits no message; it closes when the writer's thread ends, even after a panic. The wait is
-        // limited.
+        // The channel transmits no messages. The channel closes when the writer's thread ends, even after a panic. The
+        // wait for the writer's thread is limited.
         let _ = self.written.recv_timeout(LAST_LINES);
     }
 }
@@ -164,7 +166,7 @@ fn write(
             let before = line.get("lines_lost_before").and_then(Value::as_u64).unwrap_or(0);
             line.insert("lines_lost_before".into(), (before + lost).into());
         }
-        // An incomplete line is first completed with a line end, so that only this line is lost.
+        // An incomplete log line is first completed with a line end, so that the next line is not damaged.
         let mut text = format!("{}{line}\n", if cut { "\n" } else { "" });
         let room = file.make_room(text.len());
         if cut && matches!(room, Ok(true)) {
@@ -191,7 +193,8 @@ fn write(
     }
 }
 
-/// Writes the bytes. Returns the number of bytes written, and an error if some bytes were not written.
+/// Writes the bytes to the file. Returns the number of bytes that were written, and an error if some bytes were not
+/// written.
 fn write_whole(file: &mut impl io::Write, bytes: &[u8]) -> (usize, io::Result<()>) {
     let mut taken = 0;
     while let Some(rest @ [_, ..]) = bytes.get(taken..) {
@@ -211,7 +214,7 @@ mod tests {
 
     use super::*;
 
-    /// Disk with space for a number of bytes, and the bytes that were written to it.
+    /// Simulated disk with space for a number of bytes, and the bytes that were written to it.
     #[derive(Clone, Default)]
     struct Disk(Arc<Mutex<(usize, Vec<u8>)>>);
 
@@ -244,7 +247,7 @@ mod tests {
         struct Hung(Receiver<()>);
         impl io::Write for Hung {
             fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-                // Blocks until the test is over.
+                // The write blocks until the test ends.
                 self.0.recv().unwrap_or_default();
                 Ok(bytes.len())
             }
@@ -257,13 +260,13 @@ mod tests {
         let (hangs, until) = sync_channel(0);
         let mut log = CommandLog::on(Hung(until), |_| {});
         log.write("sent", json!({}));
-        // The test succeeds if this call returns.
+        // The test succeeds if the call of `drop` returns.
         drop(log);
         drop::<SyncSender<()>>(hangs);
     }
 
-    /// The disk can become full at any time. Each failure is reported once, and all lines except an interrupted line
-    /// are complete. The next line states the number of missing lines.
+    /// The disk can become full at any time. Each write error is reported once, and all log lines except an interrupted
+    /// line are complete. The next log line states the number of missing lines.
     #[test]
     fn a_full_disk_costs_the_lines_that_it_does_not_take_and_they_are_counted() {
         for room in 0..120 {
@@ -280,8 +283,8 @@ mod tests {
             };
             (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
             done(&log);
-            // The disk may still process the last line, so three more lines follow. Each of these lines is either
-            // refused or written after the last line.
+            // The disk may still process the last log line, so the test writes three more lines. Each of the three
+            // further lines is either refused or written after the last line.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
             log.lines = None;
@@ -289,7 +292,7 @@ mod tests {
             let text = disk.with(|(_, taken)| String::from_utf8(taken.clone()).expect("text"));
             let whole: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
             let lost = log.lost_in_all();
-            // A line without its line end is counted as lost, although its text is in the file.
+            // A log line without its line end is counted as lost, although its text is in the file.
             assert!((8..=9).contains(&(whole.len() as u64 + lost)), "{room}: {text}");
             assert!(text.lines().count() <= whole.len() + 1, "{room}: one line breaks off: {text}");
             assert_eq!(whole.last().map(|line| line["n"].clone()), Some(7.into()));
@@ -299,8 +302,8 @@ mod tests {
         }
     }
 
-    /// For any limit and any number of restarts, the current and the previous file together stay within the limit. Each
-    /// line is complete and appears once, and no line is missing between the first and the last line in the files.
+    /// For any limit and any number of restarts, the current and the previous log file together stay within the limit.
+    /// Each log line is complete and appears once. No line is missing between the first and the last line in the files.
     #[test]
     fn the_log_keeps_its_limit_and_its_last_lines() {
         let dir = tempfile::tempdir().expect("a directory");
@@ -331,8 +334,8 @@ mod tests {
         }
     }
 
-    /// If the file cannot be renamed, the error is reported and the lines are counted as lost. The file stays within
-    /// its limit.
+    /// If the log file cannot be renamed, the error is reported and the lines are counted as lost. The log file stays
+    /// within its limit.
     #[test]
     fn a_log_that_cannot_be_put_aside_stays_within_its_limit() {
         let dir = tempfile::tempdir().expect("a directory");
@@ -362,8 +365,8 @@ mod tests {
         assert!(!Path::new("/dev/null.1").exists());
     }
 
-    /// The first refused requests each cause a line of limited length. Later requests do not cause a line. Each request
-    /// is counted.
+    /// Each of the first refused requests causes a log line of limited length. Later refused requests do not cause a
+    /// log line. The log counts each refused request.
     #[test]
     fn lines_of_those_who_are_not_let_in_are_short_and_few() {
         let dir = tempfile::tempdir().expect("a directory");

@@ -10,16 +10,16 @@ use utoipa::{IntoResponses, Modify};
 
 use crate::api::Problem;
 
-/// Returns the description as JSON. A response that several operations share appears only once.
+/// Returns the API description as JSON. A response that several operations share appears only once.
 pub fn text(description: &OpenApi) -> String {
     let mut description = description.clone();
     share_responses(&mut description);
-    // All keys are strings, so this cannot fail.
+    // All keys of the API description are strings, so the conversion cannot fail.
     description.to_pretty_json().unwrap_or_default()
 }
 
-/// Moves responses that several operations share to the components. The names come from their status: `NotFound`,
-/// `NotFound2`.
+/// Moves responses that several operations share to the components of the API description. The name of a shared
+/// response comes from its HTTP status: `NotFound`, `NotFound2`.
 fn share_responses(description: &mut OpenApi) {
     let mut counts: Vec<(String, RefOr<Response>, u32)> = Vec::new();
     for_each_response(description, |status, response| {
@@ -29,7 +29,7 @@ fn share_responses(description: &mut OpenApi) {
         }
     });
     counts.retain(|(.., count)| *count > 1);
-    // The most frequent response of a status gets the name without a number.
+    // The most frequent response with a given status gets the name without a number.
     counts.sort_by_key(|(status, _, count)| (status.clone(), Reverse(*count)));
     let mut names: Vec<String> = Vec::new();
     for (status, ..) in &counts {
@@ -64,13 +64,13 @@ fn status_name(status: &str) -> String {
     reason.replace(' ', "")
 }
 
-/// Serves the description.
+/// Returns a route that serves the API description.
 pub fn served<S: Clone + Send + Sync + 'static>(description: &OpenApi) -> MethodRouter<S> {
     let description = text(description);
     get(async move || ([(header::CONTENT_TYPE, "application/json")], description))
 }
 
-/// Token; clients on the same computer need it for commands only.
+/// Token of a client; clients on the same computer need a token for commands only.
 pub struct Bearer;
 
 impl Modify for Bearer {
@@ -104,8 +104,8 @@ enum Denials {
     Lost(Problem),
 }
 
-/// Returns the refusals that a command can receive in addition to the refusals that every request can receive. `denied`
-/// and `lost` are the agent's descriptions of these two cases.
+/// Returns the refusals of commands, in addition to the refusals that every request can receive. `denied` and `lost`
+/// are the agent's texts for the statuses 409 and 503.
 pub fn denials(denied: &str, lost: &str) -> BTreeMap<String, RefOr<Response>> {
     let mut responses = Denials::responses();
     for (status, words) in [("409", denied), ("503", lost)] {

@@ -1,8 +1,9 @@
-//! Pages of the dashboard, which are part of the program, so that a browser does not need other files.
+//! Web pages of the dashboard. The pages are part of the program, so a browser does not need other files.
 //!
-//! A page contains no secrets. The agent serves a page to every browser that requests it by one of the agent's names,
-//! but never to pages of other sites. The page itself requests a token from the user if one is needed. Later requests
-//! of the page pass the access gate like all other requests.
+//! A page of the dashboard contains no secrets. The agent serves a dashboard page to every browser that requests the
+//! page by one of the agent's names. The agent never serves a page to pages of other sites. If the agent requires a
+//! token, the page asks the user for it. Later requests of the dashboard page pass the access gate, like the requests
+//! of other clients.
 use std::io::Write as _;
 use std::sync::Arc;
 
@@ -17,36 +18,36 @@ use rust_embed::{EmbeddedFile, RustEmbed};
 
 use crate::gate::Gate;
 
-/// Files that `npm run build` has generated in `web/`.
+/// Dashboard files that `npm run build` has generated in `web/`.
 #[derive(RustEmbed)]
 #[folder = "../../web/dist"]
 #[allow_missing = true]
 struct Built;
 
-/// Permissions of a page: it may use its own scripts and files, and send requests to this agent. No page of another
-/// site may show the page in a frame.
+/// Permissions of a dashboard page: it may use its own scripts and files, and send requests to this agent. No page of
+/// another site may show a dashboard page in a frame.
 const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; \
                       connect-src 'self' ws: wss:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Directory of files whose names contain a hash of their contents.
+/// Directory of files whose names contain a hash of the file contents.
 const LASTING: &str = "assets/";
 /// File name extensions of formats that are already compressed.
 const COMPRESSED: [&str; 3] = ["png", "woff2", "ico"];
 
-/// Header that specifies for a browser which sites may use a file.
+/// HTTP header that lists the sites that may use a file.
 const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
-/// File of the pages, ready to be sent.
+/// Dashboard file, ready to be sent.
 struct File {
     name: String,
     kind: &'static str,
-    /// Entity tag, computed from the contents.
+    /// Entity tag of the file, computed from its contents.
     tag: HeaderValue,
     bytes: Bytes,
-    /// Contents compressed with gzip, if that is shorter.
+    /// Contents of the file, compressed with gzip; `None` if the compressed form is not shorter.
     gzip: Option<Bytes>,
 }
 
-/// Pages of an agent.
+/// Dashboard pages of an agent.
 #[derive(Clone)]
 pub struct Pages {
     gate: Gate,
@@ -56,13 +57,14 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// Returns the pages for this gate. `first` is the file that is served at `/`, for example `index.html`.
+    /// Creates the dashboard pages for this gate. `first` is the file that is served at `/`, for example
+    /// `index.html`.
     pub fn new(gate: Gate, first: &'static str) -> Self {
         let files = Built::iter().filter_map(|name| Built::get(&name).map(|file| File::of(&name, file)));
         Self { gate, first, files: files.collect() }
     }
 
-    /// Returns the file for a path.
+    /// Returns the dashboard file for the path of a request.
     fn find(&self, path: &str) -> Option<&File> {
         let name = match path.strip_prefix('/')? {
             "" => self.first,
@@ -82,7 +84,7 @@ impl File {
         Self { name: name.to_owned(), kind: kind(ending), tag, bytes: file.data.into_owned().into(), gzip }
     }
 
-    /// Returns the answer to a request with these headers.
+    /// Returns the answer to a request for this file with these headers.
     fn answer(&self, request: &HeaderMap) -> Response {
         let lasts =
             if self.name.starts_with(LASTING) { "public, max-age=31536000, immutable" } else { "no-cache" };
@@ -117,7 +119,7 @@ impl File {
 /// Middleware in front of the gate: serves the pages and passes all other requests to the gate.
 pub async fn show(State(pages): State<Pages>, request: Request, next: Next) -> Response {
     let looks = [Method::GET, Method::HEAD].contains(request.method());
-    // A WebSocket request at `/` does not request the page.
+    // A WebSocket request at `/` does not request the dashboard page.
     let socket = request.headers().contains_key(header::SEC_WEBSOCKET_KEY);
     match pages.find(request.uri().path()).filter(|_| looks && !socket) {
         Some(file) => match pages.gate.is_own(request.headers()) {
@@ -135,7 +137,7 @@ fn takes_gzip(headers: &HeaderMap) -> bool {
     })
 }
 
-/// Returns `None` if the compressed form is not shorter.
+/// Returns the bytes compressed with gzip, or `None` if the compressed form is not shorter.
 fn gzip(bytes: &[u8]) -> Option<Bytes> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes).ok()?;
@@ -209,7 +211,7 @@ mod tests {
             let (status, encoding, _) = answer("a.js", &[(header::ACCEPT_ENCODING, encodings)]);
             assert_eq!((status, encoding.as_str()), (200, sent), "{encodings}");
         }
-        // The name of the file contains the hash of its contents, so the file never changes.
+        // The file name contains the hash of the contents, so the file never changes.
         assert!(
             answer("assets/a.js", &[]).2.contains("immutable") && answer("index.html", &[]).2 == "no-cache"
         );

@@ -1,4 +1,4 @@
-//! Common error object of the APIs.
+//! Error object that the APIs of all agents return.
 use std::borrow::Cow;
 use std::ops::Deref;
 
@@ -21,36 +21,37 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Returns a refusal with the next step for the user.
+    /// Creates a refusal with the next step for the user.
     pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<Next>) -> Self {
         let failure = Failure::new(ErrorKind::Refused, code, message.into()).next(next);
         Self { failure, status: StatusCode::CONFLICT }
     }
 
-    /// Returns a problem with all details of a library's error.
+    /// Creates a problem with all details of a library's error.
     pub fn of(error: &impl Diagnose) -> Self {
         Failure::of(error).into()
     }
 
-    /// Returns a problem for a request that cannot be read; the message may contain parts of the request.
+    /// Creates a problem for a request that cannot be read; the message may contain parts of the request.
     pub fn rejected(status: StatusCode, message: impl AsRef<str>) -> Self {
         let message = cut_middle(message.as_ref());
         Self { status, ..Self::new("request", message, "GET /openapi.json describes each request") }
     }
 
-    /// Returns a problem for an object with this number that does not exist.
+    /// Creates a problem for an object that does not exist; the message contains the number of the
+    /// object.
     pub fn nothing(what: &str, number: impl std::fmt::Display, list: &str) -> Self {
         let next = format!("list the existing entries with GET {list}");
         let problem = Self::new("not-found", format!("there is no {what} {number}"), next);
         Self { status: StatusCode::NOT_FOUND, ..problem }
     }
 
-    /// Sets the kind of the error, and the HTTP status of this kind.
+    /// Sets the kind of the error, and the HTTP status that belongs to this kind.
     pub fn kind(self, kind: ErrorKind) -> Self {
         Failure { kind, ..self.failure }.into()
     }
 
-    /// Sets the message.
+    /// Sets the message of the problem.
     pub fn message(self, message: impl Into<String>) -> Self {
         Self { failure: Failure { message: message.into(), ..self.failure }, ..self }
     }
@@ -60,17 +61,17 @@ impl Problem {
         Self { failure: self.failure.next(next), ..self }
     }
 
-    /// Sets the facts.
+    /// Sets the facts of the problem.
     pub fn with(self, facts: Facts) -> Self {
         Self { failure: self.failure.with(facts), ..self }
     }
 
-    /// Sets the status 403: the client has no permission for this request.
+    /// Sets the HTTP status 403: the client has no permission for this request.
     pub fn forbidden(self) -> Self {
         Self { status: StatusCode::FORBIDDEN, ..self }
     }
 
-    /// Sets the status 400: the request itself is wrong.
+    /// Sets the HTTP status 400: the request itself is wrong.
     pub fn unreadable(self) -> Self {
         Self { status: StatusCode::BAD_REQUEST, ..self }
     }
@@ -128,7 +129,7 @@ struct ErrorObject<'a> {
 
 impl<'a> From<&'a Failure> for ErrorObject<'a> {
     fn from(failure: &'a Failure) -> Self {
-        // JSON cannot represent values that are not finite.
+        // JSON cannot represent infinite numbers or NaN.
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
         let Facts { board, joint, point, value, limit, cause, .. } = *failure.facts;
         Self {
@@ -140,7 +141,7 @@ impl<'a> From<&'a Failure> for ErrorObject<'a> {
             value: finite(value),
             limit: finite(limit),
             cause,
-            // Backticks, which mark code in terminal texts, are removed.
+            // Backticks mark code in terminal texts; the next step in the API does not contain them.
             next: failure.next.plain(FrontEnd::Agent),
         }
     }

@@ -29,23 +29,24 @@ use crate::api::Problem;
 use in_time::{InTime, Taken};
 use places::{Place, Places};
 
-/// Interval at which the end condition is checked.
+/// Interval at which the server checks whether it must end.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest time for the head of a request, and longest wait of a connection for its next request.
+/// Longest time for receiving the head of a request. The same time limit applies to the wait of a connection for its
+/// next request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 const HEAD_TIME_OF_FEW: Duration = Duration::from_secs(1);
 /// Longest head of a request, in bytes.
 const HEAD_MAX: usize = 16 << 10;
-/// Longest time for the body of a request while few connections are free. If more connections are free, only the time
-/// of the whole request is limited.
+/// Longest time for receiving the body of a request while few connections are free. If more connections are free, the
+/// server limits only the time of the whole request.
 const BODY_TIME_OF_FEW: Duration = Duration::from_secs(1);
 
-/// Serves `router` at `listener`, with TLS if it is configured, until `ended` returns `true`. Blocks the calling
+/// Serves `router` at `listener`, with TLS if TLS is configured, until `ended` returns `true`. Blocks the calling
 /// thread.
 ///
 /// # Errors
 ///
-/// The system cannot start threads, or the listener fails.
+/// The operating system cannot start threads, or the listener fails.
 pub fn serve(
     router: Router,
     listener: TcpListener,
@@ -76,18 +77,18 @@ async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<
     let (here, elsewhere) = (Places::here(), Places::elsewhere());
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
-            // The program has reached its limit of open files for the moment.
+            // The program has reached its limit of open files, so it waits before it accepts the next connection.
             tokio::time::sleep(LOOK).await;
             continue;
         };
         let places = if peer.ip().to_canonical().is_loopback() { &here } else { &elsewhere };
         let (router, tls) = (router.clone().layer(Extension(ConnectInfo(peer))), tls.clone());
         let connection = async move |place: Place| {
-            // A status of 175 bytes must be sent at once, without waiting for more data.
+            // A short message, such as a status of 175 bytes, must be sent at once, without waiting for more data.
             let _ = stream.set_nodelay(true);
             match tls {
                 None => serve_connection(router, stream, place).await,
-                // If a client does not complete the TLS handshake in time, the agent does not answer it.
+                // If a client does not complete the TLS handshake in time, the agent does not answer the client.
                 Some(tls) => {
                     let handshake = tokio::time::timeout(head_time(place.few), tls.accept(stream));
                     if let Ok(Ok(stream)) = handshake.await {
@@ -135,11 +136,11 @@ async fn serve_connection(
         .with_upgrades()
         .await;
     is_socket.store(true, Ordering::Relaxed);
-    // A client that has disconnected needs no answer. WebSockets are counted separately (`Sockets`).
+    // A client that has disconnected receives no answer. `Sockets` counts the WebSockets separately.
     drop((served, place));
 }
 
-/// Returns the answer to a request when the remaining connections are reserved for Stop and Pause.
+/// Returns the answer to a request if all free connections are reserved for Stop and Pause.
 fn full() -> Response {
     let next = "send the request again after 1 s; the agent still accepts Stop and Pause";
     Problem::new("full", "all connections of this agent are in use", next)

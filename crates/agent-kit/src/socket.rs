@@ -1,4 +1,4 @@
-//! Limits for WebSockets: their number, and the traffic of clients with read-only access.
+//! Limits for WebSockets: the number of WebSockets, and the traffic of clients with read-only access.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,20 +10,20 @@ use tokio::sync::Semaphore;
 
 use crate::access::Role;
 
-/// Largest number of WebSockets for viewers and for operators. Separate limits ensure that viewers cannot block
-/// operators.
+/// Largest number of WebSockets of viewers. `OPERATORS_MAX` is the limit for operators. Separate limits
+/// ensure that viewers cannot block operators.
 const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
-/// Protocol that a page requests for its WebSocket, in addition to `bearer.` with the token.
+/// Protocol name that a page requests for its WebSocket, in addition to `bearer.` with the token.
 pub const PROTOCOL: &str = "openjtc";
 /// Longest message of a client with read-only access, in bytes.
 pub const MESSAGE_MAX: usize = 1024;
-/// Largest number of pings of a client between two messages to the client.
+/// Largest number of pings that a client may send between two messages to the client.
 const NOISE_MAX: u32 = 100;
 /// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
 
-/// Places for sockets.
+/// Limits for the numbers of open WebSockets.
 #[derive(Clone)]
 pub struct Sockets {
     viewers: Arc<Semaphore>,
@@ -59,7 +59,7 @@ impl Sockets {
     }
 }
 
-/// Waits until the client disconnects, or sends a message that is not expected.
+/// Waits until the client disconnects or sends an unexpected message.
 pub(crate) async fn ended(socket: &mut WebSocket) {
     let mut noise = 0;
     while let Some(Ok(Message::Ping(_) | Message::Pong(_))) = socket.recv().await {
@@ -72,7 +72,7 @@ pub(crate) async fn ended(socket: &mut WebSocket) {
 
 /// Sends a message as JSON. Returns `false` if the client does not accept the message in time.
 pub(crate) async fn pass(socket: &mut WebSocket, message: &impl Serialize) -> bool {
-    // The message contains only strings and numbers, so this cannot fail.
+    // The message contains only strings and numbers, so the conversion to JSON cannot fail.
     let text = serde_json::to_string(message).unwrap_or_default();
     matches!(tokio::time::timeout(SEND_TIME, socket.send(Message::Text(text.into()))).await, Ok(Ok(())))
 }

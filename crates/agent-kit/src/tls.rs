@@ -1,4 +1,4 @@
-//! TLS configuration from certificate files.
+//! TLS configuration that an agent loads from certificate files.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ pub enum TlsError {
     File {
         /// Path of the file.
         path: PathBuf,
-        /// Problem in the file.
+        /// Problem in the contents of the file.
         what: String,
     },
     /// Private key that other users can read.
@@ -43,12 +43,13 @@ impl host_kit::Diagnose for TlsError {
     }
 }
 
-/// Returns a configuration for TLS 1.2 and 1.3 with this certificate chain and its private key, both PEM files. The
+/// Returns a TLS configuration for TLS 1.2 and 1.3. The certificate chain and its private key are PEM files. The
 /// agent's own certificate is the first certificate in the chain.
 ///
 /// # Errors
 ///
-/// [`TlsError`].
+/// A [`TlsError`] if a file is not valid, if other users can read the private key, or if the key and the certificate
+/// do not match.
 pub fn load(certificate: &Path, key: &Path) -> Result<Arc<ServerConfig>, TlsError> {
     let wrong = |path: &Path| {
         let path = path.to_owned();

@@ -1,7 +1,7 @@
-//! Classes of requests. The class depends only on the method and the path, so the agent knows it before it reads the
-//! other parts.
+//! Classes of HTTP requests. The class of a request depends only on its method and its path. The agent therefore
+//! knows the class of a request before it reads the body.
 
-/// Paths that pages of allowed origins may request. A request to these paths with the method GET changes nothing.
+/// Paths that pages of allowed origins may request. A GET request to one of these paths changes nothing.
 const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
 
 /// Returns `true` if a request with this method and path has read-only access.
@@ -9,7 +9,7 @@ pub fn looks(method: &str, path: &str) -> bool {
     ["GET", "HEAD"].contains(&method) && LOOKS.contains(&path)
 }
 
-/// Paths of Stop and Pause, which need no lease, and on this computer no token.
+/// Paths of Stop and Pause. A Stop or a Pause needs no lease, and from this computer no token.
 const HALTS: [&str; 2] = ["/api/stop", "/api/pause"];
 
 /// Returns `true` if a request with this method and path is a Stop or a Pause.
@@ -17,9 +17,9 @@ pub fn halts(method: &str, path: &str) -> bool {
     method == "POST" && HALTS.contains(&path)
 }
 
-/// Returns `true` if a request with this method and path is served even when no other connection is free. Such requests
-/// are a Stop, a Pause, a command that ends the work of a board or a job, and the socket that `jtc traj stop` uses for
-/// its Stop.
+/// Returns `true` if a request with this method and path is served even when no other connection is free. Such
+/// requests are Stop, Pause, and each command that ends an operation of a board or a job. The WebSocket that
+/// `jtc traj stop` uses for its Stop is also such a request.
 pub fn stops(method: &str, path: &str) -> bool {
     let number = |part: &str| part.parse::<u64>().is_ok();
     let board = path.strip_prefix("/api/boards/").and_then(|rest| rest.split_once('/'));

@@ -40,7 +40,7 @@ pub enum TokenError {
     Contents {
         /// Path of the file.
         path: PathBuf,
-        /// Problem in the contents.
+        /// Problem in the contents of the token file.
         what: String,
     },
     /// Operating system that provides no random numbers.
@@ -68,7 +68,7 @@ impl host_kit::Diagnose for TokenError {
 ///
 /// # Errors
 ///
-/// The operating system does not provide random numbers.
+/// The operating system provides no random numbers.
 pub fn random() -> Result<String, TokenError> {
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes).map_err(TokenError::Random)?;
@@ -80,7 +80,7 @@ impl Tokens {
     ///
     /// # Errors
     ///
-    /// Other users can read the file, it is not a token file, or it cannot be read.
+    /// Other users can read the token file, the file is not a token file, or it cannot be read.
     pub fn load(path: &Path) -> Result<Self, TokenError> {
         let contents = |what: String| TokenError::Contents { path: path.to_owned(), what };
         let text =
@@ -95,12 +95,12 @@ impl Tokens {
         Ok(tokens)
     }
 
-    /// Loads the tokens from a file, or writes new tokens to a new file that only its owner can read. Returns `true`
-    /// with the tokens if they are new.
+    /// Loads the tokens from a file. If the token file does not exist, creates it with new tokens; only the owner can
+    /// read the new file. Returns the tokens, and `true` if they are new.
     ///
     /// # Errors
     ///
-    /// Other users can read the file, it is not a token file, or it cannot be read or written.
+    /// Other users can read the token file, the file is not a token file, or it cannot be read or written.
     pub fn load_or_make(path: &Path) -> Result<(Self, bool), TokenError> {
         match Self::load(path) {
             Err(TokenError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {}
@@ -125,9 +125,9 @@ impl Tokens {
 
 impl Tokens {
     /// Returns the lines that announce the agent at `url` when it starts. The operator's token and the dashboard link
-    /// that contains it appear only on a terminal, because other outputs (the system journal, a file) are stored and
-    /// can be read by other users. Browsers do not send the part after `#` to any server, and the page removes this
-    /// part from its URL at once.
+    /// with this token appear only on a terminal. Other outputs (the system journal, a file) are stored, and other
+    /// users can read them. Browsers do not send the part of a URL after `#` to any server. The dashboard removes the
+    /// part after `#` from its URL at once.
     pub fn announce(&self, url: &str, file: &Path, announced: Announced) -> Vec<String> {
         let Announced { are_new, link, on_terminal } = announced;
         let (operator, file) = (&self.operator, file.display());
@@ -147,14 +147,14 @@ impl Tokens {
     }
 }
 
-/// Conditions under which the tokens are announced.
+/// Conditions that determine which tokens an agent announces.
 #[derive(Clone, Copy, Debug)]
 pub struct Announced {
     /// `true` if the tokens were generated at this start.
     pub are_new: bool,
-    /// `true` if the user requested the link with the token.
+    /// `true` if the user requested the dashboard link with the token.
     pub link: bool,
-    /// `true` if the output is a terminal, which is read by a person and not stored.
+    /// `true` if the output is a terminal. A person reads the text on a terminal, and the text is not stored.
     pub on_terminal: bool,
 }
 
@@ -163,7 +163,7 @@ pub fn default_token_file() -> Option<PathBuf> {
     token_file("tokens.toml")
 }
 
-/// Returns the path of the file of this name in the directory of this user's token files.
+/// Returns the path of a token file with the name `name` in the directory of this user's token files.
 pub fn token_file(name: &str) -> Option<PathBuf> {
     let state = host_kit::user_folder("XDG_STATE_HOME", ".local/state")?;
     Some(state.join("openjtc").join(name))

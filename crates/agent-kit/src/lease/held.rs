@@ -1,44 +1,46 @@
-//! Lease that a client holds, and the rules of its renewal and succession. All agents use these rules.
+//! Lease that a client holds, and the rules for renewing the lease and passing it to the next client. All agents use
+//! the same rules for the lease.
 use std::time::Duration;
 
-/// Lease: at most one client holds it at a time. `Id` identifies a client. All times are measured by the agent's clock.
+/// Lease, which at most one client holds at a time. `Id` identifies a client. All times are measured by the agent's
+/// clock.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lease<Id> {
     /// Client that holds the lease.
     pub holder: Id,
     /// Time when the holder took the lease.
     pub since: Duration,
-    /// Time when the lease lapses without renewal. `None` if the client has its own connection; such a lease does not
-    /// lapse.
+    /// Time when the lease lapses if the client does not renew it. `None` if the client has a permanent connection;
+    /// such a lease does not lapse.
     pub until: Option<Duration>,
     /// Client that waits for the lease.
     pub wanted_by: Option<Id>,
 }
 
-/// Last sign of life of a client, and the duration of its lease.
+/// Time of a client's last message, and the duration of the client's lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Presence {
-    /// Time until the client's lease ends without a sign of life. `None` if the lease lasts while the client is
-    /// connected.
+    /// Time until the client's lease lapses without a message from the client. `None` if the lease lasts while the
+    /// client is connected.
     pub lasts: Option<Duration>,
-    /// Time of the last sign of life.
+    /// Time of the client's last message.
     pub seen: Duration,
 }
 
 impl Presence {
-    /// Returns `true` if the client sent a sign of life within the duration of its own lease.
+    /// Returns `true` if the client sent a message within the duration of its own lease.
     pub fn is_present(&self, now: Duration) -> bool {
         self.lasts.is_none_or(|lasts| now.saturating_sub(self.seen) < lasts)
     }
 }
 
 impl<Id: Clone + PartialEq> Lease<Id> {
-    /// Begins the lease of a client. Without a sign of life the lease lapses after `lasts`.
+    /// Begins the lease of a client. Without a message from the client, the lease lapses after `lasts`.
     pub fn begin(holder: Id, lasts: Option<Duration>, now: Duration) -> Self {
         Self { holder, since: now, until: lasts.map(|lasts| now + lasts), wanted_by: None }
     }
 
-    /// Renews the lease after a sign of life.
+    /// Renews the lease after a message from its holder.
     pub fn renew(&mut self, lasts: Option<Duration>, now: Duration) {
         self.until = lasts.map(|lasts| now + lasts);
     }
@@ -48,17 +50,17 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         self.until.is_some_and(|until| now >= until)
     }
 
-    /// Returns the client that waits for the lease, if this client still sends signs of life.
+    /// Returns the client that waits for the lease, if this client still sends messages.
     pub fn first(&self, is_present: impl Fn(&Id) -> bool) -> Option<&Id> {
         self.wanted_by.as_ref().filter(|first| is_present(first))
     }
 
-    /// Registers a client that waits for the lease. Only one client can wait at a time. The first waiting client stays
-    /// first while it sends signs of life.
+    /// Registers a client that waits for the lease. Only one client can wait for the lease at a time. The first waiting
+    /// client keeps its position while it sends messages.
     ///
     /// # Errors
     ///
-    /// The client that already waits.
+    /// The client that already waits for the lease.
     pub fn want(&mut self, client: Id, is_present: impl Fn(&Id) -> bool) -> Result<(), Id> {
         match self.first(is_present).filter(|first| **first != client) {
             Some(first) => Err(first.clone()),
@@ -69,7 +71,7 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         }
     }
 
-    /// Returns the lease of the client that waits, which follows this lease. `lasts` returns the duration of a client's
+    /// Returns the lease of the waiting client, which follows this lease. `lasts` returns the duration of a client's
     /// lease, and `None` for a client that has disconnected.
     pub fn next(&self, lasts: impl Fn(&Id) -> Option<Option<Duration>>, now: Duration) -> Option<Self> {
         let next = self.wanted_by.clone()?;

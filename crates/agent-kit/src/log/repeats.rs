@@ -1,5 +1,5 @@
-//! Log lines that clients without a token can cause without limit. The first lines are written; further lines are only
-//! counted.
+//! Log lines that clients without a token can cause in any number. The log contains the first of these lines; further
+//! lines are only counted.
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -7,19 +7,19 @@ use serde_json::Value;
 
 /// Number of lines per kind and sender that are written before repetitions are only counted.
 const FIRST: u32 = 10;
-/// Interval between log lines that contain a count. After this time without a line, the next lines of a sender are
-/// again written in full.
+/// Interval between log lines that contain a count of repetitions. If a sender causes no line during this time, its
+/// next lines are again written in full.
 const PERIOD: Duration = Duration::from_secs(60);
-/// Number of senders that are counted separately; all other senders are counted together.
+/// Number of senders whose log lines are counted separately; the lines of all other senders are counted together.
 const SENDERS_MAX: usize = 256;
-/// Name for all senders that are counted together.
+/// Name in the log for all senders whose lines are counted together.
 const OTHERS: &str = "others";
 
-/// Count of lines of one kind and sender.
+/// Count of log lines of one kind and sender.
 struct Count {
     since: Instant,
     written: u32,
-    /// Number of lines that were not written, and the data of the last of them.
+    /// Number of log lines that were not written, and the data of the last of these lines.
     more: u64,
     facts: Value,
 }
@@ -28,12 +28,12 @@ struct Count {
 #[derive(Default)]
 pub(super) struct Repeats {
     counts: BTreeMap<(&'static str, String), Count>,
-    /// Earliest time at which a log line with a count is due.
+    /// Earliest time at which a log line with a count must be written.
     next: Option<Instant>,
 }
 
 impl Repeats {
-    /// Counts a line of this kind and sender. Returns the data of the line if it must be written.
+    /// Counts a log line of this kind and sender. Returns the data of the log line if the line must be written.
     pub(super) fn admit(
         &mut self,
         what: &'static str,
@@ -57,7 +57,8 @@ impl Repeats {
         None
     }
 
-    /// Returns the log lines with counts that are due. Each contains the data of the last repetition and `times`.
+    /// Returns the log lines with counts that must be written now. Each log line with a count contains the data of the
+    /// last repetition and `times`.
     pub(super) fn due(&mut self, now: Instant) -> Vec<(&'static str, Value)> {
         if self.next.is_none_or(|next| now < next) {
             return Vec::new();
@@ -77,7 +78,7 @@ impl Repeats {
         lines
     }
 
-    /// Returns the lines with counts that are not written yet.
+    /// Returns the log lines with counts that are not written yet.
     pub(super) fn rest(&mut self) -> Vec<(&'static str, Value)> {
         let counts = std::mem::take(&mut self.counts).into_iter();
         counts.filter_map(|((what, _), mut count)| Some((what, count.line()?))).collect()
@@ -85,7 +86,7 @@ impl Repeats {
 }
 
 impl Count {
-    /// Returns the line about lines that were not written, if there are any.
+    /// Returns the log line that reports the number of unwritten lines, if there are unwritten lines.
     fn line(&mut self) -> Option<Value> {
         let times = std::mem::take(&mut self.more);
         let mut facts = self.facts.take();
@@ -100,7 +101,7 @@ mod tests {
 
     use super::*;
 
-    /// For any rate of repetitions, only few lines are written, and the sum of their counts is the number of all
+    /// For any rate of repetitions, only few log lines are written, and the sum of their counts is the number of all
     /// repetitions.
     #[test]
     fn every_repeat_is_written_or_counted_and_the_lines_are_few() {

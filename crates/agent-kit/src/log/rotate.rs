@@ -6,33 +6,33 @@ use std::path::{Path, PathBuf};
 
 /// Output to which log lines are written.
 pub(super) trait Target: Write {
-    /// Ensures that a line of this number of bytes fits. Returns `true` if the line begins a new file.
+    /// Ensures that a log line of `_line` bytes fits into the file. Returns `true` if this log line begins a new file.
     ///
     /// # Errors
     ///
-    /// The line does not fit into the file.
+    /// The log line does not fit into the file.
     fn make_room(&mut self, _line: usize) -> io::Result<bool> {
         Ok(false)
     }
 }
 
-/// Current and previous file, which together stay within a limit.
+/// Current and previous log file, which together stay within a limit.
 pub(super) struct Rotated {
     file: File,
-    /// Paths of the current and the previous file; `None` if the output is not an ordinary file, because only ordinary
-    /// files are renamed.
+    /// Paths of the current and the previous log file. `None` if the output is not an ordinary file, because only
+    /// ordinary files are renamed.
     names: Option<(PathBuf, PathBuf)>,
     length: u64,
     limit: u64,
 }
 
 impl Rotated {
-    /// Opens or creates this file.
+    /// Opens or creates the log file `path`.
     pub(super) fn open(path: &Path, limit: u64) -> io::Result<Self> {
         let file = append(path)?;
         let metadata = file.metadata()?;
         let names = if metadata.is_file() {
-            // If the path is a symbolic link, the target of the link is renamed.
+            // If the path is a symbolic link, the target of the link is renamed, not the link.
             let path = path.canonicalize()?;
             let before = before(&path);
             Some((path, before))
@@ -49,14 +49,15 @@ impl Target for Rotated {
         if self.length == 0 || self.length.saturating_add(line as u64) <= self.limit / 2 {
             return Ok(false);
         }
-        // A file larger than this limit was written by an earlier version or another program, and is not replaced.
+        // An earlier version or another program wrote a previous file that is larger than the limit. A previous log
+        // file that is larger than the limit gets another name, so that its lines are not lost.
         if std::fs::metadata(before).is_ok_and(|found| found.is_file() && found.len() > self.limit) {
             let mut kept = before.clone().into_os_string();
             kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));
             std::fs::rename(before, kept)?;
         }
         match std::fs::rename(path, before) {
-            // Another program has moved or removed the file, so the next line begins a new file.
+            // Another program has moved or removed the log file, so the next line begins a new file.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             renamed => renamed.map_err(|error| {
                 let (path, before) = (path.display(), before.display());
@@ -88,7 +89,7 @@ fn append(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).create(true).open(path)
 }
 
-/// Returns the name of the previous file: `commands.jsonl.1`.
+/// Returns the name of the previous log file: `commands.jsonl.1`.
 fn before(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".1");

@@ -1,4 +1,4 @@
-//! Time limits for connections and bodies: a client that sends or reads too slowly loses its connection.
+//! Time limits for connections and bodies of requests. A client that sends or reads too slowly loses its connection.
 use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
@@ -11,20 +11,20 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// Longest time for which a client may read no bytes although some are waiting. The total waiting time may be longer by
-/// a second for each `TAKES_PER_S` bytes that the client reads. Quick reading does not extend the longest time without
-/// bytes.
+/// Longest time without reading for a client that has unread bytes. The total waiting time for a client may be longer
+/// by one second for each `TAKES_PER_S` bytes that the client reads. A client that reads quickly does not get a longer
+/// limit for a time without reading.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 
-/// Body that must be complete within a time limit.
+/// Body of a request that must be complete within a time limit.
 pub(super) struct InTime {
     body: Incoming,
     end: Option<(Pin<Box<Sleep>>, Duration)>,
 }
 
 impl InTime {
-    /// Returns the body with the limit `within` from now; with `None`, the time is limited elsewhere.
+    /// Creates the body with the time limit `within` from now. With `None`, another part of the server limits the time.
     pub(super) fn new(body: Incoming, within: Option<Duration>) -> Self {
         let end = |within| (Box::pin(sleep_until(Instant::now() + within)), within);
         Self { body, end: within.map(end) }
@@ -61,7 +61,7 @@ impl Body for InTime {
     }
 }
 
-/// Connection that is closed if the client does not read.
+/// Connection that the server closes if the client does not read.
 pub(super) struct Taken<S> {
     stream: S,
     /// `true` after the connection has become a WebSocket, which has its own time limits.
@@ -78,12 +78,12 @@ impl<S> Taken<S> {
         Self { stream, released, since: None, waited: Duration::ZERO, bytes: 0, timer }
     }
 
-    /// Returns the total waiting time that is allowed for the number of bytes read so far.
+    /// Returns the total waiting time that the client may use for the number of bytes that it has read.
     fn patience(&self) -> Duration {
         TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
     }
 
-    /// Handles the result of a write: either bytes were written, or the write waits until the client reads.
+    /// Processes the result of a write: either bytes were written, or the write waits until the client reads.
     fn see<T>(
         &mut self,
         context: &mut Context<'_>,
@@ -162,8 +162,8 @@ mod tests {
 
     use super::*;
 
-    /// Returns the number of bytes that a reader of `piece` bytes every `pause` received, and `true` if it received the
-    /// whole answer.
+    /// Simulates a client that reads `piece` bytes after each wait of `pause`. Returns the number of bytes that the
+    /// client received, and `true` if it received the whole answer.
     fn taken(bytes: usize, piece: usize, pause: Duration) -> (usize, bool) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
         runtime.expect("a runtime").block_on(async {
@@ -201,11 +201,11 @@ mod tests {
             let (got, all) = taken(bytes, piece, pause);
             assert_eq!((got == bytes, all), (whole, whole), "{bytes} bytes, {piece} each {pause:?}: {got}");
         }
-        // The reader does not read any bytes.
+        // The client reads one byte per hour.
         assert!(!taken(100_000, 1, Duration::from_secs(3600)).1);
     }
 
-    /// A reader that read quickly before and then stops is closed as soon as any other reader.
+    /// A client that reads quickly and then stops reading loses its connection after the same time as any other client.
     #[test]
     fn bytes_that_were_taken_quickly_give_no_time_to_take_nothing() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
@@ -225,7 +225,7 @@ mod tests {
         });
     }
 
-    /// A WebSocket may be silent without a time limit.
+    /// A WebSocket may be silent for any time.
     #[test]
     fn a_connection_that_has_become_a_socket_is_not_closed() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();

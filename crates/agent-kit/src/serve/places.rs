@@ -1,5 +1,4 @@
-//! Limits of the number of connections for all requests, and of further connections that are reserved for Stop and
-//! Pause.
+//! Limits of the number of connections. Some further connections are reserved for Stop and Pause.
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -8,22 +7,24 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
-/// Largest number of connections from this computer. This number also applies to other computers, so that they cannot
-/// block local clients.
+/// Largest number of connections from this computer that serve any request. Connections from other computers have a
+/// separate limit of the same size, so that they cannot block local clients.
 pub(super) const CONNECTIONS_MAX: usize = 256;
-/// If fewer connections than this number are free, each new connection serves only one request, which must be sent at
-/// once.
+/// Number of free connections below which each new connection serves only one request. The client of such a connection
+/// must send its request at once.
 const FEW: usize = CONNECTIONS_MAX / 2;
-/// Further connections from this computer for Stop and Pause only; the next constant applies to other computers. When
-/// all of these are used as well, a new connection replaces the oldest connection without a Stop. Idle connections
-/// therefore never block a Stop. All connections together stay below the 1024 files that a program may open.
+/// Number of further connections from this computer that serve only Stop, Pause and the other requests of
+/// [`stops`](crate::access::stops). `KEPT_ELSEWHERE` is the number for other computers. When all reserved connections
+/// are in use, a new connection replaces the oldest connection without a Stop. Idle connections therefore never prevent
+/// a Stop. The number of all connections together stays below 1024, which is the number of files that a program may
+/// open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
-/// Shortest time in which a local connection can send its request before it is closed for a new one. The new connection
-/// waits for this time.
+/// Shortest time that a local connection has for sending its request before a new connection can replace it. A new
+/// connection waits until the older connection has had this time.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
-/// Limits and state of the connections from this computer, or from other computers.
+/// Limits and state of the connections from this computer, or of those from other computers.
 pub(super) struct Places {
     common: Arc<Semaphore>,
     kept: Mutex<Kept>,
@@ -31,7 +32,7 @@ pub(super) struct Places {
     asks_within: Duration,
 }
 
-/// Connections within the limit that is reserved for Stop and Pause, oldest first.
+/// Connections that are reserved for Stop and Pause, oldest first.
 #[derive(Default)]
 struct Kept {
     open: VecDeque<Open>,
@@ -42,14 +43,15 @@ struct Open {
     number: u64,
     since: Instant,
     abort: AbortHandle,
-    /// `true` if the connection has requested a Stop: such a connection is not closed early.
+    /// `true` if the connection has requested a Stop. The server does not replace a connection that has requested a
+    /// Stop.
     stops: bool,
 }
 
-/// Reservation for one connection, which is released on drop.
+/// Reservation for one connection; dropping the reservation releases it.
 pub(super) struct Place {
     places: Arc<Places>,
-    /// `true` if few connections were free when this connection was accepted.
+    /// `true` if few connections were free when the server accepted this connection.
     pub(super) few: bool,
     kind: Kind,
 }
@@ -65,7 +67,8 @@ impl Places {
         Self::new(KEPT_HERE, ASKS_WITHIN)
     }
 
-    /// Creates the limits for connections from other computers, which never delay local connections.
+    /// Creates the limits for connections from other computers. Connections from other computers never delay local
+    /// connections.
     pub(super) fn elsewhere() -> Arc<Self> {
         Self::new(KEPT_ELSEWHERE, Duration::ZERO)
     }
@@ -75,8 +78,8 @@ impl Places {
         Arc::new(Self { common, kept: Mutex::default(), kept_max, asks_within })
     }
 
-    /// Runs a connection if the limits permit it, or if an older connection can be closed. If all reserved connections
-    /// serve a Stop, the new connection is dropped, which closes it.
+    /// Serves a connection if the limits permit it, or if the server can close an older connection. If all reserved
+    /// connections serve a Stop, the new connection is dropped, which closes it.
     pub(super) async fn run<F: Future<Output = ()> + Send + 'static>(
         self: &Arc<Self>,
         connection: impl FnOnce(Place) -> F,
@@ -87,7 +90,7 @@ impl Places {
             tokio::spawn(connection(place));
             return;
         }
-        // The wait gives the serving threads time to read earlier requests.
+        // The wait gives the server's threads time to read requests that arrived earlier.
         let oldest = self.oldest().map(|open| open + self.asks_within);
         if let Some(due) = oldest.filter(|due| *due > Instant::now()) {
             tokio::time::sleep_until(due).await;
@@ -102,12 +105,13 @@ impl Places {
         kept.last += 1;
         let number = kept.last;
         let place = Place { places: self.clone(), few: true, kind: Kind::Kept { number } };
-        // The lock is held, so the connection cannot end before it is in the list.
+        // The lock of the list is held, so the connection cannot end before it is added to the list.
         let abort = tokio::spawn(connection(place)).abort_handle();
         kept.open.push_back(Open { number, since: Instant::now(), abort, stops: false });
     }
 
-    /// Returns the arrival time of the connection that would be closed for a new one, if one must be closed.
+    /// Returns the arrival time of the connection that a new connection would replace. Returns `None` if a reserved
+    /// connection is free, or if all reserved connections serve a Stop.
     fn oldest(&self) -> Option<Instant> {
         let kept = self.kept();
         let full = kept.open.len() >= self.kept_max;
@@ -157,7 +161,7 @@ mod tests {
 
     use super::*;
 
-    /// A new connection is served even if many are open, unless all reserved connections serve Stops.
+    /// The server serves a new connection even if many are open, unless all reserved connections serve Stops.
     #[test]
     fn the_newest_connection_has_a_place() {
         let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
@@ -168,7 +172,7 @@ mod tests {
             let came = came.clone();
             runtime.block_on(places.run(move |place| async move {
                 let served = place.serves(stops);
-                // Another part of the test may have failed in the meantime.
+                // The send fails if another part of the test has already failed.
                 let _ = came.send((number, place.few, served));
                 pending::<()>().await;
                 drop(place);

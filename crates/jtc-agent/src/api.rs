@@ -67,19 +67,20 @@ use objects::Found;
 
 /// Longest request body, bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Longest body with a trajectory, bytes. This is enough for 12,000 points as text, with a margin. Only a limited
-/// number of such bodies is read at the same time.
+/// Longest request body that contains a trajectory, bytes. 16 MiB are enough for a trajectory of 12,000 points as
+/// text, with a margin. The agent reads only a limited number of bodies with trajectories at the same time.
 const TRAJECTORY_MAX: usize = 16 << 20;
-/// Longest body with an arm, bytes. This is enough for a robot description, with a margin.
+/// Longest request body that contains an arm, bytes. 1 MiB is enough for a robot description, with a margin.
 const ARM_MAX: usize = 1 << 20;
-/// Longest body with waypoints, bytes.
+/// Longest request body that contains waypoints, bytes.
 const PLAN_MAX: usize = 1 << 18;
 const TRAJECTORIES_AT_ONCE: usize = 4;
 const CHECKS_AT_ONCE: usize = 2;
-/// Longest duration of a request.
+/// Longest duration of an ordinary request.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
 
-/// Longest duration of a plan or of reading a flight recorder log. Reading the log takes about 40 s at 115,200 Bd.
+/// Longest duration of a request that plans a motion or reads the flight recorder log. Reading the flight recorder
+/// log takes about 40 s at 115,200 Bd.
 const LONG_TIME: Duration = Duration::from_secs(120);
 
 /// State that every handler receives.
@@ -94,24 +95,24 @@ pub struct Agent {
     simulated: bool,
     sockets: Sockets,
     bodies: Arc<Semaphore>,
-    /// Limit for trajectory checks that run at the same time.
+    /// Limit for the number of trajectory checks that run at the same time.
     checks: Arc<Semaphore>,
-    /// Limit for plans that are computed at the same time.
+    /// Limit for the number of plans that are computed at the same time.
     plans: Arc<Semaphore>,
-    /// Limit for reports that are generated at the same time.
+    /// Limit for the number of reports that are generated at the same time.
     reports: Arc<Semaphore>,
-    /// Limit for flight recorder logs that are read at the same time.
+    /// Limit for the number of flight recorder logs that are read at the same time.
     logs: Arc<Semaphore>,
     events: Arc<Events>,
     identity: Arc<tokio::sync::Mutex<Identity>>,
 }
 
 impl Agent {
-    /// Creates the agent of a serial line. `port` is the name of the port that users see.
+    /// Creates the agent of one serial line. `port` is the name of the port, which users see.
     ///
     /// # Errors
     ///
-    /// The operating system does not provide random numbers.
+    /// The operating system provides no random numbers.
     pub fn new(
         line: Line,
         jobs: Arc<Jobs>,
@@ -141,7 +142,7 @@ impl Agent {
         })
     }
 
-    /// Returns the router for all requests.
+    /// Returns the router for all HTTP requests.
     pub fn router(self) -> Router {
         let (router, mut description) = described().split_for_parts();
         let (slow, of_slow) = slow().split_for_parts();
@@ -170,11 +171,11 @@ impl Agent {
         self.gate.lost_lines()
     }
 
-    /// Sends a Stop or a Pause of an HTTP client. The agent never treats the sender as the lease holder, because the
-    /// holder may have sent requests before the Stop.
+    /// Sends a Stop or a Pause of an HTTP client. The agent never treats the sender of a Stop or Pause as the
+    /// lease holder, because the holder may have sent other requests before the Stop.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
-        // The identity of the client matters only for its later requests.
+        // The identity of the client affects only the later requests of this client.
         let client = self.client(asker).ok().map(|(client, _)| client);
         let name = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
         let lost = self.line.lost();
@@ -183,8 +184,8 @@ impl Agent {
         });
         match client {
             Some(_) => self.note("halt", facts),
-            // A client without a lease can send any number of Stops and Pauses, so repeated requests are logged
-            // together.
+            // A client without a lease can send any number of Stops and Pauses, so the log contains only the first of
+            // them in full and counts the others.
             None => self.gate.note_repeated("halt", caller.peer, facts),
         }
         if let Some(lost) = lost {
@@ -308,7 +309,7 @@ fn described() -> OpenApiRouter<Agent> {
     others.merge(trajectories).merge(arms)
 }
 
-/// Returns the requests with a longer time limit.
+/// Returns the routes of the requests that have a longer time limit.
 fn slow() -> OpenApiRouter<Agent> {
     let plans = OpenApiRouter::new().routes(routes!(plans::plan)).layer(DefaultBodyLimit::max(PLAN_MAX));
     plans.merge(OpenApiRouter::new().routes(routes!(log::fetch)).routes(routes!(log::values)))
@@ -359,7 +360,7 @@ async fn pause(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObje
     agent.halt(&asker, ExecCommand::Pause)
 }
 
-/// Serves the socket for programs that know only the agent's address and connect to `/`.
+/// Serves the WebSocket for programs that know only the agent's address and connect to `/`.
 async fn at_root(State(agent): State<Agent>, request: Request<Body>, next: Next) -> Response {
     if request.uri().path() == "/" && request.method() == Method::GET && foxglove::is_asked(request.headers())
     {

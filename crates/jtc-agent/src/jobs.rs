@@ -1,5 +1,6 @@
-//! Work of an agent for clients without a connection to the serial line. The agent maintains connections for these
-//! clients, runs their jobs, and writes a journal that a client can read when it reconnects.
+//! Jobs of the agent for clients without a connection to the serial line. The agent keeps a connection to the serial
+//! line for each such client and runs the client's jobs. The agent also writes a journal that a client can read when
+//! it reconnects.
 mod event;
 mod http_session;
 mod poses;
@@ -33,28 +34,28 @@ use crate::line::{Introduction, Policy, Role};
 use crate::owner::{ClientPort, Line};
 pub use task::{STOPPED, Task, stopped};
 
-/// Number of jobs that are stored.
+/// Number of jobs that the agent stores.
 const KEPT: usize = 256;
 /// Largest number of clients without a connection to the serial line.
 const COMMANDERS_MAX: usize = 32;
-/// Time from the end of a silent client's lease until the client is removed.
+/// Time from the end of a silent client's lease until the agent removes the client.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Shortest interval between events for Stops and Pauses; the last event is always written. Repeated Stops must not
-/// displace other events from the journal.
+/// Shortest interval between two events for Stops and Pauses; the event for the last Stop or Pause is always written.
+/// Repeated Stops must not remove other events from the journal.
 const HALTS_APART: Duration = Duration::from_millis(200);
-/// Interval at which the watcher checks for changes that the serial line does not announce.
+/// Interval at which the agent checks for changes that the serial line does not announce.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Stage of a job.
+/// Stage of a job: running, or the outcome after its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Running.
+    /// The job is running.
     Running,
-    /// Completed.
+    /// The job was completed.
     Finished,
     /// The job was stopped by a client.
     Stopped,
-    /// Failed.
+    /// The job has failed.
     Failed,
 }
 
@@ -71,7 +72,7 @@ pub struct Job {
     pub stage: Stage,
     /// Progress and results.
     pub done: Done,
-    /// Reason why the job failed.
+    /// Reason why the job has failed.
     pub error: Option<Problem>,
 }
 
@@ -83,12 +84,12 @@ struct Kept {
     ended: Ended,
 }
 
-/// Numbers of jobs that have ended, one number per outcome.
+/// Counts of jobs that have ended, one count per outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
     /// Number of completed jobs.
     pub finished: u64,
-    /// Number of jobs stopped by a client.
+    /// Number of jobs that a client stopped.
     pub stopped: u64,
     /// Number of failed jobs.
     pub failed: u64,
@@ -97,20 +98,20 @@ pub struct Ended {
 /// Jobs of an agent, and the clients that request them.
 pub struct Jobs {
     line: Line,
-    /// Journal of events.
+    /// Journal of the events of the arm and of the jobs.
     pub journal: Journal,
-    /// Store of trajectories by number.
+    /// Store of trajectories, which are identified by number.
     pub store: Store,
     arm: Arm,
-    /// Session that sends queries for all clients.
+    /// Session through which the agent sends the queries of all clients.
     asker: Arc<HttpSession>,
-    /// Held stops and their causes.
+    /// Held stops of the arm, and their causes.
     pub stops: Stops,
     kept: Mutex<Kept>,
 }
 
 impl Jobs {
-    /// Creates the jobs of a serial line. `arm` is used if the controller cannot return its own arm.
+    /// Creates the job list of a serial line. The agent uses `arm` if the controller cannot return its own arm.
     pub fn new(line: Line, store: Store, arm: Arm) -> Arc<Self> {
         let introduction =
             Introduction { name: "the agent".into(), role: Role::Viewer, policy: Policy::Continue };
@@ -129,24 +130,24 @@ impl Jobs {
         jobs
     }
 
-    /// Returns the session that sends queries for all clients.
+    /// Returns the session through which the agent sends the queries of all clients.
     pub fn asker(&self) -> &Arc<HttpSession> {
         &self.asker
     }
 
-    /// Returns the arm that is used if the controller cannot return its own arm.
+    /// Returns the arm that the agent uses if the controller cannot return its own arm.
     pub fn arm(&self) -> &Arm {
         &self.arm
     }
 
     /// Registers a client that sends its requests with `key`. The lease of the client lapses if the client sends no
-    /// request for `lasts`. Returns `None` if too many clients are registered.
+    /// request for `lasts`. Returns `None` if the maximum number of clients is registered and none of them is idle.
     pub fn admit(&self, key: &str, introduction: Introduction, lasts: Duration) -> Option<Arc<HttpSession>> {
         let http_session = HttpSession::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.http_sessions.len() >= COMMANDERS_MAX {
-            // Removes a client without lease and job. Without this, a program that restarts repeatedly would fill the
-            // list of clients.
+            // A client that has no lease and no job is removed. Without the removal of idle clients, a program that
+            // restarts repeatedly would fill the list of clients.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
                 .http_sessions
@@ -159,7 +160,8 @@ impl Jobs {
         Some(http_session)
     }
 
-    /// Returns the client with this key, and the time without a request after which the client's lease lapses.
+    /// Returns the client with this key. Also returns the time without a request after which the client's lease
+    /// lapses.
     pub fn http_session(&self, key: &str) -> Option<(Arc<HttpSession>, Duration)> {
         let found = self.lock().http_sessions.get(key).cloned()?;
         found.0.see();
@@ -171,11 +173,11 @@ impl Jobs {
         self.lock().http_sessions.remove(key);
     }
 
-    /// Begins a job for a client, with the permit to use the client's session.
+    /// Begins a job for a client. The job needs the permit to use the client's session.
     ///
     /// # Errors
     ///
-    /// [`Unable`]: the job was not begun.
+    /// [`Unable`] if the job was not begun.
     pub fn begin(
         self: &Arc<Self>,
         http_session: &Arc<HttpSession>,
@@ -189,7 +191,7 @@ impl Jobs {
             kept.last += 1;
             Job { number: kept.last, what, client, stage: Stage::Running, done: Done::default(), error: None }
         };
-        // The job is stored before it can end.
+        // The job is stored before it begins, because it may end at once.
         self.remember(job.clone());
         let (own, begun, whose) = (self.clone(), job.clone(), Arc::downgrade(http_session));
         let unfinished = Unfinished { jobs: self.clone(), number: job.number };
@@ -218,7 +220,7 @@ impl Jobs {
         self.lock().jobs.iter().cloned().collect()
     }
 
-    /// Returns the number of running jobs, and the outcomes of the jobs that ended.
+    /// Returns the number of running jobs, and the counts of the jobs that have ended.
     pub fn counts(&self) -> (usize, Ended) {
         let kept = self.lock();
         (kept.jobs.iter().filter(|job| job.stage == Stage::Running).count(), kept.ended)
@@ -263,7 +265,7 @@ impl Jobs {
     }
 }
 
-/// Guard of a job that has not ended. If the agent panics and drops the guard, the job ends as failed.
+/// Guard of a running job. If the agent panics and drops the guard, the job ends as failed.
 struct Unfinished {
     jobs: Arc<Jobs>,
     number: u64,
@@ -285,7 +287,7 @@ impl Drop for Unfinished {
 }
 
 impl Stage {
-    /// Returns the name of the stage.
+    /// Returns the name of the job's stage.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -307,7 +309,8 @@ struct Seen {
     lost: Option<String>,
 }
 
-/// Until the agent ends, writes changes on the serial line to the journal, and removes clients that do not reconnect.
+/// Writes changes on the serial line to the journal until the agent ends. Also removes clients that have stopped
+/// sending requests.
 fn watch(jobs: &Weak<Jobs>) {
     let (mut seen, mut looked) = (Seen::default(), Instant::now());
     loop {

@@ -1,15 +1,15 @@
-//! Shares the serial line of one controller between many clients. The module does not do I/O: its functions take the
-//! received bytes and the time, and return the bytes to write.
+//! Shares the serial line of one controller among many clients. The module does not do I/O: its functions take the
+//! received bytes and the time, and return the bytes to be written.
 //!
-//! Each client speaks the protocol of the line as if no other client existed, and receives every status, but only the
-//! records of its own frames. Every program that can use a serial port can therefore use a shared line. The shared line
-//! decides which client may send which frame:
+//! Each client uses the protocol of the serial line as if no other client existed. A client receives every status, but
+//! only the response records of its own frames. Every program that can use a serial port can therefore also use a
+//! shared line. The shared line decides which client may send which frame:
 //!
-//! - every client may send queries, and a Stop or a Pause, which is sent before all other frames;
-//! - all other frames may be sent by the holder of the [`Lease`] only.
+//! - every client may send queries, Stops and Pauses; a Stop or a Pause is sent before all other frames;
+//! - only the holder of the [`Lease`] may send other frames.
 //!
-//! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last Stop or
-//! Pause does not move the arm, even if its frames arrive later.
+//! Stops and Pauses have a common sequence of numbers (in the code: *halts*). A motion request that a client made
+//! before the last Stop or Pause does not move the arm, even if its frames arrive later.
 mod client;
 mod device;
 mod event;
@@ -42,27 +42,28 @@ use stop_queue::StopQueue;
 use supervision::Supervision;
 use tx_queue::TxQueue;
 
-/// Longest wait for the record of a frame.
+/// Longest wait for the response record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(2);
-/// Longest wait after the record until the controller sends the requested frame.
+/// Longest wait from a response record until the controller sends the requested frame.
 const RETURN_TIME: Duration = Duration::from_millis(500);
-/// Hold-off after a Stop or a Pause of another client. A motion request that arrives in this time may have been sent
-/// before the Stop.
+/// Hold-off after a Stop or a Pause of another client. A client may send a motion request before it learns of the Stop,
+/// and the request may arrive during the hold-off.
 const CALM: Duration = Duration::from_secs(3);
 /// Shortest hold-off after a refused motion request.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
 
-/// Written frame whose record has not arrived yet.
+/// Written frame whose response record has not arrived yet.
 struct Sent {
     client: ClientId,
     kind: u8,
-    /// `true` if the frame was aborted before its end. The controller then answers with an error record.
+    /// `true` if the transmission of the frame was aborted before its end. The controller answers an aborted frame with
+    /// an error record.
     abandoned: bool,
-    /// Time at which the serial line finishes the last byte.
+    /// Time at which the serial line finishes the last byte of the frame.
     at: Duration,
 }
 
-/// Frame that the controller sends in addition to a record.
+/// Frame that the controller sends in addition to a response record.
 struct Return {
     client: ClientId,
     kind: FrameType,
@@ -76,18 +77,19 @@ pub struct SharedLine {
     tx_queue: TxQueue,
     sent: VecDeque<Sent>,
     returns: Option<Return>,
-    /// Client whose frame was sent last. Clients take turns.
+    /// Client whose frame was sent last. The frames of the clients are sent in rotation.
     last_turn: ClientId,
     lease: Option<Lease>,
     halts: StopQueue,
-    /// Last Stop or Pause, with its number, the name of its client, and the command.
+    /// Number of the last Stop or Pause, the name of its client, and the command.
     halted: (u64, String, ExecCommand),
-    /// End of the hold-off. Until this time, only the client of the last Stop or Pause may begin a motion.
+    /// End of the hold-off. During the hold-off, only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
     motion_tracker: MotionTracker,
-    /// Name and policy of the last lease holder. While no client holds the lease, this policy applies to the motion.
+    /// Name and policy of the last lease holder. While no client holds the lease, the policy of the last lease holder
+    /// applies to the motion.
     left: (String, Policy),
-    /// Last will that was most recently reported.
+    /// Last will that the line most recently reported.
     will: Option<Will>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
@@ -96,14 +98,14 @@ pub struct SharedLine {
     counts: Counts,
 }
 
-/// Client number of the serial line's owner. The owner acts for clients that are disconnected or have no connection of
-/// their own.
+/// Client number of the owner of the serial line. The owner sends commands for clients that are disconnected or have no
+/// connection to the line.
 pub const OWNER: ClientId = ClientId(0);
-/// Placeholder for all clients that have requested a Stop or a Pause.
+/// Placeholder client number for all clients that have requested a Stop or a Pause.
 const HALTS: ClientId = ClientId(u64::MAX);
 
 impl SharedLine {
-    /// Creates a line with this bit rate in Bd; `None` means that the serial line has no bit rate.
+    /// Creates a serial line with the bit rate `baud` in Bd; `None` means that the line has no bit rate.
     pub fn new(baud: Option<u32>) -> Self {
         Self {
             clients: BTreeMap::new(),
@@ -127,20 +129,20 @@ impl SharedLine {
         }
     }
 
-    /// Adds a client.
+    /// Adds a client to the serial line.
     pub fn join(&mut self, introduction: Introduction) -> ClientId {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // Earlier Stops do not block a new client. The user of this client may have decided before the Stop, however,
-        // so the hold-off applies.
+        // Stops from before a client connected do not block its requests. However, the user of a new client may have
+        // decided before such a Stop, so the hold-off applies to the client.
         (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
     }
 
-    /// Removes a client. Drops the client's frames that are not written yet, and applies the client's policy to its
-    /// motion.
+    /// Removes a client from the serial line. Drops the client's frames that are not written yet, and applies the
+    /// client's policy to its motion.
     pub fn leave(&mut self, client: ClientId, now: Duration) {
         let Some(gone) = self.clients.remove(&client) else { return };
         if let Some((outgoing, _)) = self.tx_queue.writing()
@@ -167,30 +169,30 @@ impl SharedLine {
         }
     }
 
-    /// Returns the number of clients.
+    /// Returns the number of clients on the serial line.
     pub fn clients(&self) -> usize {
         self.clients.len()
     }
 
-    /// Returns the last status, and the time at which it arrived.
+    /// Returns the last status, and the arrival time of this status.
     pub fn status(&self) -> Option<&(Duration, Status)> {
         self.status.as_ref()
     }
 
-    /// Sends a Stop or a Pause of a client before all other frames, and repeats it until the controller confirms it.
-    /// Drops all frames that need the lease and are not written yet. The clients of these frames receive a notice that
-    /// `name` stopped the arm.
+    /// Sends a Stop or a Pause of a client before all other frames. Repeats the Stop or Pause until the controller
+    /// confirms it. Drops all frames that need the lease and of which no byte was written yet. The clients of the
+    /// dropped frames receive a notice that `name` stopped the arm.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(client, client, name, command, now);
     }
 
-    /// Like [`halt`](Self::halt), for a requester without a connection to the serial line. The hold-off does not apply
-    /// to `client`.
+    /// Like [`halt`](Self::halt), for a Stop or Pause that did not arrive as a frame of a client. The hold-off does
+    /// not apply to `client`.
     pub fn halt_for(&mut self, client: Option<ClientId>, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(OWNER, client.unwrap_or(OWNER), name, command, now);
     }
 
-    /// Sends a Stop or a Pause, and delivers its record to `asker`. The hold-off does not apply to `own`.
+    /// Sends a Stop or a Pause, and delivers its response record to `asker`. The hold-off does not apply to `own`.
     fn halt_by(&mut self, asker: ClientId, own: ClientId, name: &str, command: ExecCommand, now: Duration) {
         let name = name.to_owned();
         self.halted = (self.halted.0 + 1, name.clone(), command);
@@ -201,8 +203,9 @@ impl SharedLine {
             other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
-        // After a Stop, the arm must hold its position. In Teaching, the arm would be compliant. Teaching may also
-        // begin as soon as the arm is at rest. Teaching is therefore ended in both cases.
+        // After a Stop or Pause, the arm must hold its position. In Teaching, however, the arm would be compliant. A
+        // requested Teaching may also begin as soon as the arm is at rest. A Stop or Pause therefore also ends
+        // Teaching, whether Teaching is active or only requested.
         if self.motion_tracker.may_teach(self.status.as_ref()) {
             self.motion_tracker.end_teaching(now);
         }
@@ -234,7 +237,7 @@ impl SharedLine {
             };
             client.heard_at = now;
             let allowed = client.allow(now);
-            // A Stop is executed even if the client is disconnected because of its other frames.
+            // A Stop is executed even if the agent disconnects the client because of its other frames.
             if allowed.is_ok() || matches!(frame.class, FrameClass::Halt(_)) {
                 self.take_frame(id, frame, now);
             }
@@ -248,7 +251,7 @@ impl SharedLine {
         if let FrameClass::Halt(command) = frame.class {
             let (name, before) = (self.name(id), self.halted.0);
             self.halt(id, &name, command, now);
-            // A client's own Stop does not invalidate its next request.
+            // A client's own Stop does not invalidate the client's next request.
             if let Some(client) = self.clients.get_mut(&id)
                 && client.asked_after == before
             {
@@ -289,7 +292,7 @@ impl SharedLine {
         self.may_command(id, now)
     }
 
-    /// Returns an error during the hold-off after a Stop or a Pause of another client. Each refused request extends the
+    /// Returns an error during the hold-off after another client's Stop or Pause. Each refused request extends the
     /// hold-off to at least `again` from now.
     fn is_calm(&mut self, id: ClientId, now: Duration, again: Duration) -> Result<(), Denied> {
         match self.clients.get_mut(&id) {
@@ -301,52 +304,52 @@ impl SharedLine {
         }
     }
 
-    /// Returns the refusal of a request that a Stop or a Pause has overtaken.
+    /// Returns the refusal of a request that was made before the last Stop or Pause.
     pub(super) fn stopped(&self, id: ClientId) -> Denied {
         Denied::Stopped { by: self.halted_by(id).to_owned() }
     }
 
-    /// Returns the name of the client whose Stop or Pause has overtaken the requests of this client.
+    /// Returns the name of the client whose Stop or Pause invalidated the earlier requests of client `id`.
     pub fn halted_by(&self, id: ClientId) -> &str {
         if self.asked_after(id) == Some(NOT_ASKED) { POLICY } else { &self.halted.1 }
     }
 
-    /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. A
-    /// later Stop or Pause revokes the permission, even while the request still waits.
+    /// Permits the next motion of a client. `after` is the number of the last Stop or Pause that the client has seen. A
+    /// later Stop or Pause revokes the permission, even if the motion request is still queued.
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, during the hold-off, and after a Stop or Pause later than `after`.
+    /// [`Denied`] if another client holds the lease, during the hold-off, or after a Stop or Pause later than `after`.
     pub fn ask_to_move(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
         self.ask(id, after, Duration::ZERO, now)
     }
 
     /// Like [`ask_to_move`](Self::ask_to_move), for a request that is repeated while a key is pressed. Each refused
-    /// repetition extends the hold-off, so that the arm moves again only after the key was released.
+    /// repetition extends the hold-off. The arm therefore moves again only after the user has released the key.
     ///
     /// # Errors
     ///
-    /// The errors of [`ask_to_move`](Self::ask_to_move).
+    /// Errors of [`ask_to_move`](Self::ask_to_move).
     pub fn ask_to_jog(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
         self.ask(id, after, CALM_AGAIN, now)
     }
 
-    /// Returns an error if the lease or a Stop of another client prevents a jog of this client now. Each refused
-    /// request extends the hold-off.
+    /// Returns an error if the lease or a Stop of another client prevents a jog of this client. Each refused request
+    /// extends the hold-off.
     ///
     /// # Errors
     ///
-    /// The errors of [`ask_to_move`](Self::ask_to_move).
+    /// Errors of [`ask_to_move`](Self::ask_to_move).
     pub fn could_jog(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         self.is_calm(id, now, CALM_AGAIN)
     }
 
-    /// Returns an error if the lease or a Stop of another client prevents a motion of this client now.
+    /// Returns an error if the lease or a Stop of another client prevents a motion of this client.
     ///
     /// # Errors
     ///
-    /// The errors of [`ask_to_move`](Self::ask_to_move).
+    /// Errors of [`ask_to_move`](Self::ask_to_move).
     pub fn could_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         self.is_calm(id, now, Duration::ZERO)
@@ -364,13 +367,13 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Returns true if a Stop or a Pause came after the client's last request for a motion.
+    /// Returns true if a Stop or a Pause followed the client's last motion request.
     pub fn is_halted(&self, id: ClientId) -> bool {
         self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// Returns the number of the last Stop or Pause before the client's last request for a motion. If the client has
-    /// made no request, returns the number of the last Stop or Pause before the client connected.
+    /// Returns the number of the last Stop or Pause before the client's last motion request. If the client has made no
+    /// motion request, returns the number of the last Stop or Pause before the client connected.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
     }
@@ -390,15 +393,15 @@ impl SharedLine {
         (&self.halted.1, self.halted.2)
     }
 
-    /// Stops the arm because the agent ends. Also prevents motions that clients still prepare.
+    /// Stops the arm because the agent is ending. Also prevents motions that clients are still preparing.
     pub fn end(&mut self, now: Duration) {
         self.halt(OWNER, "the agent, which ended", ExecCommand::Stop, now);
         self.motion_tracker.end_teaching(now);
     }
 
-    /// Stops or pauses every motion on behalf of the owner. Sends the command even if the arm seems to be at rest,
-    /// because the last status is older than the last command. If the arm seems to be at rest, the controller
-    /// may refuse the command, and other clients are not affected. Returns true if the arm may have been moving.
+    /// Stops or pauses every motion on behalf of the line's owner. Sends the command even if the arm seems to be at
+    /// rest, because the last status is older than the last command. If the arm seems to be at rest, the controller may
+    /// refuse the command, and no hold-off begins for other clients. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {
@@ -415,7 +418,8 @@ impl SharedLine {
         self.motion_tracker.may_move(self.status.as_ref(), now)
     }
 
-    /// Returns true if no frame waits for the serial line and no Stop waits for the record of the controller.
+    /// Returns true if the transmit queue is empty, and no Stop, Pause or end of Teaching waits for its response
+    /// record.
     pub fn is_idle(&self) -> bool {
         self.halts.are_done() && self.motion_tracker.due().is_none() && self.tx_queue.is_free()
     }
@@ -425,7 +429,7 @@ impl SharedLine {
         self.events.push_back(LineEvent::Lease(lease));
     }
 
-    /// Refuses a frame of this client.
+    /// Refuses a frame of a client.
     fn refuse(&mut self, id: ClientId, frame: &HostFrame, denied: Denied) {
         let event = LineEvent::Denied { client: id, frame_type: frame.frame_type, denied: denied.clone() };
         self.events.push_back(event);
@@ -447,12 +451,12 @@ impl SharedLine {
         self.leave(client, now);
     }
 
-    /// Removes and returns the deliveries that are queued for a client. Returns `None` if the client is disconnected.
+    /// Removes and returns the deliveries that are queued for a client. Returns `None` if the client has disconnected.
     pub fn take_deliveries(&mut self, client: ClientId) -> Option<Vec<Delivery>> {
         self.clients.get_mut(&client).map(Client::take_deliveries)
     }
 
-    /// Removes and returns the events since the last call.
+    /// Removes and returns the events since the last call of this function.
     pub fn take_events(&mut self) -> Vec<LineEvent> {
         let events: Vec<LineEvent> = self.events.drain(..).collect();
         events.iter().for_each(|event| self.counts.count(event));
@@ -469,7 +473,7 @@ impl SharedLine {
         self.receiver.counters()
     }
 
-    /// Returns the approximate present time, which is the arrival time of the last status.
+    /// Returns the approximate present time: the arrival time of the last status.
     fn now(&self) -> Duration {
         self.status.map_or(Duration::ZERO, |(at, _)| at)
     }

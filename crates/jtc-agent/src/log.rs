@@ -1,4 +1,4 @@
-//! Entries for the events of a serial line in the command log.
+//! Command log entries for the events of a serial line.
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
@@ -8,13 +8,14 @@ pub use agent_kit::log::{CommandLog, LIMIT};
 use crate::line::LineEvent;
 use crate::owner::Observer;
 
-/// Returns an observer that writes the events of a line to a command log.
+/// Returns an observer that writes the events of a serial line to a command log.
 pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     Box::new(move |_, event| {
         let Some((what, facts)) = logged(event) else { return };
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
-            // Refused frames of clients with read-only access are included.
+            // Clients with read-only access can cause such events without limit, so repetitions are only
+            // counted.
             LineEvent::Denied { client, .. } => {
                 log.write_repeated(what, &format!("client {}", client.0), facts)
             }
@@ -24,7 +25,8 @@ pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     })
 }
 
-/// Returns the log entry for an event, with name and data. Returns `None` if the event is logged elsewhere.
+/// Returns the log entry for an event: its name and data. Returns `None` if another part of the agent logs
+/// the event.
 fn logged(event: &LineEvent) -> Option<(&'static str, Value)> {
     Some(match event {
         LineEvent::Sent { client, frame_type, .. } => {

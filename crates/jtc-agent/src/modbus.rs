@@ -1,9 +1,9 @@
 //! Modbus TCP server, through which a PLC accesses the arm as a map of registers.
 //!
-//! [`pdu`] contains the protocol and [`map`] the registers. [`handshake`] turns register writes into commands, and each
-//! command is executed once. [`plc`] decides which of several connections may command. `act` executes the commands with
-//! the same jobs as the API. [`server`] manages the connections. Modbus has no tokens, so [`allow`] lists the addresses
-//! that may connect.
+//! [`pdu`] contains the protocol, and [`map`] contains the registers. [`handshake`] converts register writes to
+//! commands, and each command is executed once. [`plc`] decides which of several PLC connections may send commands.
+//! `act` executes the commands with the same jobs as the API of the agent. [`server`] manages the connections of PLCs.
+//! Modbus has no tokens, so [`allow`] lists the addresses that may connect.
 mod act;
 pub mod allow;
 pub mod codes;
@@ -24,12 +24,12 @@ pub use server::Server;
 
 use crate::access::TokenError;
 
-/// Returns a random first sequence number for a new agent. A PLC that repeats old writes is then unlikely to send the
-/// next valid number.
+/// Returns a random first sequence number for a new agent. If a PLC repeats earlier writes, they are therefore
+/// unlikely to contain the next valid sequence number.
 ///
 /// # Errors
 ///
-/// The system has no random numbers.
+/// The operating system provides no random numbers.
 pub fn first_sequence() -> Result<u16, TokenError> {
     let mut bytes = [0; 2];
     getrandom::fill(&mut bytes).map_err(TokenError::Random)?;

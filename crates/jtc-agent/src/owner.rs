@@ -1,4 +1,4 @@
-//! Owner of a serial port: one thread that reads and writes the port for all clients.
+//! Owner of a serial port: a thread that reads and writes the port for all clients.
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -12,14 +12,14 @@ use tokio::sync::watch;
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
-/// Longest wait for bytes of the controller before the owner checks the requests of clients. A Stop also waits at most
-/// for this time.
+/// Longest wait for bytes from the controller before the owner checks the requests of clients. A Stop also waits at
+/// most for this time before it is written.
 const TURN: Duration = Duration::from_millis(2);
 
-/// Longest time for which the owner waits for data in flight before the owner ends.
+/// Longest time for which an ending owner waits for its last frames and for the confirmation of a Stop.
 const LAST_TURNS: Duration = Duration::from_secs(1);
 
-/// Callback for each event, on the owner's thread; the callback must return quickly.
+/// Callback for each event on the serial line. The callback runs on the owner's thread, so it must return quickly.
 pub type Observer = Box<dyn FnMut(Duration, &LineEvent) + Send>;
 
 struct State {
@@ -30,12 +30,13 @@ struct State {
 
 struct Shared {
     state: Mutex<State>,
-    /// Condition that signals deliveries to blocking callers. Asynchronous callers use the channel instead.
+    /// Condition variable that wakes blocking callers when a delivery arrives. Asynchronous callers use the channel
+    /// `changes` instead.
     delivered: Condvar,
     changed: watch::Sender<()>,
-    /// Trajectory that was sent to the controller.
+    /// Trajectory that was uploaded to the controller.
     upload: Mutex<Upload>,
-    /// Number of frames that may have changed the arm.
+    /// Number of sent frames that may have changed the arm of the controller.
     arm_changes: AtomicU64,
     ended: AtomicBool,
     start: Instant,
@@ -45,8 +46,7 @@ struct Shared {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // The lock is used even after a panic of another thread, because a Stop is more important than a complete
-        // state.
+        // The lock is used even after a panic of another thread. A Stop is more important than a consistent state.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -60,7 +60,7 @@ impl Shared {
     }
 }
 
-/// Marks the port as lost on drop, even after a panic of the owner thread.
+/// Guard that marks the port as lost when it is dropped, even after a panic of the owner thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {
@@ -70,12 +70,12 @@ impl Drop for Gone<'_> {
     }
 }
 
-/// Handle through which clients and the API use the serial line. A thread owns the line.
+/// Handle through which clients and the API use the serial line. A separate thread owns the serial line.
 #[derive(Clone)]
 pub struct Line(Arc<Shared>);
 
 impl Line {
-    /// Returns the time of the serial line since the start of its owner thread.
+    /// Returns the time since the start of the thread that owns the serial line.
     pub fn now(&self) -> Duration {
         self.0.now()
     }
@@ -85,12 +85,12 @@ impl Line {
         act(&mut self.0.lock().line, self.0.now())
     }
 
-    /// Returns the bit rate of the serial line in Bd, or `None` if it has no bit rate.
+    /// Returns the bit rate of the serial line in Bd; `None` if the line has no bit rate.
     pub fn baud(&self) -> Option<u32> {
         self.0.baud
     }
 
-    /// Returns a receiver that announces possible deliveries.
+    /// Returns a receiver that announces that clients may have new deliveries.
     pub fn changes(&self) -> watch::Receiver<()> {
         self.0.changed.subscribe()
     }
@@ -100,13 +100,13 @@ impl Line {
         self.0.lock().line.last_halt()
     }
 
-    /// Waits for a delivery, at most for `timeout`.
+    /// Waits for a delivery to any client, at most for `timeout`.
     pub fn wait(&self, timeout: Duration) {
-        // The caller itself checks the reason for the end of the wait.
+        // The caller itself checks why the wait has ended.
         drop(self.0.delivered.wait_timeout(self.0.lock(), timeout));
     }
 
-    /// Wakes all waiting callers.
+    /// Wakes all callers that wait for a delivery.
     pub fn wake(&self) {
         self.0.wake();
     }
@@ -116,8 +116,9 @@ impl Line {
         self.0.lock().lost.clone()
     }
 
-    /// Returns the values in a status. Adds the commanded values, which a status does not contain, if the executed
-    /// trajectory was seen on the serial line. `delay_ticks` is the age of the measurements in ticks (J-62).
+    /// Returns the values in a status as a sample. Adds the commanded values, which a status does not contain, if a
+    /// client uploaded the executed trajectory through this agent. `delay_ticks` is the age of the measurements in
+    /// ticks (J-62).
     pub fn sample(&self, status: &Status, delay_ticks: u8) -> Sample {
         let given = self.0.upload.lock().unwrap_or_else(PoisonError::into_inner).trajectory(false);
         match given {
@@ -126,13 +127,14 @@ impl Line {
         }
     }
 
-    /// Returns the commanded joint positions, rad, if the executed trajectory was seen on the serial line.
+    /// Returns the commanded joint positions, rad. Returns `None` if no client uploaded the executed trajectory
+    /// through this agent.
     pub fn commanded(&self, status: &Status) -> Option<[f64; JOINTS]> {
         let positions = self.sample(status, 0).joints.map(|joint| joint.set_position);
         positions.iter().all(|position| position.is_finite()).then_some(positions)
     }
 
-    /// Returns the number of frames that may have changed the controller's arm.
+    /// Returns the number of sent frames that may have changed the controller's arm.
     pub fn arm_changes(&self) -> u64 {
         self.0.arm_changes.load(Ordering::Relaxed)
     }
@@ -142,19 +144,19 @@ impl Line {
         self.with(|line, _| line.introduction(line.lease()?.holder).map(|client| client.name.clone()))
     }
 
-    /// Adds a client, which is removed when the returned guard is dropped.
+    /// Adds a client to the serial line. The client is removed when the returned guard is dropped.
     pub fn join(&self, introduction: Introduction) -> Joined {
         let client = self.with(|line, _| line.join(introduction));
         Joined { line: self.clone(), client }
     }
 
-    /// Returns a client's port, for programs that expect a serial port.
+    /// Adds a client and returns its port, for programs that expect a serial port.
     pub fn connect(&self, introduction: Introduction) -> ClientPort {
         ClientPort { joined: self.join(introduction), read: Vec::new(), denied: None }
     }
 }
 
-/// Guard of a client on the serial line, which removes the client on drop.
+/// Guard of a client on the serial line, which removes the client when it is dropped.
 pub struct Joined {
     line: Line,
     client: ClientId,
@@ -173,14 +175,14 @@ impl Drop for Joined {
     }
 }
 
-/// Thread that owns the port.
+/// Thread that owns the serial port.
 pub struct Owner {
     line: Line,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Owner {
-    /// Takes a port. `observer` receives every event on the serial line.
+    /// Starts the thread that owns `port`. `observer` receives every event on the serial line.
     pub fn new(port: impl Port + Send + 'static, observer: Observer) -> Self {
         let shared = Arc::new(Shared {
             state: Mutex::new(State { line: SharedLine::new(port.baud()), lost: None }),
@@ -203,7 +205,7 @@ impl Owner {
         self.line.clone()
     }
 
-    /// Releases the port after the data in flight is written.
+    /// Ends the thread, which releases the port. The thread first waits until the line is idle, for at most 1 s.
     pub fn end(mut self) {
         self.join();
     }
@@ -211,7 +213,7 @@ impl Owner {
     fn join(&mut self) {
         self.line.0.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of the owner thread was already printed.
+            // If the owner thread has panicked, the panic was already printed.
             drop(thread.join());
         }
     }
@@ -223,7 +225,8 @@ impl Drop for Owner {
     }
 }
 
-/// Reads and writes until the port is lost, or until the owner must end and no data is in flight.
+/// Reads and writes the port until the port is lost, or until the owner must end. An ending owner waits until the
+/// line is idle, for at most 1 s.
 fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     let mut gone = Gone(shared, "internal error of the agent".to_owned());
     let mut last_turns = None;
@@ -243,7 +246,7 @@ fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     }
 }
 
-/// Writes the waiting bytes, reads the received bytes, and calls the observer.
+/// Writes the next bytes to the port, reads the received bytes, and calls the observer.
 fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Result<(), PortError> {
     let (now, bytes, due) = {
         let mut state = shared.lock();
@@ -280,7 +283,7 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
 /// Connection of a client to the serial line.
 pub struct ClientPort {
     joined: Joined,
-    /// Bytes that were delivered but not read yet.
+    /// Bytes that were delivered to the client, but that the client has not read yet.
     read: Vec<u8>,
     denied: Option<Denied>,
 }
@@ -300,11 +303,11 @@ impl ClientPort {
         &self.joined.line.0
     }
 
-    /// Returns the deliveries; waits at most `timeout` for deliveries.
+    /// Returns the deliveries to the client; waits for them at most for `timeout`.
     ///
     /// # Errors
     ///
-    /// [`PortError::Gone`] if the port was lost or this client was disconnected.
+    /// [`PortError::Gone`] if the port was lost or the agent disconnected this client.
     pub fn deliveries(&mut self, timeout: Duration) -> Result<Vec<Delivery>, PortError> {
         let end = Instant::now() + timeout;
         let mut state = self.shared().lock();

@@ -1,8 +1,9 @@
-//! Recorder of all motions of all clients. The recorder is itself a client of the agent, with read-only access.
+//! Recorder of the motions of all clients. The recorder is itself a client of the agent, with read-only access.
 //!
 //! [`Prepared`] opens the directory, [`Witness`] receives the frames on the serial line, and [`Recorder`] reads the statuses. One thread
-//! reads the statuses and another thread writes the recordings, so a slow disk delays only the writer. Neither thread delays the serial
-//! line. If the queue between the threads is full, samples are dropped, and the recording contains the number of dropped samples.
+//! reads the statuses and another thread writes the recordings. A slow disk therefore delays only the thread that writes the recordings.
+//! The two threads of the recorder do not delay the serial line. If the queue between these threads is full, samples are dropped, and the
+//! recording contains the number of dropped samples.
 mod disk;
 mod motion;
 mod retention;
@@ -32,34 +33,34 @@ use retention::Retention;
 
 pub use disk::{Notice, Notify};
 
-/// Largest number of frames that wait for the follower.
+/// Largest number of frames that are queued for the thread that reads the statuses.
 const SEEN_MAX: usize = 256;
-/// Largest number of statuses that wait while the recorder requests the identity of the controller.
+/// Largest number of statuses that are queued while the recorder requests the identity of the controller.
 const ARRIVED_MAX: usize = 1 << 12;
-/// Longest wait for a status before the end condition is checked.
+/// Longest wait for a status before the recorder checks whether it must end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Time without a command after which the recorder may request the identity of the controller.
 const QUIET: Duration = Duration::from_millis(300);
-/// Time after which the request is repeated if the controller did not answer.
+/// Time after which the recorder repeats its request for the identity, if the controller did not answer.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
 /// Longest wait for the disk when the recorder ends.
 const LAST_WORDS: Duration = Duration::from_secs(5);
-/// Name of the recorder on the line.
+/// Name of the recorder on the serial line.
 const NAME: &str = "recorder of the agent";
 
-/// Data from a frame to the controller that recordings need.
+/// Data about a frame to the controller, as far as recordings need the data.
 enum Seen {
-    /// A Trajectory frame.
+    /// Bytes of a Trajectory frame.
     Segment(Vec<u8>),
-    /// Answer to a frame that recordings need; `true` if the controller accepted the frame.
+    /// Answer to a frame whose data recordings need; `true` if the controller accepted the frame.
     Answered(bool),
-    /// Jog frame and its time on the serial line.
+    /// Time of a Jog frame on the serial line.
     Jog(Duration),
-    /// Frame that may change the arm, and its time on the serial line.
+    /// Time on the serial line of a frame that may change the arm.
     Change(Duration),
 }
 
-/// Receiver that passes events of the serial line to the recorder. Never waits.
+/// Receiver that passes events of the serial line to the recorder. Never waits for the recorder.
 pub struct Witness {
     seen: SyncSender<Seen>,
     missed: Arc<AtomicBool>,
@@ -84,7 +85,7 @@ impl Witness {
     }
 }
 
-/// Directory for recordings, ready to begin.
+/// Directory for recordings, before the recorder begins.
 pub struct Prepared {
     retention: Retention,
     witness: Option<Witness>,
@@ -93,11 +94,11 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens or creates the directory; all recordings together use at most `limit` bytes.
+    /// Opens or creates the directory for recordings. All recordings together use at most `limit` bytes.
     ///
     /// # Errors
     ///
-    /// The directory cannot be created or written, or another agent records into it.
+    /// The directory cannot be created or written, or another agent uses the directory for its recordings.
     pub fn open(dir: &Path, limit: u64) -> io::Result<Self> {
         let (sender, seen) = sync_channel(SEEN_MAX);
         let missed = Arc::new(AtomicBool::new(false));
@@ -105,7 +106,7 @@ impl Prepared {
         Ok(Self { retention: Retention::open(dir, limit)?, witness, seen, missed })
     }
 
-    /// Returns the witness that the owner of the line calls for each event. Returns `None` at later calls.
+    /// Returns the witness that the owner of the line calls for each event. Returns `None` at each later call.
     pub fn witness(&mut self) -> Option<Witness> {
         self.witness.take()
     }
@@ -114,7 +115,7 @@ impl Prepared {
     ///
     /// # Errors
     ///
-    /// The system cannot start threads.
+    /// The operating system cannot start threads.
     pub fn begin(self, line: Line, source: &str, notify: Notify) -> io::Result<Recorder> {
         let Self { retention, seen, missed, .. } = self;
         let (disk, writer) = Disk::begin(retention, notify)?;
@@ -139,14 +140,14 @@ impl Prepared {
     }
 }
 
-/// Recorder that runs until it is dropped.
+/// Recorder that runs until this value is dropped.
 pub struct Recorder {
     ended: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Recorder {
-    /// Ends the current recording and waits, for a limited time, until the recording is written.
+    /// Ends the current recording. Waits for a limited time until the recording is written.
     pub fn end(self) {}
 }
 
@@ -169,29 +170,29 @@ struct Identity {
 }
 
 impl Identity {
-    /// Returns the identity that is used for a device that does not report its identity. A controller with the hash of the built-in arm has
-    /// the built-in arm, so the recorder does not request the arm.
+    /// Returns the identity for a device that does not report its identity. The recorder does not request the arm of a controller if the
+    /// controller reports the hash of the built-in arm.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }
     }
 }
 
-/// Possible change of the arm.
+/// State after a possible change of the arm.
 struct Doubt {
-    /// Time on the serial line since which the arm is uncertain.
+    /// Time on the serial line since which the recorder no longer knows the arm.
     since: Duration,
     asked: Option<Duration>,
 }
 
-/// Recording in progress.
+/// Recording that is in progress.
 struct Reel {
     trajectory: Option<Arc<Trajectory>>,
-    /// Clock of the recording, which starts at the first status.
+    /// Clock of the recording. The clock starts at the first status.
     clock: Option<StatusClock>,
 }
 
-/// Statuses with their arrival times, and number of statuses that did not fit into the queue.
+/// Queue of statuses with their arrival times, and number of statuses that did not fit into the queue.
 type Arrived = Rc<RefCell<(VecDeque<(Duration, Status)>, u64)>>;
 
 /// State of the thread that reads the statuses.
@@ -207,7 +208,7 @@ struct Following {
     reel: Option<Reel>,
 }
 
-/// Connects a client with read-only access. Returns the session of this client and the queue of received statuses.
+/// Adds a client with read-only access to the serial line. Returns the session of this client and the queue of received statuses.
 fn connect(line: &Line) -> (Session<ClientPort>, Arrived) {
     let introduction = Introduction { name: NAME.into(), role: Role::Viewer, policy: Policy::Continue };
     let mut session = Session::new(line.connect(introduction));
@@ -235,7 +236,8 @@ impl Following {
                     self.follow(steps, &mut session);
                     return;
                 }
-                // The client was disconnected, for example because the computer was suspended. The recorder reconnects to the line.
+                // The line disconnected the recorder's client, for example because the computer was suspended. The recorder therefore adds
+                // a new client.
                 (session, arrived) = connect(line);
             }
             self.take_seen();
@@ -273,7 +275,7 @@ impl Following {
         }
     }
 
-    /// Processes a status. If the controller has restarted, it contains no trajectory and may have another arm.
+    /// Processes a status of the controller. After a restart, the controller contains no trajectory and may have another arm.
     fn look_at(&mut self, now: Duration, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.upload.forget();
@@ -281,8 +283,8 @@ impl Following {
         }
     }
 
-    /// Requests the identity of the controller if the identity is uncertain and no commands are sent. Sends as few requests as possible,
-    /// because each request tells host supervision that the host is alive (J-59).
+    /// Requests the identity of the controller if the identity is uncertain and no client sends commands. Sends as few requests as
+    /// possible. Each request prevents host supervision from detecting a silent host (J-59).
     fn resolve_doubt(&mut self, session: &mut Session<ClientPort>) {
         let now = session.now();
         let due = self.doubt.as_ref().is_some_and(|doubt| {
@@ -294,7 +296,7 @@ impl Following {
         }
     }
 
-    /// Requests the identity of the controller, and the arm if the arm has changed.
+    /// Requests the identity of the controller. Also requests the arm if the arm has changed.
     fn ask(&mut self, session: &mut Session<ClientPort>) {
         let asked = Some(session.now());
         if let Some(doubt) = &mut self.doubt {

@@ -1,4 +1,4 @@
-//! Trajectory of the controller, reassembled from the frames that were sent to the controller.
+//! Trajectory of the controller, which the agent reassembles from the frames on the serial line.
 use std::sync::Arc;
 
 use jtc_host::{Point, Trajectory};
@@ -9,30 +9,30 @@ use crate::line::LineEvent;
 /// Largest number of points that a controller accepts (J-30).
 const POINTS_MAX: usize = 12_000;
 
-/// Points of the received segments, in order.
+/// Points of the received trajectory segments, in order.
 #[derive(Clone, Default)]
 struct Assembly {
     number: u16,
     step_ms: u16,
     segments: u16,
-    /// Number of received segments.
+    /// Number of trajectory segments that were received.
     taken: u16,
-    /// Number of points before the last segment. The number is needed if the last segment is sent again.
+    /// Number of trajectory points before the last segment; it is needed if the client sends the last segment again.
     before_last: usize,
     points: Vec<Point>,
 }
 
-/// Follows uploads.
+/// Reassembles the trajectories that clients upload.
 #[derive(Default)]
 pub(crate) struct Upload {
     current: Option<Assembly>,
-    /// New upload. If the controller refuses the first segment of this upload, the previous upload stays valid.
+    /// Upload that has just begun. If the controller refuses the first segment of this upload, the previous trajectory stays valid.
     next: Option<Assembly>,
     whole: Option<Arc<Trajectory>>,
 }
 
 impl Upload {
-    /// Returns `true` if the event belongs to an upload of a trajectory.
+    /// Returns `true` if the event belongs to the upload of a trajectory.
     pub(crate) fn is_of(event: &LineEvent) -> bool {
         match event {
             LineEvent::Sent { frame_type, .. } => *frame_type == FrameType::Trajectory,
@@ -81,7 +81,7 @@ impl Upload {
             return;
         }
         if segment.segment.checked_add(1) == Some(assembly.taken) {
-            // The response record of the segment was lost, so the client sent the segment again.
+            // The response record of this segment was lost, so the client sent the segment again.
             assembly.points.truncate(assembly.before_last);
         } else if segment.segment == assembly.taken && assembly.taken < assembly.segments {
             assembly.taken += 1;
@@ -95,8 +95,8 @@ impl Upload {
         self.whole = None;
     }
 
-    /// Processes the answer to a Trajectory frame. Response records arrive in the order of the frames, so the first record after a first
-    /// segment belongs to that segment.
+    /// Processes the answer to a Trajectory frame. Response records arrive in the order of the frames. The first response record after a
+    /// first segment therefore belongs to that segment.
     pub(crate) fn answered(&mut self, accepted: bool) {
         if let Some(next) = self.next.take() {
             self.whole = None;
@@ -106,16 +106,16 @@ impl Upload {
         }
     }
 
-    /// Forgets all uploads.
+    /// Removes all uploads, because the controller may have lost its trajectory.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Returns the controller's trajectory, if all segments of the trajectory were received. If `executes` is true, the controller executes
-    /// the trajectory, so the trajectory must be complete.
+    /// Returns the controller's trajectory if all segments of the trajectory were received. If `executes` is true, the controller executes
+    /// the trajectory. A trajectory that the controller executes is always complete.
     pub(crate) fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
         if executes {
-            // The response record of the first segment was lost.
+            // If the response record of the first segment was lost, the segment counts as accepted.
             self.answered(true);
         }
         let current = self.current.as_ref().filter(|c| c.taken == c.segments && c.points.len() >= 2)?;
@@ -130,7 +130,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns segments of two points each, whose positions begin at `from`.
+    /// Returns trajectory segments of two points each; the positions begin at `from`.
     fn frames(number: u16, from: i16, segments: u16) -> Vec<Vec<u8>> {
         let segment = |i: u16| {
             let point = |k: i16| RawPoint { position: [from + 2 * i as i16 + k; 6], ..RawPoint::default() };
@@ -153,13 +153,13 @@ mod tests {
             assert_eq!(upload.trajectory(false), None);
             upload.sent(frame);
             if i == 1 {
-                // The response record was lost.
+                // The response record of this segment was lost.
                 upload.sent(frame);
             }
             upload.answered(true);
         }
         assert_eq!(positions(&mut upload).unwrap(), [100, 101, 102, 103, 104, 105]);
-        // An incomplete next trajectory cannot be executed, and is not returned.
+        // The next trajectory is incomplete, so `trajectory` does not return it before its last segment arrives.
         upload.sent(&frames(8, 500, 2)[0]);
         upload.answered(true);
         assert_eq!(positions(&mut upload), None);
@@ -178,7 +178,7 @@ mod tests {
         }
         upload.answered(true);
         upload.answered(true);
-        // Several frames are sent before the first answer. The controller refuses the first frame and all frames after it.
+        // The client sends several frames before the first answer. The controller refuses the first frame and all frames after it.
         for frame in &new {
             upload.sent(frame);
         }

@@ -1,4 +1,4 @@
-//! Runs the body of the fuzz target with the stored inputs and with random inputs.
+//! Runs the body of the fuzz target `modbus_stream` with the stored inputs and with random inputs.
 use jtc_agent::modbus::fuzzing::modbus_stream;
 use proptest::prelude::*;
 
@@ -13,7 +13,8 @@ fn request(pdu: Vec<u8>) -> Vec<u8> {
     [&[0xAB, 0xCD, 0, 0][..], &len.to_be_bytes(), &[7], &pdu].concat()
 }
 
-/// Returns random requests. Most have addresses of the device and a correct length.
+/// Returns random Modbus requests. Most of the random requests have addresses of the device and a
+/// correct length.
 fn requests() -> impl Strategy<Value = Vec<u8>> {
     let any_request = prop::collection::vec(any::<u8>(), 1..20);
     let write =

@@ -1,5 +1,5 @@
-//! Many clients on one serial line. The tests check which client receives a response record, which client may send commands, and how soon a
-//! Stop is sent.
+//! Tests of many clients on one serial line. The tests check which client receives a response record, which client may send commands, and
+//! how soon a Stop is sent.
 use crate::board;
 
 use std::time::Duration;
@@ -17,7 +17,7 @@ const PAUSE: [u8; 7] = fixed::exec(ExecCommand::Pause);
 const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 const EXECUTE: [u8; 7] = fixed::exec(ExecCommand::Execute);
 
-/// Returns a segment of `points` points.
+/// Returns a trajectory segment of `points` points.
 fn segment(points: usize) -> Vec<u8> {
     let points = vec![RawPoint::default(); points];
     let mut bytes = vec![0; 60_000];
@@ -54,7 +54,7 @@ proptest! {
         board.run_ms(100);
         let at = board.frames.iter().find(|(_, t, _)| *t == Some(FrameType::TrajSetExecStatus)).expect("it came").0;
         prop_assert!(at - asked <= Duration::from_millis(40), "{:?}", at - asked);
-        // No further frame of the upload arrives, and its sender receives the reason.
+        // No further frame of the upload arrives, and the client of the upload receives the reason.
         board.run_ms(6_000);
         let behind = board.frames.iter().filter(|(t, kind, _)| *t > at && kind.is_some()).count();
         prop_assert_eq!(behind, 0);
@@ -83,8 +83,8 @@ proptest! {
         board.run_ms(after_us / 1000);
         board.send(bob, &STOP);
         board.run_ms(100);
-        // If the operating system delays the bytes of a frame, the board sends more than one error record. The Stop is sent again if an
-        // error record may belong to the Stop. Each Stop arrives as a complete frame.
+        // If the operating system delays the bytes of a frame, the board sends more than one error record for this frame. If an error
+        // record may belong to the Stop, the line sends the Stop again. Each Stop arrives as a complete frame.
         let stops = board.written.iter().filter(|(_, bytes)| bytes.ends_with(&STOP)).count();
         prop_assert!(stops >= 1);
         prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), stops);
@@ -100,7 +100,7 @@ proptest! {
         let asks = [FrameType::GetInfo, FrameType::TrajSetExecStatus];
         let mut sent = [Vec::new(), Vec::new(), Vec::new()];
         for (client, kind) in frames {
-            // All clients send read requests. Only the first client also sends commands.
+            // All clients send read requests. Only the first client also sends a command.
             let frame: Vec<u8> = match (client, kind) {
                 (_, 0) => fixed::GET_INFO.to_vec(),
                 (_, 1) => fixed::get_arm(256).to_vec(),
@@ -113,8 +113,8 @@ proptest! {
             board.send(clients[client], &frame);
             board.run_ms(seed_ms);
         }
-        // A request for a frame waits until the frame of the previous request has arrived. The simulated board never sends the requested
-        // frame.
+        // A request for a frame waits until the controller has sent the frame for the previous request. The simulated board never sends the
+        // requested frame.
         board.run_ms(60 * 520 + 2000);
         for (client, sent) in clients.iter().zip(&sent) {
             let (records, denied) = board.take(*client);
@@ -208,7 +208,7 @@ fn a_lease_that_is_not_renewed_lapses_and_its_policy_counts() {
         board.run_ms(200);
         assert_eq!(board.line.lease(), None, "{policy:?}");
         let sent = board.frames.iter().find(|f| f.1 == Some(FrameType::TrajSetExecStatus)).map(|f| f.2[4]);
-        // Teaching is ended, so that the arm is in position hold again.
+        // The line ends Teaching, so the arm is in position hold again.
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), usize::from(wanted.is_some()));
         assert_eq!(sent, wanted, "{policy:?}");
         let now = board.now();
@@ -250,7 +250,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert_eq!(board.arrived(FrameType::GripperControl), 1, "it moves nothing");
-    // A program that ignores the refusal repeats the command, and sends an upload. No frame is sent to the controller.
+    // A program may ignore the refusal, repeat the command, and send an upload. The line sends no frame of this program to the controller.
     for _ in 0..20 {
         board.run_ms(400);
         board.send(a, &EXECUTE);
@@ -310,8 +310,8 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
-/// The controller begins Teaching only in position hold, and refuses a Stop until then. If Teaching were not ended, the arm would become
-/// compliant after the Stop.
+/// The controller begins Teaching only in position hold, and refuses a Stop before that. If the line did not end Teaching, the arm would
+/// become compliant after the Stop.
 #[test]
 fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     for damaged in [0, 10] {
@@ -330,7 +330,8 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
         board.run_ms(1_000);
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), 1);
         assert!(board.line.is_idle());
-        // A Stop also ends Teaching if Teaching is active. When Teaching has ended, the line does not send the end of Teaching again.
+        // A Stop also ends Teaching if Teaching is active. When Teaching has ended, the line does not send the frame that ends Teaching
+        // again.
         board.status.state = ControllerState::Teaching.into();
         board.run_ms(100);
         board.send(b, &STOP);
@@ -344,7 +345,7 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     }
 }
 
-/// If a client disconnects while the arm is at rest, the other clients have no hold-off.
+/// If a client disconnects while the arm is at rest, no hold-off begins for the other clients.
 #[test]
 fn a_policy_where_nothing_moves_stops_nobody_else() {
     for (state, moves, sent) in [
@@ -374,8 +375,8 @@ fn a_policy_where_nothing_moves_stops_nobody_else() {
     }
 }
 
-/// A client with the policy Continue takes the lease again for its upload after the lease has lapsed. With the policy Pause the upload
-/// ends.
+/// After its lease has lapsed, a client with the policy Continue takes the lease again for its upload. If the client has the policy Pause,
+/// its upload ends.
 #[test]
 fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
     for (policy, arrived) in [(Policy::Continue, 4), (Policy::Pause, 0)] {
@@ -390,7 +391,7 @@ fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
         board.run_ms(9_000);
         assert_eq!(board.arrived(FrameType::Trajectory), arrived, "{policy:?}");
         assert!(board.line.lease().is_none());
-        // With the policy Pause, later commands of this client also do not take the lease again.
+        // If the client has the policy Pause, its later commands also do not take the lease again.
         board.send(a, &fixed::gripper_control(true));
         assert_eq!(board.line.lease().is_some(), policy == Policy::Continue);
         let now = board.now();
@@ -416,7 +417,7 @@ fn a_client_that_sends_too_much_can_stop_the_arm_all_the_same() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
 }
 
-/// If a jog key is held down during a Stop, the user must release the key before it can move the arm again.
+/// If a jog key is held down during a Stop, the user must release the key before the key can move the arm again.
 #[test]
 fn who_goes_on_asking_for_a_jog_behind_a_stop_does_not_get_it() {
     let mut board = Board::new(115_200);
@@ -442,8 +443,8 @@ fn j04_a_stop_that_the_line_damages_is_sent_again_for_whoever_asked() {
     board.run_ms(2_000);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert!(board.line.is_idle());
-    // A viewer requests many Pauses before and after the Stop of another client. The last command on the serial line is a Stop, and the viewer
-    // receives a response record.
+    // A viewer requests many Pauses before and after the Stop of another client. The last command on the serial line is a Stop, and the
+    // viewer receives a response record.
     for _ in 0..100 {
         board.send(viewer, &PAUSE);
     }
@@ -518,7 +519,8 @@ fn a_stop_is_not_given_up_while_the_device_is_away() {
     assert!(board.line.is_idle());
 }
 
-/// After a Stop, a motion begins only if it was requested after that Stop. The arrival time of its frame does not matter.
+/// After a Stop, a motion begins only if a client requested it after that Stop. The arrival time of the frame that starts the motion does
+/// not matter.
 #[test]
 fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     let mut board = Board::new(115_200);
@@ -535,7 +537,7 @@ fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before, "it was asked for before the Stop");
     let (_, denied) = board.take(anna);
     assert!(denied.iter().any(|why| why.contains("bob has stopped")), "{denied:?}");
-    // After a new request the Execute is sent. A Pause of the same client does not cancel the request.
+    // After a new motion request, the Execute frame is sent. A Pause of the same client does not cancel its motion request.
     ask(&mut board, anna).expect("it is long ago");
     board.send(anna, &EXECUTE);
     board.run_ms(1_000);
@@ -572,8 +574,8 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     ask(&mut board, again).expect("it is over");
 }
 
-/// If the policy of a client has ended its motion, the client needs a new request for the next motion. The client also needs a new request
-/// if another client has resumed the first motion.
+/// If the policy of a client has ended its motion, the client needs a new motion request for its next motion. The client also needs
+/// a new request if another client has resumed the first motion.
 #[test]
 fn a_lease_that_lapsed_with_a_pause_is_not_taken_again_by_what_waits() {
     let mut board = Board::new(115_200);
@@ -643,7 +645,7 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     board.line.want_lease(anna, now).expect("nobody waits");
 }
 
-/// The controller detects a silent lease holder even if another client sends requests all the time and requests are queued.
+/// The controller detects a silent lease holder, even if another client sends requests all the time and requests are queued.
 #[test]
 fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
     for (timeout_ms, every_ms) in [(600, 10), (2000, 50), (2000, 250), (5000, 100)] {
@@ -668,19 +670,20 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
         }
         let asked = board.frames.iter().filter(|(_, kind, _)| *kind == Some(FrameType::GetInfo));
         let shown = asked.map(|(at, ..)| at.saturating_sub(silent_from)).max().unwrap_or_default();
-        // A frame that is being written when half of the timeout passes is sent completely.
+        // If a frame is being written when half of the timeout has passed, the frame is sent completely.
         let limit = Duration::from_millis(timeout_ms / 2 + 20);
         assert!(shown <= limit, "{timeout_ms} ms, every {every_ms} ms: a frame came after {shown:?}");
     }
 }
 
-/// While host supervision is active and the arm moves, only frames of the lease holder show the controller that its host is alive.
+/// During a motion under host supervision, only frames of the lease holder show the controller that its host still runs.
 #[test]
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
     use TrajectoryState::{Execute, Finish, Pause, Stop};
-    // Each case contains the timeout (ms), the controller state, and `true` if the lease of the holder lapses. The last two values are the
-    // frame interval of the holder (ms; 0 for no frames), and `true` if the requests of the viewer are sent.
+    // Each case contains the timeout (ms), the controller state, and `true` if the lease of the holder lapses. The last two values of each
+    // case are the frame interval of the lease holder (ms; 0 for no frames), and a flag. The flag is `true` if the requests of the viewer
+    // are sent.
     let cases = [
         (0, (Operate, Execute), true, 0, true),
         (1500, (Operate, Execute), true, 0, false),
@@ -716,13 +719,13 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         board.take(bob);
         let before = board.arrived(FrameType::GetInfo);
         let (mut asked, mut own) = (0, 0);
-        // The board never returns the requested frame, and each request waits for the frame, so the requests take longer than 3 s.
+        // The board never returns the requested frame. Each request waits for the requested frame, so the requests take longer than 3 s.
         for ms in (0..13_000).step_by(250) {
             if every_ms > 0 && ms % every_ms == 0 {
                 board.send(anna, &fixed::get_settings(0));
                 own += 1;
             }
-            // Shortly after a frame of the holder, requests of other clients may be sent.
+            // Shortly after a frame of the lease holder, other clients may send requests.
             if ms < 3000 && (every_ms != 2000 || ms % 2000 >= 400) {
                 board.send(bob, &fixed::GET_INFO);
                 asked += 1;

@@ -1,5 +1,5 @@
-//! PLCs with a simulated arm. The tests check which requests start a motion, which connection may send commands, and which addresses may
-//! connect.
+//! Tests of PLCs with a simulated arm. The tests check which requests start a motion, which connection may send commands, and which
+//! addresses may connect.
 use std::io::{Read as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
@@ -40,7 +40,7 @@ impl Cell {
         Self::with_faults(allowed, Vec::new())
     }
 
-    /// Starts a cell whose arm simulates these faults.
+    /// Starts a cell whose simulated arm has these faults.
     fn with_faults(allowed: &[&str], faults: Vec<Fault>) -> Self {
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(921_600), ..SimConfig::new(arm.config(), &arm.parameters()) };
@@ -82,7 +82,7 @@ impl Cell {
         })
     }
 
-    /// Recovers the arm to position hold.
+    /// Recovers the simulated arm to position hold.
     fn recover(&self, client: &mut Client) {
         until("a report", || client.input(4) < 500);
         assert_eq!(client.command(Command::RecoverWithDefaults), Outcome::Done);
@@ -109,7 +109,7 @@ impl Client {
         self.0.write_all(&pdus.iter().flat_map(frame).collect::<Vec<u8>>()).expect("it reads");
     }
 
-    /// Returns the next response; `None` if the connection is closed.
+    /// Returns the next response of the server; `None` if the server has closed the connection.
     fn response(&mut self) -> Option<Vec<u8>> {
         self.0.set_read_timeout(Some(LONGEST)).expect("a time");
         let mut head = [0; 7];
@@ -156,22 +156,22 @@ fn order(command: Command, sequence: u16) -> Vec<u8> {
 const PRESS: [u8; 5] = [5, 0, 0, 0xFF, 0];
 const LET_GO: [u8; 5] = [5, 0, 0, 0, 0];
 
-/// The Stop follows the start immediately, in the same packet, as a coil that is briefly 1, or as the next command.
+/// The Stop follows the start command immediately: in the same packet, as a coil that is briefly 1, or as the next command.
 #[test]
 fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     let cell = Cell::start(&[]);
     let mut client = cell.connect();
     cell.recover(&mut client);
     drop(client);
-    // Passes the requests to the PLC object directly. The command therefore begins only after all requests have arrived, which is the
-    // latest possible time.
+    // The test passes the requests to the PLC object directly. The command therefore begins only after all requests have arrived, which
+    // is the latest possible time.
     let connection = plc::Connection { number: 1000, peer: (IpAddr::from(HERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
     let acknowledged = || {
         let pdu = cell.plc.respond(&connection, &[4, 0, 14, 0, 2]);
         (u16::from_be_bytes([pdu[2], pdu[3]]), usize::from(pdu[5]))
     };
-    // Waits until the server has detected that the first connection is closed.
+    // The test waits until the server has detected that the first connection is closed.
     let write = [6, 0, holding::SPEED as u8, 0, 100];
     until("its turn", || cell.plc.respond(&connection, &write) == write);
     for command in [Command::Start, Command::Recover, Command::TeachOn] {
@@ -199,7 +199,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     }
     cell.plc.left(&connection);
     let mut client = cell.connect();
-    // One packet contains the start, Stop coil on and Stop coil off.
+    // One packet contains the start command, Stop coil on and Stop coil off.
     for _ in 0..3 {
         let start = order(Command::Start, client.next());
         client.send(&[&start, &PRESS, &LET_GO]);
@@ -221,14 +221,14 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     client.ask(&PRESS);
 }
 
-/// A PLC with another address cannot write while the first PLC has the lease. The second PLC never uses values that the first PLC has
+/// A PLC with another address cannot write while the first PLC holds the lease. The second PLC never uses values that the first PLC has
 /// written.
 #[test]
 fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_defaults() {
     let cell = Cell::start(&["127.0.0.0/8"]);
     let mut client = cell.connect();
     until("a report", || client.input(4) < 500);
-    // Passes the requests to the PLC object directly, because a test cannot choose the address of a connection.
+    // The test passes the requests to the PLC object directly, because a test cannot choose the address of a connection.
     let there = plc::Connection { number: 1000, peer: (IpAddr::from(THERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
     let _entered = runtime.enter();
@@ -264,13 +264,13 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     for other in &mut others[1..] {
         other.input(0);
     }
-    // The commanding connection is still open, although it was silent for as long as the closed connection.
+    // The connection that sends commands is still open, although it was silent for as long as the closed connection.
     assert_eq!(cell.connect().input(0), 1);
     assert!(others[0].response().is_none());
     assert_eq!(first.input(0), 1);
 }
 
-/// Returns true if the server closes the connection, before or after it receives the request.
+/// Returns true if the server closes the connection, before or after it receives a request.
 fn is_refused(mut client: Client) -> bool {
     let _ = client.0.write_all(&[0, 1, 0, 0, 0, 6, 9, 4, 0, 0, 0, 1]);
     client.response().is_none()
@@ -281,7 +281,7 @@ fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
     let cell = Cell::start(&[]);
     let mut clients: Vec<Client> = (0..8).map(|_| cell.connect()).collect();
     let silence = || std::thread::sleep(Duration::from_millis(2100));
-    // The first seven connections stay open because their coils are 1, so the last connection is closed.
+    // The first seven connections stay open because their coils are 1. The server therefore closes the last connection.
     for (n, client) in clients.iter_mut().enumerate() {
         client.input(0);
         assert_eq!(if n < 7 { client.ask(&PRESS) } else { PRESS.to_vec() }, PRESS);
@@ -290,7 +290,7 @@ fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
     let mut ninth = cell.connect();
     assert_eq!(ninth.input(0), 1);
     assert!(clients.pop().expect("the last").response().is_none());
-    // If all connections keep the arm stopped with a coil, no new connection is accepted until one coil is 0 again.
+    // If all connections hold the arm at rest with a coil, the server accepts no new connection until one coil is 0 again.
     assert_eq!(ninth.ask(&PRESS), PRESS);
     silence();
     assert!(is_refused(cell.connect()));
@@ -337,12 +337,12 @@ fn requests() -> impl Strategy<Value = Vec<u8>> {
     });
     let bytes = (0..24_u8, prop::collection::vec(any::<u8>(), 0..30))
         .prop_map(|(function, rest)| [vec![function], rest].concat());
-    // The requests do not write coils, because the test would count the Stop of a coil as a sent command.
+    // The requests do not write coils, because the test would count a Stop by a coil as a sent command.
     prop_oneof![4 => written, 4 => single, 2 => bytes]
         .prop_filter("no coil", |pdu| pdu[0] != 5 && pdu[0] != 15)
 }
 
-/// Returns true if the request would write the next sequence number.
+/// Returns true if the request would write the next valid sequence number.
 fn is_next(pdu: &[u8]) -> bool {
     let sequence = holding::SEQUENCE;
     let value = match pdu {
@@ -359,11 +359,11 @@ fn is_next(pdu: &[u8]) -> bool {
     u16::from_be_bytes(value) == FIRST + 1
 }
 
-/// A status does not contain the cause of a held stop, so the agent requests the cause from the controller. After an encoder jump the arm
-/// does not execute a motion, even if the errors were cleared.
+/// A status does not contain the cause of a held stop, so the agent requests the cause from the controller. After an encoder jump, the
+/// arm does not execute a motion, even if the errors were cleared.
 #[test]
 fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
-    // The jump occurs long after the drives were enabled.
+    // The encoder jump occurs long after the drives were enabled.
     let jump = Fault {
         kind: FaultKind::EncoderJump { joint: Joint::ALL[2], rad: 0.02 },
         trigger: Trigger::InState(ControllerState::HoldPos, 10_000),
@@ -385,7 +385,8 @@ fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
     assert_eq!((client.input(20), client.input(21)), (33, 3));
 }
 
-/// A write of a PLC without the next sequence number does not send a frame to the controller, begin a job or take the lease.
+/// Without the next sequence number, a write request of a PLC sends no frame to the controller. Without the next sequence number, a write
+/// request also begins no job and does not take the lease.
 #[test]
 fn nothing_goes_to_the_controller_without_the_next_number() {
     let cell = Cell::start(&[]);

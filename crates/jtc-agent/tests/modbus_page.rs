@@ -1,5 +1,6 @@
-//! The tables of docs/modbus.md are equal to the tables of the code. `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite modbus_page::`
-//! writes the tables of the page.
+//! The tables in docs/modbus.md must be equal to the tables in the code. The command
+//! `UPDATE_DOCS=1 cargo test -p jtc-agent --test suite modbus_page::` writes the tables of
+//! docs/modbus.md.
 use std::path::Path;
 
 const BEGIN: &str = "<!-- map begin -->\n";

@@ -1,5 +1,5 @@
-//! Test program with all tests of the crate. Each file is a module. Linking this program takes as long as linking the program of a single
-//! test.
+//! Test program that contains all tests of the crate. Each test file is a module of the test program. Linking the single program takes
+//! as long as linking a program for one test file.
 mod board;
 mod description;
 mod fuzz_regressions;

@@ -8,7 +8,7 @@ use jtc_agent::line::{Applied, Moves, Will};
 use jtc_agent::{LineEvent, Policy, Role};
 use jtc_wire::{ControllerState, ExecCommand, FrameType, RawPoint, TrajectoryState, fixed, trajectory};
 
-/// Returns the wills that were reported since the last call, in order.
+/// Returns the last wills that the line reported since the previous call, in order.
 fn wills(board: &mut Board) -> Vec<Option<Will>> {
     let events = board.line.take_events().into_iter();
     events.filter_map(|event| if let LineEvent::Will(will) = event { Some(will) } else { None }).collect()
@@ -35,7 +35,7 @@ fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
     board.send(anna, &segment());
     board.run_ms(300);
     assert_eq!(wills(&mut board), [will("anna", Policy::Stop, Moves::Upload)]);
-    // The will changes before any status shows the motion.
+    // The last will changes before any status shows the motion.
     board.send(anna, &fixed::exec(ExecCommand::Execute));
     board.run_ms(20);
     assert_eq!(wills(&mut board), [will("anna", Policy::Stop, Moves::Motion)]);
@@ -44,11 +44,12 @@ fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
     board.line.set_policy(anna, Policy::Continue);
     board.run_ms(20);
     assert_eq!(wills(&mut board), [will("anna", Policy::Continue, Moves::Motion)]);
-    // While no status is received, the arm may still be moving, so the will is kept.
+    // While no status arrives, the arm may still be moving, so the last will stays valid.
     board.deaf_until = board.now() + Duration::from_secs(3);
     board.run_ms(3_500);
     assert_eq!(wills(&mut board), []);
-    // The will is kept after its client has disconnected. When another client takes the lease, the policy of that client applies.
+    // The last will stays valid after its client has disconnected. When another client takes the lease, the policy of that client
+    // replaces the last will.
     let now = board.now();
     board.line.leave(anna, now);
     let bob = board.join("bob", Role::Operator, Policy::Pause);
@@ -81,7 +82,8 @@ fn teaching_has_a_will_before_it_shows_and_an_upload_that_leads_nowhere_none_aft
     assert_eq!(wills(&mut board), [will("anna", Policy::Pause, Moves::Upload), None]);
 }
 
-/// If the controller has not confirmed a Stop, the Stop replaces a weaker policy in the will, so that the next agent sends the Stop.
+/// If the controller has not confirmed a Stop, the Stop replaces a weaker policy in the last will. The next agent therefore sends
+/// the Stop.
 #[test]
 fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let mut board = Board::new(115_200);
@@ -94,7 +96,7 @@ fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let now = board.now();
     board.line.halt_for(None, "the desk", ExecCommand::Stop, now);
     board.run_ms(900);
-    // The owner of the line also calls this method if no bytes were received.
+    // The line's owner also calls this method if it has received no bytes.
     let now = board.now();
     board.line.from_device(&[], now);
     assert_eq!(wills(&mut board), [will("the desk", Policy::Stop, Moves::Motion)]);
@@ -126,7 +128,8 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
             "{policy:?} {state:?} {trajectory:?}"
         );
         board.run_ms(300);
-        // A hold-off begins only if a command was sent to a moving arm. The applied will stays valid while the motion continues.
+        // A hold-off begins only if a command was sent to a moving arm. The applied last will stays valid while the motion
+        // continues.
         let sent = matches!(applied, Applied::Sent(_));
         assert_eq!(board.line.last_halt(), u64::from(sent));
         assert_eq!(
@@ -139,7 +142,8 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
     }
 }
 
-/// Without a status the agent cannot know that the arm is at rest. The applied will therefore stays in the file for the next agent.
+/// Without a status, the agent cannot know that the arm is at rest. The applied last will therefore stays in the file for the next
+/// agent.
 #[test]
 fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     for policy in [Policy::Continue, Policy::Pause, Policy::Stop] {
@@ -151,7 +155,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
         board.run_ms(3_000);
         assert_eq!(board.line.will().cloned(), will("anna", policy, Moves::Motion), "{policy:?}");
         assert_eq!(wills(&mut board), [], "{policy:?}: it is as it was");
-        // The controller reports again that the arm is at rest.
+        // The controller reports that the arm is at rest again.
         board.status.trajectory = TrajectoryState::Finish.into();
         board.status.state = ControllerState::HoldPos.into();
         board.run_ms(3_000);
@@ -159,7 +163,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     }
 }
 
-/// If the controller refuses Teaching, the agent does not leave a will.
+/// If the controller refuses Teaching, the agent leaves no last will.
 #[test]
 fn teaching_that_is_refused_leaves_no_will() {
     let mut board = Board::new(115_200);

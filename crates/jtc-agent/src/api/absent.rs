@@ -1,4 +1,4 @@
-//! Absent joints, for work on a bench.
+//! Requests about absent joints, for work on a bench with an incomplete arm.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;

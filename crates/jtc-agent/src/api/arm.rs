@@ -1,4 +1,5 @@
-//! The complete arm of the controller. The API returns the arm as an arm file, and accepts only a whole arm.
+//! Requests about the complete arm of the controller: geometry, limits and parameters. The API returns the arm as an arm
+//! file, and accepts only a complete arm.
 use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::{Asker, plain};
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -85,7 +86,7 @@ impl From<Given> for GivenObject {
     }
 }
 
-/// Returns a hash as text.
+/// Returns the hash of an arm as text.
 pub(super) fn in_words(hash: u64) -> String {
     format!("{hash:016x}")
 }
@@ -123,7 +124,7 @@ pub(super) async fn put_arm(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // The body of the request is read only if the client holds the lease.
+    // The agent reads the request body only if the client holds the lease.
     agent.http_session(&asker)?;
     let (arm, store) = read(&agent, request, |ArmRequest { text, store }| Ok((taken(&text)?, store))).await?;
     let (http_session, turn) = agent.mover(&asker, after)?;

@@ -1,5 +1,5 @@
-//! Long request bodies. Only a limited number of large bodies is read at the same time, outside the threads that serve
-//! requests.
+//! Long request bodies. The agent reads only a limited number of large bodies at the same time, and does not use the
+//! threads that serve requests.
 use agent_kit::api::Problem;
 use axum::Json;
 use axum::body::Bytes;
@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::Agent;
 
-/// Optional JSON body.
+/// JSON body of a request, which may be missing.
 pub(super) struct Perhaps<T>(pub Option<T>);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
@@ -23,7 +23,8 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
     }
 }
 
-/// Reads a JSON body and converts it with `understand`. The conversion completes even if the client disconnects.
+/// Reads a JSON request body and converts it with `understand`. The conversion of the body is completed even if the
+/// client disconnects.
 pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     agent: &Agent,
     request: Request,

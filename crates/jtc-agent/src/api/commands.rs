@@ -22,7 +22,7 @@ use crate::owner::ClientPort;
 
 /// Interval at which the agent renews the lease of a client that waits for an answer.
 const RENEWED: Duration = Duration::from_millis(300);
-/// Slowest speed, % (J-57).
+/// Slowest speed that a client can set, % (J-57).
 const SPEED_MIN: u8 = 5;
 
 /// Speed, % of the speed of the trajectory.
@@ -75,7 +75,7 @@ impl Agent {
         self.act(&http_session, turn, what, act).await
     }
 
-    /// Runs the command and logs its result, even if the client disconnects.
+    /// Runs a command and logs its result, even if the client disconnects.
     pub(super) async fn act<T, E>(
         &self,
         http_session: &HttpSession,
@@ -102,7 +102,8 @@ impl Agent {
         loop {
             tokio::select! {
                 done = &mut acting => return done?,
-                // A client that waits for an answer is still connected, so its lease is renewed.
+                // A client that waits for an answer is still connected, so the agent renews its
+                // lease.
                 () = tokio::time::sleep(RENEWED) => self.line.with(|line, now| line.renew(client, now)),
             }
         }
@@ -123,7 +124,8 @@ pub(super) async fn resume(
 ) -> Result<StatusCode, Problem> {
     let http_session = agent.http_session(&asker)?;
     if http_session.is_moving() {
-        // A motion that another client stopped before it began must not be resumed.
+        // If another client stopped a motion before the motion began, the motion must not be
+        // resumed.
         agent.line.with(|line, now| {
             line.could_ask(http_session.client, now)?;
             match line.status() {

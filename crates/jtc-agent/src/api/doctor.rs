@@ -1,4 +1,4 @@
-//! Diagnosis of connection, bus and set-up, like `jtc doctor`.
+//! Diagnosis of the connection, the bus and the set-up, like `jtc doctor`.
 use std::time::Duration;
 
 use agent_kit::api::{Problem, Refusals};
@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 use super::Agent;
 use super::error::Denials;
 
-/// Time for which the agent listens: the duration of 50 statuses.
+/// Time for which the agent receives statuses: the duration of 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);
 
 /// Result of a diagnosis.
@@ -99,8 +99,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 
-/// Returns the joints that the user has declared absent. Requests this list from the controller, because the status
-/// does not show an absent joint whose drive answers (J-53).
+/// Returns the joints that the user has declared absent. The agent requests the list of absent joints from the
+/// controller. The status does not show an absent joint whose drive answers (J-53).
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(labels::absent(status));

@@ -1,4 +1,4 @@
-//! Events as numbered lists, and a live stream of events with the controller's statuses.
+//! Events of the arm as numbered lists, and a live stream of events with the controller's statuses.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};
@@ -15,7 +15,7 @@ use tokio::time::Instant;
 use super::{Agent, Caller, StatusObject};
 use crate::jobs::ArmEvent;
 
-/// Longest interval between status messages of a stream.
+/// Longest interval between two status messages of a stream.
 const QUIET: Duration = Duration::from_millis(500);
 
 /// Event with its number and time.
@@ -39,15 +39,15 @@ pub(super) async fn events(
     agent.events.ask(&agent.jobs.journal, request).await
 }
 
-/// Message of the stream that is not an event.
+/// Message of an event stream that is not an event.
 #[derive(serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage {
-    /// Status of the controller; older statuses are omitted if the client reads slowly.
+    /// Status of the controller; if the client reads slowly, older statuses are omitted.
     Status(Box<StatusObject>),
 }
 
-/// Serves `GET /api/stream`: statuses, at most 25 times a second, and events.
+/// Serves `GET /api/stream`: events, and statuses at most 25 times a second.
 pub(super) async fn stream(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,

@@ -1,4 +1,4 @@
-//! Meaning of codes: the pages of `jtc explain`.
+//! Meanings of codes: the pages of `jtc explain`.
 use agent_kit::api::{Number, Problem, Refusals};
 use axum::Json;
 use jtc_host::explain::{Page, find, named, pages};
@@ -51,7 +51,7 @@ pub(super) async fn list() -> Json<Vec<PageObject>> {
     )
 )]
 pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObject>, Problem> {
-    // The page with exactly this name comes before pages that contain the same words.
+    // A page with exactly this name has priority over pages that contain the same words.
     let fitting = named(&code).map_or_else(|| find(&code), |page| vec![page]);
     let (first, others) = fitting.split_first().ok_or_else(|| {
         let message = format!("no page explains \"{}\"", agent_kit::gate::plain(&code));

@@ -1,9 +1,10 @@
-//! Live data for Foxglove, Lichtblick and PlotJuggler over the Foxglove WebSocket protocol, with the message types of
-//! recordings.
+//! Live data for Foxglove, Lichtblick and PlotJuggler over the Foxglove WebSocket protocol. The message types of the
+//! live data are the message types of recordings.
 //!
-//! A client receives the latest values at most 25 times a second. Pings show how far the client has read. While a ping
-//! is unanswered, no values are sent. A slow client therefore loses messages but always sees recent data. A client that
-//! does not read at all is disconnected.
+//! A client receives the latest values of the arm at most 25 times a second. The answers to pings show how much data
+//! the client has read. If a ping is unanswered for 400 ms, the agent sends no further values to the client until it
+//! answers. A slow client therefore loses messages but always sees recent data. The agent disconnects a client that
+//! does not read at all.
 mod channels;
 mod protocol;
 
@@ -38,22 +39,22 @@ const MESSAGE_MAX: usize = 64 << 10;
 /// Largest number of messages that a client may send, per second and in one burst.
 const MESSAGES_PER_S: f64 = 50.0;
 const MESSAGES_AT_ONCE: f64 = 500.0;
-/// Largest number of answers that wait for a client.
+/// Largest number of answers that are queued for a client.
 const ANSWERS_MAX: usize = 64;
-/// Shortest interval between values.
+/// Shortest interval between two messages with values.
 const PERIOD: Duration = Duration::from_millis(40);
-/// Longest interval between text messages.
+/// Longest interval between two text messages.
 const QUIET: Duration = Duration::from_millis(500);
-/// Interval at which the progress of a client is checked.
+/// Interval at which the agent checks how much data a client has read.
 const PING_TIME: Duration = Duration::from_millis(200);
 /// Time after which the agent sends no new data to a client that does not read, until the client reads again.
 const LATE: Duration = Duration::from_millis(400);
 /// Time after which the agent disconnects a client that does not read.
 const GONE: Duration = Duration::from_secs(10);
-/// Longest time in which a client may leave a message unread.
+/// Longest time for which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
 
-/// Returns `true` if these headers request this protocol.
+/// Returns `true` if these headers request the Foxglove WebSocket protocol.
 pub(super) fn is_asked(headers: &HeaderMap) -> bool {
     headers
         .get_all(header::SEC_WEBSOCKET_PROTOCOL)
@@ -63,7 +64,7 @@ pub(super) fn is_asked(headers: &HeaderMap) -> bool {
         .any(|name| NAMES.contains(&name.trim()))
 }
 
-/// Serves `GET /api/foxglove`, and `GET /` for requests of this protocol.
+/// Serves `GET /api/foxglove`, and `GET /` for requests of the Foxglove WebSocket protocol.
 pub(super) async fn foxglove(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -80,7 +81,7 @@ pub(super) async fn foxglove(
     sockets.serve(caller.role, upgrade, async move |socket| serve(&agent, &caller, socket).await)
 }
 
-/// State that both directions of a WebSocket share.
+/// State that the sender and the receiver of a WebSocket share.
 struct Shared {
     wanted: Mutex<Wanted>,
     /// Notification that a message must be sent at once.
@@ -100,7 +101,7 @@ impl Shared {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Queues an answer. Returns `false` if the client does not read its answers.
+    /// Queues an answer for the client. Returns `false` if the client does not read its answers.
     fn answer(&self, message: Message) -> bool {
         let mut wanted = self.lock();
         wanted.answers.push_back(message);
@@ -116,15 +117,15 @@ impl Shared {
 async fn serve(agent: &Agent, caller: &Caller, socket: WebSocket) {
     let shared = Shared { wanted: Mutex::default(), wake: Notify::new(), read: AtomicU64::new(0) };
     let (to, from) = socket.split();
-    // The two directions of the connection do not wait for each other. A Stop is therefore accepted even from a client
-    // that does not read.
+    // Sending and receiving on the connection do not wait for each other. A Stop is therefore accepted even from a
+    // client that does not read.
     tokio::select! {
         () = receive(agent, caller, &shared, from) => {}
         () = Sender { agent, caller, shared: &shared, to, pinged: 0, pinged_at: Instant::now() }.run() => {}
     }
 }
 
-/// Handles the messages of the client until it disconnects or exceeds its limits.
+/// Processes the messages of the client until the client disconnects or exceeds its limits.
 async fn receive(agent: &Agent, caller: &Caller, shared: &Shared, mut from: SplitStream<WebSocket>) {
     let (mut allowance, mut at) = (MESSAGES_AT_ONCE, Instant::now());
     while let Some(Ok(message)) = from.next().await {
@@ -147,7 +148,7 @@ async fn receive(agent: &Agent, caller: &Caller, shared: &Shared, mut from: Spli
     }
 }
 
-/// Handles a text message. Returns `false` if the client is disconnected.
+/// Processes a text message of the client. Returns `false` if the agent disconnects the client.
 fn ask(shared: &Shared, text: &str) -> bool {
     match serde_json::from_str(text) {
         Ok(FromClient::Subscribe { subscriptions }) => subscriptions.iter().all(|subscription| {
@@ -167,7 +168,8 @@ fn ask(shared: &Shared, text: &str) -> bool {
     }
 }
 
-/// Handles a binary message, which is a Stop or a Pause if the client may send them.
+/// Processes a binary message, which calls the service Stop or Pause. Refuses the call if the client may not send
+/// Stops and Pauses.
 fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     let Some(call) = Call::parse(bytes) else {
         return shared.warn("message ignored: this server accepts no messages on channels".to_owned());
@@ -195,13 +197,13 @@ fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     })
 }
 
-/// Connection state for messages to the client.
+/// State of the connection for messages to the client.
 struct Sender<'a> {
     agent: &'a Agent,
     caller: &'a Caller,
     shared: &'a Shared,
     to: SplitSink<WebSocket, Message>,
-    /// Number of the last ping, and its time.
+    /// Number of the last ping; `pinged_at` is its time.
     pinged: u64,
     pinged_at: Instant,
 }
@@ -211,7 +213,7 @@ struct Gone;
 
 impl Sender<'_> {
     async fn run(mut self) {
-        // Every error has the same effect: the connection ends.
+        // Every error of `deliver` has the same effect: the connection ends.
         let _ = self.deliver().await;
     }
 
@@ -271,7 +273,7 @@ impl Sender<'_> {
         self.text(&ToClient::AdvertiseServices { services: channels::services() }).await
     }
 
-    /// Sends answers, and the description to new subscriptions.
+    /// Sends queued answers, and sends the robot description to new subscriptions.
     async fn answer(&mut self, writer: &mut MessageWriter) -> Result<(), Gone> {
         let (answers, latched) = {
             let mut wanted = self.shared.lock();
@@ -291,7 +293,8 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// Sends the values of a status to all subscriptions. For an old status, sends only the text message.
+    /// Sends the values in a status to all subscriptions. For an old status, sends only the text message, without
+    /// values.
     async fn values(
         &mut self,
         writer: &mut MessageWriter,
@@ -337,7 +340,8 @@ impl Sender<'_> {
         words.to_string().into_bytes()
     }
 
-    /// Returns `true` if the client has read all data up to the last ping.
+    /// Returns `true` if the agent may send more data: the client has answered the last ping, or this ping is less
+    /// than 400 ms old. Returns an error if the ping is unanswered for more than 10 s.
     fn has_read(&self) -> Result<bool, Gone> {
         if self.shared.read.load(Ordering::Relaxed) >= self.pinged {
             return Ok(true);
@@ -348,7 +352,8 @@ impl Sender<'_> {
         }
     }
 
-    /// Sends a ping after the data. The client has read the data when it answers the ping.
+    /// Sends a ping to the client after the data. When the client answers the ping, it has read all data that was sent
+    /// before the ping.
     async fn ping(&mut self) -> Result<(), Gone> {
         let back = self.shared.read.load(Ordering::Relaxed) >= self.pinged;
         if !back || self.pinged_at.elapsed() < PING_TIME {
@@ -370,7 +375,7 @@ impl Sender<'_> {
     }
 }
 
-/// Returns the time that was `ago` before now, in ns since 1970.
+/// Returns the time that lies `ago` before the present time, in ns since 1970.
 fn unix_ns(ago: Duration) -> u64 {
     u64::try_from(host_kit::unix_time().saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! Held stops in the API (J-69): texts and values of [`jtc_host::held_stop`], with their API description.
+//! Held stops in the API (J-69): the texts and values of [`jtc_host::held_stop`], with their API description.
 use jtc_host::held_stop::{HeldStop, Reacting};
 use utoipa::ToSchema;
 

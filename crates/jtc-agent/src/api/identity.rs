@@ -1,5 +1,5 @@
-//! Identity of the controller and its arm. The agent reads the identity when needed, and uses the answer for all
-//! clients.
+//! Identity of the controller and its arm. The agent reads the identity when a client needs it, and uses the same
+//! answer for all clients.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,35 +9,36 @@ use tokio::time::{Instant, timeout};
 
 use super::Agent;
 
-/// Time for which an answer is used before the agent queries the controller again.
+/// Time for which the agent uses an answer before it queries the controller again.
 const FRESH: Duration = Duration::from_secs(10);
-/// Longest wait for an answer of the controller.
+/// Longest wait for the controller's answer.
 const ASK_TIME: Duration = Duration::from_secs(3);
-/// Duration of silence after which the agent does not query the controller.
+/// If the controller is silent for this time, the agent does not query the controller.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// Known identity of the controller.
+/// Identity of the controller that the agent knows.
 #[derive(Clone)]
 pub(super) struct Identity {
     asked: Option<Instant>,
     /// Identity that the controller reports; `None` if the controller has no extensions, or before its first answer.
     pub info: Option<Info>,
-    /// Arm of the controller, or the agent's arm if the controller cannot return its arm.
+    /// Arm that the controller reports. If the controller cannot return its arm, the value is the agent's own arm.
     pub arm: Arc<Arm>,
     /// Hash of the controller's arm.
     hash: Option<u64>,
-    /// Number of frames that may have changed the arm and were sent before the query.
+    /// Number of frames that were sent before the query and may have changed the arm.
     changes: u64,
 }
 
 impl Identity {
-    /// Returns the identity that is used before the first answer of the controller.
+    /// Returns the identity that the agent uses before the first answer of the controller.
     pub(super) fn of(arm: &Arm) -> Self {
         let hash = arm.hash().ok().flatten();
         Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }
     }
 
-    /// Returns the identity that the controller reports, if the known arm is the arm that the controller uses.
+    /// Returns the identity that the controller reports. Returns `None` if the known arm differs from the arm that the
+    /// controller uses.
     pub(super) fn of_controller(&self) -> Option<&Info> {
         self.info.as_ref().filter(|info| Some(info.hash) == self.hash)
     }
@@ -47,7 +48,7 @@ impl Agent {
     /// Returns the identity of the controller. Queries the controller if the last answer is older than 10 s, or if the
     /// arm may have changed since then.
     pub(super) async fn identity(&self) -> Identity {
-        // Concurrent requests wait for the answer to the first request.
+        // Requests that arrive at the same time wait for the answer to the first request.
         let mut known = self.identity.lock().await;
         let changes = self.line.arm_changes();
         let old = known.asked.is_none_or(|asked| asked.elapsed() >= FRESH) || known.changes != changes;

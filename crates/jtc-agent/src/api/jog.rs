@@ -14,9 +14,10 @@ use utoipa::{IntoParams, ToSchema};
 use super::Agent;
 use super::error::Denials;
 
-/// Largest age, when a jog request arrives, of the status that the user saw.
+/// Largest age of the status that the user saw, when the jog request arrives.
 const SEEN_WITHIN: Duration = Duration::from_millis(500);
-/// Tolerance for a status time that is ahead of the agent's clock, because the time was rounded before it was sent.
+/// Tolerance for a status time that is later than the agent's clock. The tolerance is necessary because the client receives
+/// a rounded time.
 const AHEAD: Duration = Duration::from_millis(100);
 
 /// Joint rates of a jog.
@@ -43,8 +44,8 @@ pub(super) struct KnownToJog {
     as_of_ms: Option<u64>,
 }
 
-/// Data that the client knew when it sent the request. If the client does not send the number of the last Stop or
-/// Pause, the agent sets this number before it reads the body, because the body may arrive slowly.
+/// Data that the client knew when it sent the jog request. If the client does not send the number of the last Stop or Pause,
+/// the agent reads the number before the body. The agent does this because the body may arrive slowly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JogAsked {
     after: AskedAfter,
@@ -62,12 +63,13 @@ impl FromRequestParts<Agent> for JogAsked {
     }
 }
 
-/// Returns a duration in ms.
+/// Returns a duration as a number of milliseconds.
 const fn ms(duration: Duration) -> u64 {
     duration.as_millis() as u64
 }
 
-/// Returns the refusal of a request that was based on the status of `as_of_ms` and arrived too late, at `arrived_ms`.
+/// Returns the refusal of a jog request that arrived too late. The request was based on the status of the time `as_of_ms`,
+/// and arrived at `arrived_ms`.
 fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     let (late, ahead) = (arrived_ms.saturating_sub(as_of_ms), as_of_ms.saturating_sub(arrived_ms));
     if ahead > ms(AHEAD) {
@@ -108,10 +110,11 @@ pub(super) async fn jog(
     let http_session = agent.http_session(&asker)?;
     let turn = http_session.turn()?;
     let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);
-    // The arrival time is taken now, because the body may have arrived later than the head.
+    // The agent takes the arrival time now, because the body may have arrived later than the head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
-        // After a Stop the user must release the key. Late requests of this key therefore also extend the hold-off.
+        // After a Stop the user must release the jog key. While the user holds the key down, each late request also extends
+        // the hold-off.
         agent.line.with(|line, now| line.could_jog(http_session.client, now))?;
         return Err(late);
     }

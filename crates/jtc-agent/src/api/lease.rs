@@ -1,4 +1,4 @@
-//! Lease of clients without a connection of their own. Each request of the holder renews the lease.
+//! Lease of clients without a permanent connection. Each request of the lease holder renews the lease.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -57,8 +57,8 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// Returns the client of a lease key and renews the lease of this client. Returns an error if the client does not
-    /// hold the lease.
+    /// Returns the client that uses a lease key. Renews the lease of this client, or takes the lease for it if no
+    /// client holds the lease. Returns an error if another client holds the lease.
     pub(super) fn http_session(&self, asker: &Asker) -> Result<Arc<HttpSession>, Problem> {
         let (http_session, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(http_session.client, Some(lasts), now));
@@ -66,10 +66,10 @@ impl Agent {
         Ok(http_session)
     }
 
-    /// Like [`http_session`](Self::http_session), for requests that may move the arm. Refuses requests that were made
-    /// before the last Stop or Pause, and all requests within three seconds after a Stop or Pause of another client.
-    /// The session of the client is reserved first, so that the permission to move does not apply to requests that
-    /// cannot begin yet.
+    /// Like [`http_session`](Self::http_session), for requests that may move the arm. Refuses a request that the client
+    /// made before the last Stop or Pause. Also refuses all requests within three seconds after a Stop or Pause of
+    /// another client. Reserves the session of the client first. The permission to move therefore does not apply to
+    /// requests that cannot begin yet.
     pub(super) fn mover(
         &self,
         asker: &Asker,
@@ -81,7 +81,8 @@ impl Agent {
         Ok((http_session, turn))
     }
 
-    /// Returns the client of a lease key, and the time without a request after which the client's lease lapses.
+    /// Returns the client that uses a lease key. Also returns the time without a request after which the client's lease
+    /// lapses.
     pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<HttpSession>, Duration), Problem> {
         asker.caller.operator()?;
         let key = asker.key().ok_or(lease::Denied::NoKey)?;
@@ -169,11 +170,11 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let (http_session, _) = agent.client(&asker)?;
     let turn = match http_session.turn() {
         Ok(turn) => Some(turn),
-        // The thread of the client has ended, so the client has no running job.
+        // The client's thread has ended, so the client has no running job.
         Err(Unable::Gone) => None,
         Err(busy) => return Err(busy.into()),
     };
-    // If the client only waits for the lease, this call has no effect.
+    // If the client does not hold the lease but only waits for it, this call has no effect.
     let _ = agent.line.with(|line, now| line.release_lease(http_session.client, now));
     agent.line.wake();
     agent.note("left", json!({ "client": http_session.client.0, "name": http_session.name }));

@@ -1,4 +1,4 @@
-//! Flight recorder of the controller: state, log as a file, and restart.
+//! Flight recorder of the controller: its state, its log as a file, and its restart.
 use std::io::Cursor;
 use std::path::Path;
 
@@ -22,7 +22,7 @@ use crate::jobs::HttpSession;
 use crate::line::{Introduction, Policy};
 use crate::owner::ClientPort;
 
-/// Name of the log file.
+/// Name of the flight recorder log file.
 const FILE: &str = "flight-recorder.mcap";
 
 /// State of the flight recorder.
@@ -67,15 +67,16 @@ pub(super) struct LogJoint {
 }
 
 impl LogValues {
-    /// Returns the samples since the last start of the controller that are at most `last_s` older than the last sample.
+    /// Returns the samples of the last `last_s` seconds before the last sample. Samples before the last start of the
+    /// controller are not included.
     fn of(samples: &[Sample], last_s: f64) -> Self {
         let end = samples.last().map_or(0.0, |sample| sample.time_s);
-        // A margin of half a tick is added, because the difference of two times in seconds is not exact.
+        // A margin of half a tick is added because the difference of two times in seconds is not exact.
         let from = end - last_s - 0.5e-3;
         let rows: Vec<&Sample> =
             samples.iter().filter(|sample| (from..=end).contains(&sample.time_s)).collect();
         let joint = |j: usize| {
-            // Seven digits exceed the resolution of an encoder.
+            // Seven digits are more than the resolution of an encoder.
             let column = |value: fn(&JointSample) -> f64| {
                 let known = |sample: &&Sample| {
                     sample.joints.get(j).map(value).filter(|x| x.is_finite()).map(|x| (x * 1e7).round() / 1e7)
@@ -181,20 +182,21 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the flight recorder log and converts it. Only operators may read the log, one request at a time.
+/// Reads the flight recorder log and converts the log with `make`. Only operators may read the flight recorder log, one
+/// request at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
     make: impl FnOnce(&Account) -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
-    // The flight recorder pauses while its log is read.
+    // Only operators may read the log, because the flight recorder does not record while its log is read.
     caller.operator()?;
     agent.note("log", json!({ "from": caller.peer.to_string() }));
     let room = agent.logs.clone().try_acquire_owned().map_err(|_| {
         let next = "send the request again after some seconds";
         Problem::new("busy", "another client is reading the log of the flight recorder", next)
     })?;
-    // Uses a separate client, so that other queries do not wait for the log.
+    // The log is read with a separate client, so that other queries do not wait for the log.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = HttpSession::new(&agent.line, introduction);
@@ -214,7 +216,7 @@ async fn from_log<T: Send + 'static>(
     made.await?
 }
 
-/// Returns the recording as bytes.
+/// Returns the recording as the bytes of a file.
 fn written(account: &Account) -> Result<Vec<u8>, Problem> {
     let mut file = Cursor::new(Vec::new());
     account.write(&mut file, Path::new(FILE)).map_err(|error| Problem::of(&error))?;

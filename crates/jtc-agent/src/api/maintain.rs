@@ -1,4 +1,4 @@
-//! Maintenance: clearing and resetting single nodes, and use of the built-in arm.
+//! Maintenance: clears and resets single nodes, and switches to the built-in arm.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -49,7 +49,7 @@ pub(super) struct ResetRequest {
     pub arm_may_fall: bool,
 }
 
-/// Returns bits 0 to 5 for joints 1 to 6 and bit 6 for the gripper.
+/// Returns a bit mask of nodes: bits 0 to 5 for joints 1 to 6, and bit 6 for the gripper.
 fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     let mut mask = if gripper { 1 << labels::GRIPPER } else { 0 };
     for number in joints {
@@ -154,6 +154,6 @@ pub(super) async fn defaults(
 )]
 pub(super) async fn speed(State(agent): State<Agent>) -> Result<Json<SpeedObject>, Problem> {
     let speed = agent.ask(|session| Ok(session.speed()?)).await?;
-    // The speed is set in whole percent.
+    // The controller receives the speed in whole percent.
     Ok(Json(SpeedObject { percent: (speed * 100.0).round().clamp(0.0, 100.0) as u8 }))
 }

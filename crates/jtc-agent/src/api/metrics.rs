@@ -1,4 +1,4 @@
-//! Metrics of the controller, arm, serial line and agent, in the Prometheus text format.
+//! Metrics of the controller, the arm, the serial line and the agent, in the Prometheus text format.
 use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
@@ -10,18 +10,19 @@ use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
 use super::Agent;
 use agent_kit::api::{Problem, Refusals};
 
-/// Content type of the Prometheus text format. Programs that prefer another format also accept this type.
+/// Content type of the Prometheus text format. Programs that prefer another format of metrics also accept
+/// this content type.
 const FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// Value of a metric, with the values of its labels.
+/// Value of a metric, and the values of its labels.
 type Labelled = (Vec<String>, f64);
 
-/// Page of metrics.
+/// Page that contains all metrics.
 #[derive(Default)]
 struct Page(Registry);
 
 impl Page {
-    /// Adds values that can rise and fall.
+    /// Adds metrics whose values can rise and fall.
     fn gauges(
         &self,
         name: &str,
@@ -36,7 +37,7 @@ impl Page {
         self.0.register(Box::new(family))
     }
 
-    /// Adds values that only rise.
+    /// Adds metrics whose values only rise.
     fn counters(
         &self,
         name: &str,
@@ -60,7 +61,7 @@ impl Page {
         self.counters(name, help, &[], [("", value)])
     }
 
-    /// Adds a state: 1 for the current state, 0 for all other states.
+    /// Adds a metric for a state: 1 for the current state, 0 for all other states.
     fn state(&self, name: &str, help: &str, all: &[&'static str], is: &str) -> prometheus::Result<()> {
         let unknown = (!all.contains(&is)).then_some(is);
         let states = all.iter().copied().chain(unknown);
@@ -68,7 +69,7 @@ impl Page {
         self.gauges(name, help, &["state"], values)
     }
 
-    /// Adds the values of a status.
+    /// Adds the values in a status of the controller.
     fn status(&self, status: &Status, arm: &Arm) -> prometheus::Result<()> {
         self.state(
             "jtc_controller_state",
@@ -99,7 +100,7 @@ impl Page {
         self.joints(status, arm)
     }
 
-    /// Adds the joints that have measured values.
+    /// Adds the metrics of all joints that have measured values.
     fn joints(&self, status: &Status, arm: &Arm) -> prometheus::Result<()> {
         let each = |value: &dyn Fn(usize) -> f64| -> Vec<Labelled> {
             let measured = Joint::ALL.into_iter().filter(|joint| is_measured(status, joint.index()));
@@ -169,7 +170,7 @@ impl Page {
         )
     }
 
-    /// Adds counters of frames and statuses.
+    /// Adds the counters of frames and statuses on the serial line.
     fn line(&self, agent: &Agent) -> prometheus::Result<()> {
         let (counts, received) = agent.line.with(|line, _| (line.counts(), line.received()));
         self.counter("jtc_statuses_total", "Statuses received", received.frames)?;
@@ -200,7 +201,7 @@ impl Page {
         )
     }
 
-    /// Adds values of the agent itself.
+    /// Adds the metrics of the agent itself.
     fn agent(&self, agent: &Agent) -> prometheus::Result<()> {
         let simulated = agent.simulated.to_string();
         self.gauges(

@@ -1,4 +1,5 @@
-//! Arm model for display: frames, limits and masses. The agent uses one answer of the controller for all readers.
+//! Arm model for display: the frames, limits and masses of the arm. The agent uses one answer of the controller for all
+//! clients.
 use agent_kit::api::Refusals;
 use axum::Json;
 use axum::extract::State;
@@ -95,7 +96,7 @@ pub(super) struct ModelLink {
 impl From<&Identity> for ModelObject {
     fn from(identity: &Identity) -> Self {
         let arm: &Arm = &identity.arm;
-        // The controller may use another name for the same arm.
+        // The controller may have another name for the same arm.
         let (source, name) = match identity.of_controller() {
             Some(info) => (ModelSource::Controller, info.arm.to_string()),
             None => (ModelSource::Agent, arm.name.clone()),

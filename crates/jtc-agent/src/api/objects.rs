@@ -1,4 +1,4 @@
-//! Objects that the API sends. The description of the API is generated from these types.
+//! Objects that the API sends. The agent generates the description of the API from the types of these objects.
 use host_kit::{FrontEnd, Next};
 use jtc_host::explain::{self, Family};
 use jtc_host::held_stop::{self, HeldStop};
@@ -153,14 +153,14 @@ impl From<Payload> for PayloadObject {
 /// Held stop and encoder state that the controller has reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
-    /// Cause and age (ms) of the current held stop.
+    /// Cause of the current held stop, and the age of this stop in ms.
     pub stop: Option<(StopCause, u32)>,
     /// Joints with an encoder jump, one bit per joint.
     pub jumped: u8,
 }
 
 impl Found {
-    /// Returns the next step for the user.
+    /// Returns the next step that the user should take.
     fn next_step(&self, status: &Status) -> Next {
         if self.jumped != 0 && !status.is_held_stop() {
             return held_stop::after_encoder_jump();
@@ -179,7 +179,7 @@ pub struct SentObject {
 }
 
 impl ControllerObject {
-    /// Returns the content of a status, with the commanded joint positions if they are known.
+    /// Returns the contents of a status. Adds the commanded joint positions if they are known.
     pub(super) fn new(status: &Status, commanded_rad: Option<[f64; 6]>, found: &Found) -> Self {
         let texts = |words: Vec<&'static str>| words.into_iter().map(str::to_owned).collect();
         let codes = |family, word: u16| texts(explain::names(family, word.into()));

@@ -1,4 +1,4 @@
-//! Planning of the fastest trajectories through waypoints within the limits.
+//! Planning of the fastest trajectory through waypoints within the limits of the arm.
 use std::path::Path;
 use std::sync::Arc;
 
@@ -23,9 +23,9 @@ use super::{Agent, Caller};
 use crate::jobs::{NUMBER_MAX, StoreError};
 use crate::owner::ClientPort;
 
-/// Largest number of waypoints. A plan with more waypoints takes longer than the time limit of a request.
+/// Largest number of waypoints in a plan. A plan with more waypoints takes longer than the time limit of a request.
 const WAYPOINTS_MAX: usize = 500;
-/// Possible bearing temperatures, °C.
+/// Possible range of bearing temperatures, °C.
 const TEMPERATURES: std::ops::RangeInclusive<f64> = -40.0..=120.0;
 
 /// Waypoints, and options of the path through them.
@@ -228,7 +228,7 @@ pub(super) async fn plan(
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
     if let Some(KeepRequest { number, new: true, .. }) = request.keep {
-        // The trajectory number is checked before planning, because planning takes time.
+        // The trajectory number is checked before the planning, because the planning takes time.
         agent.jobs.store.is_free(number).map_err(|e| Problem::of(&e))?;
     }
     let room = agent.plans.clone().try_acquire_owned().map_err(|_| {
@@ -239,12 +239,12 @@ pub(super) async fn plan(
     let asked = move |session: &mut Session<ClientPort>| {
         let device = session.device_config()?;
         let mut arm = if session.has_extensions() { session.device_arm()? } else { own };
-        // The named poses are added here, because a controller does not store poses.
+        // The agent adds the named poses, because a controller does not store poses.
         arm.poses = poses;
         Ok((arm, device))
     };
     let (arm, device) = agent.ask(asked).await?;
-    // This value is dropped when the client that waits for the plan disconnects.
+    // `waits` is dropped when the client that waits for the plan disconnects.
     let waits = Arc::new(());
     let waited_for = Arc::downgrade(&waits);
     let plan = blocking(move || {
@@ -269,8 +269,8 @@ pub(super) async fn plan(
     Ok(Json(plan))
 }
 
-/// Returns the error for a plan whose client no longer waits. In the meantime the client may have stored another
-/// trajectory under this number.
+/// Returns the error for a plan after its client has disconnected. The client may have already stored another trajectory
+/// under the same number.
 fn abandoned() -> Problem {
     Problem::new(
         "abandoned",
@@ -279,7 +279,7 @@ fn abandoned() -> Problem {
     )
 }
 
-/// Returns the waypoints of a request if they are valid for planning.
+/// Returns the waypoints of a request if the waypoints and the options are valid.
 fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Problem> {
     let refused = |what: &str, message: String, value: f64, limit: f64| {
         let facts = Facts::beyond(value, limit);
@@ -311,7 +311,7 @@ fn understood(request: PlanRequest) -> Result<(PlanRequest, WaypointFile), Probl
     Ok((request, file))
 }
 
-/// Plans the motion and collects the results of the planning.
+/// Plans the motion and collects the results for the answer.
 fn planned(
     request: &PlanRequest,
     file: &WaypointFile,
@@ -322,7 +322,7 @@ fn planned(
     let way = WaypointPath::of(file, arm, options).map_err(|error| {
         let object = Problem::of(&error);
         match &error {
-            // A blend in the API is in rad or m, even if the positions are in degrees.
+            // In the API, the size of a blend is in rad or m, even if the positions are in degrees.
             WaypointError::Route(e @ PlanError::Blend { .. }) => object
                 .message(file.located(e))
                 .next("give blend_rad in rad (5° is 0.0873 rad) and blend_m in m (20 mm is 0.02 m)"),
@@ -365,7 +365,7 @@ fn planned(
     Ok(planned)
 }
 
-/// Returns the answer. Stores the trajectory if the client requested this.
+/// Returns the answer to a plan request. Stores the planned trajectory if the client has requested it.
 fn kept(
     agent: &Agent,
     request: &PlanRequest,

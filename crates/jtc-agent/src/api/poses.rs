@@ -1,4 +1,4 @@
-//! Named poses from the agent's arm file, and poses that clients have saved through the agent.
+//! Named poses: the poses of the agent's arm file, and the poses that clients have saved through the agent.
 use agent_kit::api::{Number, Problem, Refusals};
 use agent_kit::gate::plain;
 use axum::extract::State;
@@ -58,7 +58,7 @@ impl Agent {
         poses
     }
 
-    /// Returns a pose for display, with its violations of the limits of the arm that the controller uses.
+    /// Returns a pose for display. Adds the limits of the controller's arm that the pose violates.
     fn shown(&self, arm: &Arm, name: String, positions_rad: [f64; 6]) -> PoseObject {
         let from =
             if self.jobs.arm().poses.contains_key(&name) { PoseFrom::ArmFile } else { PoseFrom::Agent };
@@ -66,7 +66,8 @@ impl Agent {
         PoseObject { name, positions_rad, from, warning }
     }
 
-    /// Returns an error for a pose of the arm file, which cannot be changed through the API.
+    /// Returns an error if the pose belongs to the arm file, because such a pose cannot be changed through the
+    /// API.
     fn of_agent(&self, name: &str) -> Result<(), Problem> {
         if !is_pose_name(name) {
             return Err(pose_error(&PoseError::Name { name: plain(name) }));
@@ -82,7 +83,7 @@ impl Agent {
     }
 }
 
-/// Returns the problem for an invalid pose.
+/// Returns the problem that the API reports for an invalid pose.
 pub(super) fn pose_error(error: &PoseError) -> Problem {
     let object = Problem::of(error);
     match error {
@@ -119,7 +120,7 @@ pub(super) async fn put(
     Number(name): Number<String>,
     Perhaps(request): Perhaps<PoseRequest>,
 ) -> Result<Json<PoseObject>, Problem> {
-    // Only operators may change poses that other clients use as targets.
+    // Only operators may change poses, because other clients use these poses as targets.
     caller.operator()?;
     let saved = save(&agent, &name, request.unwrap_or_default()).await;
     let why = saved.as_ref().err().map(|error| error.message.clone());

@@ -1,4 +1,4 @@
-//! Queries to the controller that any client may request.
+//! Queries to the controller, which any client may request.
 use agent_kit::api::{Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
@@ -45,7 +45,7 @@ pub(super) struct InfoObject {
 }
 
 impl Agent {
-    /// Sends a query to the controller for any client.
+    /// Sends a query to the controller on behalf of a client.
     pub(super) async fn ask<T: Send + 'static>(
         &self,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, Error> + Send + 'static,

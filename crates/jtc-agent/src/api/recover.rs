@@ -1,4 +1,4 @@
-//! Recovery of the arm to position hold.
+//! Requests that recover the arm to position hold.
 use std::sync::Arc;
 
 use agent_kit::api::{Problem, Refusals};
@@ -39,7 +39,7 @@ pub(super) struct RecoverRequest {
 }
 
 impl RecoverRequest {
-    /// Returns the source of the parameters for a controller that lacks some of them.
+    /// Returns the source of the arm parameters, for a controller that lacks some of them.
     fn parameters(self) -> Result<RecoverParameters, Problem> {
         let Self { defaults, arm, accept_device_limits } = self;
         match arm {
@@ -75,7 +75,7 @@ pub(super) async fn begin(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // The body of the request is read only if the client holds the lease.
+    // The agent reads the request body only if the client holds the lease.
     agent.http_session(&asker)?;
     let parameters = read(&agent, request, RecoverRequest::parameters).await?;
     let (http_session, turn) = agent.mover(&asker, after)?;

@@ -1,4 +1,4 @@
-//! Jobs that run trajectories or move to a target, and the results of these jobs.
+//! Jobs that run a trajectory or move the arm to a target, and the results of these jobs.
 use std::sync::Arc;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
@@ -238,7 +238,7 @@ pub(super) async fn begin_run(
     )
 }
 
-/// Returns the error for a trajectory number whose trajectory has been replaced.
+/// Returns the error for a trajectory number under which another trajectory is stored now.
 fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(
@@ -281,7 +281,7 @@ pub(super) async fn begin_move(
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
-            // The permission is checked first, so that a client without permission does not receive another error.
+            // The agent checks the permission first. A client without permission therefore receives no other error.
             agent.http_session(&asker)?;
             let arm = Arm { poses: agent.poses(), ..(*agent.identity().await.arm).clone() };
             let to = arm.pose(&name).map_err(|error| pose_error(&error))?;
@@ -310,7 +310,7 @@ fn listed(numbers: &[f64]) -> String {
     numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Checks that a value is from 1 to `most`.
+/// Checks that a value is in the range from 1 to `most`.
 fn within(name: &str, value: f64, most: f64) -> Result<(), Problem> {
     if (1.0..=most).contains(&value) {
         return Ok(());
@@ -332,8 +332,8 @@ fn begin(
     let job = agent.jobs.begin(&http_session, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
-            // If the result is uncertain and the motion may continue, the policy from the start of the motion stays
-            // valid.
+            // If the result is uncertain, the motion may continue. If the motion may continue, the policy from the start
+            // of the motion stays valid.
             if error.is_none() || !line.may_move(now) {
                 line.set_policy(client, own);
             }

@@ -1,5 +1,5 @@
-//! Reading of the controller's settings, and changing of a list of settings. Either all settings of a list are changed,
-//! or none of them.
+//! Reads the controller's settings, and changes the settings in a list. Either all settings in the list are changed, or
+//! none of them.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
@@ -16,7 +16,7 @@ use super::Agent;
 use super::error::Denials;
 use crate::owner::ClientPort;
 
-/// Code of an unknown or refused setting.
+/// Error code for an unknown or refused setting.
 const CODE: &str = "setting";
 
 /// Condition under which a setting may be changed.
@@ -108,7 +108,7 @@ pub(super) struct SettingsRequest {
 }
 
 impl SettingsRequest {
-    /// Converts the values to the form of the protocol.
+    /// Converts the values of the settings to the form of the protocol.
     fn values(&self) -> Result<Vec<SettingValue>, Problem> {
         let count = self.settings.len();
         if !(1..=SET_VALUES_MAX).contains(&count) {
@@ -129,7 +129,7 @@ impl SettingsRequest {
         Ok(values)
     }
 
-    /// Returns the text for the command log.
+    /// Returns a text about the settings for the command log.
     fn words(&self) -> String {
         let all: Vec<String> =
             self.settings.iter().map(|change| format!("{} = {}", change.words(), change.value)).collect();
@@ -138,7 +138,8 @@ impl SettingsRequest {
 }
 
 impl SettingChange {
-    /// Returns the value in the form of the protocol, if the setting exists and the value is in range.
+    /// Returns the value of the setting in the form of the protocol. Returns an error if the setting does not exist or
+    /// the value is out of range.
     fn value(&self) -> Result<SettingValue, Problem> {
         let row = settings::named(&self.name).ok_or_else(|| {
             let message = format!("there is no setting {:?}; nothing was changed", short(&self.name));
@@ -205,12 +206,12 @@ impl SettingChange {
     }
 }
 
-/// Returns a name that a client has sent, shortened to fit in a line.
+/// Returns the name of a setting in a request, without control characters and at most 64 characters long.
 fn short(name: &str) -> String {
     agent_kit::gate::plain(name)
 }
 
-/// Returns the error for a refused change; no setting was changed.
+/// Returns the error for a refused change of settings. Each setting in the list still has its old value.
 fn none(message: String, next: &'static str) -> Problem {
     Problem::new(CODE, message, next).kind(ErrorKind::Usage)
 }

@@ -1,4 +1,4 @@
-//! Connection of a client to the serial line as a WebSocket: binary messages contain bytes of the line, text messages
+//! WebSocket that connects a client to the serial line. Binary messages contain bytes of the line, and text messages
 //! contain notices of the agent.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -20,37 +20,37 @@ use crate::owner::Line;
 
 /// Longest message of a client, bytes.
 const MESSAGE_MAX: usize = 64 << 10;
-/// Longest time in which a client may leave a message unread.
+/// Longest time for which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
-/// Interval of the pings that check if a client still answers.
+/// Interval of the pings that check whether a client still answers.
 const PING_TIME: Duration = Duration::from_secs(1);
 /// Number of consecutive unanswered pings after which the client loses the lease.
 const SILENT_MAX: u32 = 4;
-/// Close code for a client that the agent disconnects. The client sent invalid bytes or too many frames, did not read,
-/// or was silent while it held the lease.
+/// Close code that a client receives when the agent disconnects it. The agent disconnects a client that sends invalid
+/// bytes or too many frames, does not read, or is silent while it holds the lease.
 pub const CLOSE_PUT_OUT: u16 = 4000;
 
-/// Data that a client sends about itself in the URL of the WebSocket.
+/// Data about a client that the client sends in the URL of the WebSocket.
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Joining {
-    /// Name of the client that users see.
+    /// Name of the client, which users see.
     name: Option<String>,
     /// Policy for the client's motion when the client disconnects.
     #[serde(default)]
     policy: Policy,
 }
 
-/// First message of an agent.
+/// First message of the agent to a client.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hello {
-    /// Name of the port.
+    /// Name of the serial port.
     pub port: String,
     /// Bit rate of the serial line, Bd; `None` if the connection has no bit rate.
     pub baud: Option<u32>,
     /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
-    /// Role of this client.
+    /// Role of the client that receives this message.
     pub role: Role,
 }
 
@@ -58,40 +58,40 @@ pub struct Hello {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Notice {
-    /// First message.
+    /// First message to the client.
     Hello(Hello),
-    /// Frame that was not passed on.
+    /// Frame of the client that was not passed on to the controller.
     Denied {
-        /// Reason.
+        /// Reason why the frame was not passed on.
         why: String,
     },
-    /// Request about the lease that was refused.
+    /// Request of the client about the lease that was refused.
     LeaseDenied {
-        /// Reason.
+        /// Reason why the request was refused.
         why: String,
     },
-    /// Stop or Pause of the arm. Earlier requests of this client no longer move the arm, until the client sends a new
+    /// Stop or Pause of the arm. Earlier requests of the client no longer move the arm, until the client sends a new
     /// request: `{"asked_after": number}`.
     Halted {
         /// Number of this Stop or Pause.
         number: u64,
         /// Name of the client that requested this Stop or Pause.
         by: String,
-        /// Command.
+        /// Command: Stop or Pause.
         command: String,
         /// Number of Stops and Pauses of other clients since this client connected.
         of_others: Halts,
     },
     /// Request of another client for the lease.
     LeaseWanted {
-        /// Name of that client.
+        /// Name of the client that requests the lease.
         by: String,
     },
 }
 
 impl Notice {
     fn message(&self) -> Message {
-        // The message contains only strings and numbers, so this cannot fail.
+        // The message contains only strings and numbers, so the conversion to JSON cannot fail.
         Message::Text(serde_json::to_string(self).unwrap_or_default().into())
     }
 }
@@ -101,7 +101,7 @@ impl Notice {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Wish {
     Lease(LeaseWish),
-    /// Number of the last Stop or Pause that the client had seen when the client decided to send its next frames.
+    /// Number of the last Stop or Pause that the client knew when it decided to send its next frames.
     AskedAfter(u64),
 }
 
@@ -110,11 +110,11 @@ enum Wish {
 enum LeaseWish {
     Take,
     Release,
-    /// Requests the holder of the lease to release the lease.
+    /// Asks the lease holder to release the lease.
     Ask,
 }
 
-/// Serves `GET /api/line`: a connection to the serial line for a client.
+/// Serves `GET /api/line`: connects a client to the serial line.
 pub(super) async fn line(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -132,7 +132,7 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     let introduction = Introduction { name: name.clone(), role, policy: joining.policy };
     let joined = agent.line.join(introduction);
     let client = joined.client();
-    // Viewers may connect and disconnect as often as they like.
+    // Viewers can connect and disconnect without limit, so the log only counts their repetitions.
     let note = |what, facts| match role {
         Role::Operator => agent.note(what, facts),
         Role::Viewer => agent.gate.note_repeated(what, caller.peer, facts),
@@ -151,8 +151,8 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     note("left", json!({ "client": client.0, "name": name }));
 }
 
-/// Passes messages in both directions until the client or the line disconnects. The directions do not wait for each
-/// other, so the agent receives a Stop even if the client does not read.
+/// Passes messages to and from the client until the client or the line disconnects. Sending and receiving do not wait
+/// for each other. The agent therefore receives a Stop even if the client does not read.
 async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
     let alive = AtomicBool::new(true);
     let (to, from) = socket.split();
@@ -162,7 +162,7 @@ async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
     }
 }
 
-/// Passes on the messages of the client.
+/// Passes the messages of the client on to the serial line.
 async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>, alive: &AtomicBool) {
     while let Some(Ok(message)) = from.next().await {
         alive.store(true, Ordering::Relaxed);
@@ -175,15 +175,15 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
     }
 }
 
-/// Sends the client its messages, and checks that the client still answers.
+/// Sends queued messages to the client, and checks that the client still answers.
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
-    // After a delay of this computer, the agent does not send the missed pings later, so that it does not count the
-    // delay as silence of the client.
+    // After a delay of this computer, the agent does not send the missed pings later. The agent therefore does not
+    // count the delay as silence of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut silent = 0;
-    // A client counts as informed about all Stops and Pauses before it connected.
+    // The agent assumes that a new client knows all Stops and Pauses before its connection.
     let mut known = line.with(|line, _| line.asked_after(client)).unwrap_or_default();
     loop {
         let (deliveries, halt) = line.with(|line, _| {
@@ -236,7 +236,7 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
     }
 }
 
-/// Handles a request of a client to the agent; invalid requests are ignored.
+/// Processes a request of a client to the agent; invalid requests are ignored.
 fn wish(line: &Line, client: ClientId, text: &str) {
     let Ok(wish) = serde_json::from_str(text) else { return };
     line.with(|line, now| {
@@ -258,7 +258,7 @@ fn wish(line: &Line, client: ClientId, text: &str) {
     line.wake();
 }
 
-/// Sends a message; returns `false` if the client does not receive the message.
+/// Sends a message to the client; returns `false` if the client does not receive the message.
 async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
     matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
 }

@@ -1,4 +1,4 @@
-//! Storing, checking and listing of trajectories, which are identified by numbers.
+//! Requests that store, check and list trajectories. A number identifies each trajectory.
 use std::sync::Arc;
 
 use agent_kit::api::{Asked, Number, Problem, Refusals};
@@ -20,7 +20,7 @@ use super::{Agent, Caller};
 use crate::jobs::Stored;
 use crate::owner::ClientPort;
 
-/// Largest number of points in one answer.
+/// Largest number of trajectory points in one answer.
 const POINTS_MAX: usize = 2000;
 
 /// Trajectory to keep.
@@ -118,7 +118,7 @@ pub(super) struct PointsObject {
 }
 
 impl PointsObject {
-    /// Returns the trajectory with at most `most` points, but at least two.
+    /// Returns the trajectory with at least two and at most `most` points.
     fn new(stored: &Stored, most: usize) -> Self {
         let Stored { number, name, trajectory, digest, .. } = stored;
         let count = trajectory.points.len();
@@ -230,7 +230,7 @@ pub(super) async fn put(
     Asked(place): Asked<PlaceRequest>,
     request: Request,
 ) -> Result<Json<TrajectoryObject>, Problem> {
-    // Only operators may change trajectories that other clients run.
+    // Only operators may change trajectories, because other clients run them.
     caller.operator()?;
     let own = agent.clone();
     let kept = read(&agent, request, move |request| {
@@ -243,8 +243,8 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-/// Stores the trajectory in `text` under a number. If `new` is `true`, stores the trajectory only if the number is
-/// free.
+/// Stores the trajectory in `text` under a number. If `new` is `true`, stores the trajectory only if no trajectory has
+/// this number yet.
 pub(super) fn keep(
     agent: &Agent,
     (number, new): (u16, bool),
@@ -276,7 +276,7 @@ pub(super) async fn delete(
     Extension(caller): Extension<Caller>,
     Number(number): Number<u16>,
 ) -> Result<StatusCode, Problem> {
-    // Only operators may change trajectories that other clients run.
+    // Only operators may change trajectories, because other clients run them.
     caller.operator()?;
     let jobs = agent.jobs.clone();
     let gone = blocking(move || jobs.store.delete(number)).await?;

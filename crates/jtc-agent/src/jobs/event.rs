@@ -152,5 +152,5 @@ impl agent_kit::journal::JournalEvent for ArmEvent {
     }
 }
 
-/// Numbered events of an arm.
+/// Numbered events of an arm and its jobs.
 pub type Journal = agent_kit::journal::Journal<ArmEvent>;

@@ -1,4 +1,5 @@
-//! Session of an HTTP client, which has no connection to the serial line. Each request is a sign of life of the client.
+//! Session of an HTTP client, which has no connection to the serial line. Each HTTP request shows that the client still
+//! runs.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -16,7 +17,7 @@ use crate::owner::{ClientPort, Line};
 /// Interval at which an idle client reads the statuses of the controller.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Error code of a request for a motion that has already ended.
+/// Error code of a request about a motion that has already ended.
 const MOTION_ENDED: &str = "motion-ended";
 
 /// Function that runs on the session of a client.
@@ -24,49 +25,50 @@ type Work = Box<dyn FnOnce(&mut Session<ClientPort>) + Send>;
 
 /// Connection of a client to the serial line, with its session on a separate thread.
 pub struct HttpSession {
-    /// Number of the client on the serial line.
+    /// Number that identifies the client on the serial line.
     pub client: ClientId,
-    /// Name of the client that users see.
+    /// Name of the client, which users see.
     pub name: String,
     work: SyncSender<Work>,
-    /// Semaphore that permits one function at a time.
+    /// Semaphore that permits one function at a time on the session.
     free: Arc<Semaphore>,
-    /// Current job, and the queue of requests while the job runs.
+    /// Number of the current job, and the queue of requests for this job.
     job: Mutex<Option<(u64, SyncSender<Wish>)>>,
     seen: Mutex<Instant>,
     /// Policy of the client's lease.
     pub policy: Policy,
-    /// `true` while a motion runs, which accepts requests.
+    /// `true` while a motion runs. A running motion accepts requests.
     moves: AtomicBool,
 }
 
 /// Request that a client makes while a motion runs, and the channel for its result.
 pub struct Wish {
-    /// Requested change.
+    /// Change of the running motion that the client requests.
     pub flow: Flow,
-    /// Channel for the result.
+    /// Channel for the result of the request.
     pub done: oneshot::Sender<Result<(), Problem>>,
 }
 
-/// Permit to use the session of a client. The permit is returned on drop.
+/// Permit to use the session of a client. Dropping the permit returns it.
 pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSemaphorePermit);
 
 /// Reason why the session of a client cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unable {
-    /// The session is busy. Contains the number of the job that uses the session, if any.
+    /// The session is busy, because a job or another function uses the session. Number of the job that uses the
+    /// session; `None` if no job uses the session.
     Busy(Option<u64>),
     /// The serial line was lost, or the client was disconnected.
     Gone,
 }
 
 impl HttpSession {
-    /// Adds a client to the serial line in the argument.
+    /// Adds a client to the serial line `line`.
     pub fn new(line: &Line, introduction: Introduction) -> Arc<Self> {
         let (name, policy) = (introduction.name.clone(), introduction.policy);
         let port = line.connect(introduction);
         let client = port.client();
-        // The channel has space for the next function while the thread receives the previous function.
+        // The channel has space for one function while the thread receives the previous function.
         let (work, incoming) = sync_channel(1);
         std::thread::spawn(move || serve(port, &incoming));
         let seen = Mutex::new(Instant::now());
@@ -84,13 +86,13 @@ impl HttpSession {
         self.moves.load(Ordering::Acquire)
     }
 
-    /// Marks the start of a motion, which accepts requests from then on.
+    /// Marks the start of a motion. From this time, the motion accepts requests of the client.
     pub fn motion_begins(&self) {
         self.moves.store(true, Ordering::Release);
     }
 
-    /// Marks the end of a motion. Drops the requests that arrived too late, together with their result channels. The
-    /// closed channels tell the clients that the motion has ended.
+    /// Marks the end of a motion. Drops the requests that arrived too late, and their result channels. The closed
+    /// channels inform the clients that the motion has ended.
     pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
         let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
         self.moves.store(false, Ordering::Release);
@@ -105,7 +107,7 @@ impl HttpSession {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner).elapsed()
     }
 
-    /// Returns the number of the current job.
+    /// Returns the number of the client's current job.
     pub fn job(&self) -> Option<u64> {
         self.job.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|(job, _)| *job)
     }
@@ -114,16 +116,16 @@ impl HttpSession {
     ///
     /// # Errors
     ///
-    /// [`Unable::Busy`].
+    /// [`Unable::Busy`] if the session is not free.
     pub fn turn(&self) -> Result<Turn, Unable> {
         self.free.clone().try_acquire_owned().map(Turn).map_err(|_| Unable::Busy(self.job()))
     }
 
-    /// Waits for a permit and runs a short function on the session.
+    /// Waits for a permit, and runs a short function on the session.
     ///
     /// # Errors
     ///
-    /// [`Unable::Gone`].
+    /// [`Unable::Gone`] if the serial line was lost or the client was disconnected.
     pub async fn call_in_turn<T: Send + 'static>(
         &self,
         act: impl FnOnce(&mut Session<ClientPort>) -> T + Send + 'static,
@@ -132,11 +134,11 @@ impl HttpSession {
         self.act(Turn(turn), act).await
     }
 
-    /// Runs a function on the session with this permit.
+    /// Runs a function on the session; `turn` is the permit for the session.
     ///
     /// # Errors
     ///
-    /// [`Unable::Gone`].
+    /// [`Unable::Gone`] if the serial line was lost or the client was disconnected.
     pub async fn act<T: Send + 'static>(
         &self,
         turn: Turn,
@@ -145,18 +147,18 @@ impl HttpSession {
         let (done, result) = oneshot::channel();
         let work: Work = Box::new(move |session| {
             let came = act(session);
-            // The session is free before the caller receives the result, so that the caller can send its next request
-            // at once.
+            // The session becomes free before the caller receives the result. The caller can therefore send its next
+            // request at once.
             drop(turn);
-            // The function has run even if the caller has disconnected.
+            // The function has run, even if the caller has disconnected.
             let _ = done.send(came);
         });
         self.work.try_send(work).map_err(|_| Unable::Gone)?;
         result.await.map_err(|_| Unable::Gone)
     }
 
-    /// Runs a function on the session with this permit; the caller does not wait. The call has no effect if the serial
-    /// line was lost.
+    /// Runs a function on the session without waiting for its result; `turn` is the permit for the session. The call
+    /// has no effect if the serial line was lost.
     pub fn tell(&self, turn: Turn, act: impl FnOnce(&mut Session<ClientPort>) + Send + 'static) {
         let work: Work = Box::new(move |session| {
             act(session);
@@ -165,12 +167,12 @@ impl HttpSession {
         drop(self.work.try_send(work));
     }
 
-    /// Begins a job, which receives the client's requests while the job runs. After the job, when the session is free
-    /// again, `then` is called with the job's result.
+    /// Begins a job. While the job runs, the job receives the client's requests. When the job has ended and the session
+    /// is free again, `then` is called with the job's result.
     ///
     /// # Errors
     ///
-    /// [`Unable`]: the job was not begun.
+    /// [`Unable`] if the job was not begun.
     pub fn begin<T>(
         self: &Arc<Self>,
         turn: Turn,
@@ -208,7 +210,7 @@ impl HttpSession {
     fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), Problem>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        // `motion_ended` takes the same lock, so the request never reaches the next motion.
+        // `motion_ended` takes the same lock, so a request for one motion never reaches the next motion.
         let (_, wishes) = job.as_ref().filter(|_| self.is_moving())?;
         wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }
@@ -218,8 +220,8 @@ impl HttpSession {
     }
 }
 
-/// Runs the queued functions until no caller remains. Between the functions, the thread reads the deliveries, because
-/// the shared line disconnects a client that does not read.
+/// Runs the queued functions on the session until no caller remains. Between two functions, the thread reads the
+/// deliveries of the line. The shared line disconnects a client that does not read.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

@@ -1,16 +1,16 @@
-//! Named poses that were saved through the agent. If the agent has a directory for trajectories, the poses are stored in a file
-//! there and survive a restart of the agent.
+//! Named poses that clients have saved through the agent. If the agent has a directory for trajectories, a file in this
+//! directory stores the poses. The poses then survive a restart of the agent.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use jtc_host::arm::{Poses, is_pose_name};
 
-/// Largest number of poses.
+/// Largest number of poses in the store.
 pub const POSES_MAX: usize = 200;
-/// Name of the pose file.
+/// Name of the file that stores the poses.
 const FILE: &str = "poses.json";
-/// Version of the file format.
+/// Version of the format of the pose file.
 const FORMAT: u8 = 1;
 /// Positions are rounded to 1 µrad, as in arm files. At the end of an arm that is one metre long, 1 µrad corresponds to
 /// one micrometre.
@@ -19,21 +19,21 @@ const DECIMALS: f64 = 1e6;
 /// Reason why a pose is not stored.
 #[derive(Debug, thiserror::Error)]
 pub enum PoseStoreError {
-    /// The store is full.
+    /// The store of poses is full.
     #[error("the store is full: it has {POSES_MAX} poses, the maximum")]
     Full,
-    /// The file has invalid contents.
+    /// The pose file has invalid contents.
     #[error("{}: {why}", path.display())]
     Form {
-        /// Path of the file.
+        /// Path of the pose file.
         path: PathBuf,
-        /// Problem in the contents.
+        /// Problem in the contents of the pose file.
         why: String,
     },
-    /// The file cannot be read or written.
+    /// The pose file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// Path of the file.
+        /// Path of the pose file.
         path: PathBuf,
         /// Error of the operating system.
         source: io::Error,
@@ -58,7 +58,7 @@ impl host_kit::Diagnose for PoseStoreError {
     }
 }
 
-/// Contents of the file.
+/// Contents of the pose file.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Kept {
@@ -66,21 +66,21 @@ struct Kept {
     poses_rad: Poses,
 }
 
-/// Poses by name.
+/// Store of poses by name.
 #[derive(Default)]
 pub struct PoseStore {
     path: Option<PathBuf>,
     kept: Mutex<Poses>,
-    /// Lock for writing the file; it is separate, so that readers never wait for the disk.
+    /// Lock for writing the pose file. The lock is separate, so that readers never wait for the disk.
     writing: Mutex<()>,
 }
 
 impl PoseStore {
-    /// Opens the poses of a directory.
+    /// Opens the pose file in a directory.
     ///
     /// # Errors
     ///
-    /// The file cannot be read, or has invalid contents.
+    /// The pose file cannot be read, or has invalid contents.
     pub fn open(directory: &Path) -> Result<Self, PoseStoreError> {
         let path = directory.join(FILE);
         let poses = match std::fs::read(&path) {
@@ -93,7 +93,7 @@ impl PoseStore {
         Ok(Self { path: Some(path), kept: Mutex::new(poses), ..Self::default() })
     }
 
-    /// Returns all poses.
+    /// Returns all stored poses.
     pub fn list(&self) -> Poses {
         self.lock().clone()
     }
@@ -103,7 +103,7 @@ impl PoseStore {
     ///
     /// # Errors
     ///
-    /// [`PoseStoreError`]: the existing pose of this name is unchanged.
+    /// A [`PoseStoreError`]; the stored pose of this name is then unchanged.
     pub fn put(&self, name: &str, position: &[f64; 6]) -> Result<[f64; 6], PoseStoreError> {
         let rounded = position.map(|v| (v * DECIMALS).round() / DECIMALS + 0.0);
         self.change(|poses| {
@@ -116,7 +116,7 @@ impl PoseStore {
     ///
     /// # Errors
     ///
-    /// The file cannot be written. In this case the pose is not removed.
+    /// The pose file cannot be written. If an error is returned, the pose is still stored.
     pub fn delete(&self, name: &str) -> Result<bool, PoseStoreError> {
         self.change(|poses| Ok(poses.remove(name).is_some()))
     }
@@ -143,7 +143,7 @@ impl PoseStore {
     }
 }
 
-/// Returns the poses of a file.
+/// Returns the poses that the bytes of a pose file contain.
 fn understood(bytes: &[u8]) -> Result<Poses, String> {
     let Kept { format, poses_rad } = serde_json::from_slice(bytes).map_err(|e| e.to_string())?;
     if format != FORMAT {
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!((store.list().len(), store.list()["p7"]), (POSES_MAX, [1.0; 6]));
     }
 
-    /// If a directory cannot be written, the poses in memory and on disk are unchanged.
+    /// If the directory cannot be written, the poses in memory and on disk stay unchanged.
     #[test]
     fn a_disk_that_takes_nothing_leaves_what_is_kept() {
         let directory = tempfile::tempdir().expect("a directory");

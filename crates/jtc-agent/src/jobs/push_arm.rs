@@ -7,23 +7,24 @@ use super::task::STOPPED;
 use super::{ArmEvent, Done, Task};
 use crate::owner::ClientPort;
 
-/// Parameters that were sent to the controller.
+/// Arm parameters that the agent has sent to the controller.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
-    /// Number of settings that have changed.
+    /// Number of controller settings that have changed.
     pub settings: usize,
     /// `true` if the controller has stored the name of the arm.
     pub named: bool,
     /// Reports of the parameters (friction, gains, model) that the controller has confirmed.
     pub parts: Vec<PushReport>,
-    /// Hash of the arm, if all parameters were read back without a difference.
+    /// Hash of the arm; `None` if not all parameters were read back without a difference.
     pub hash: Option<u64>,
-    /// Number of the arm in the non-volatile memory.
+    /// Number of the arm in the controller's non-volatile memory.
     pub stored: Option<u32>,
 }
 
 impl Given {
-    /// Returns a text that lists the parts of an incompletely sent arm that the controller already uses.
+    /// Returns a text about an arm that was sent incompletely. The text lists the parts of the arm that the
+    /// controller already uses.
     fn in_use(&self) -> Option<String> {
         let mut parts = Vec::new();
         match self.settings {
@@ -39,9 +40,9 @@ impl Given {
     }
 }
 
-/// Sends the complete arm to the controller, then reads it back and compares it. If `store` is `true`, also stores it
-/// in non-volatile memory. Ends if a client stops or pauses the arm, because a controller with a complete arm applies
-/// torque.
+/// Sends the complete arm to the controller, then reads the arm back and compares it. If `store` is `true`, the
+/// controller also stores the arm in non-volatile memory. The job ends if a client stops or pauses the arm, because a
+/// controller with a complete arm enables torque.
 pub fn give(
     task: &Task<'_>,
     session: &mut Session<ClientPort>,
@@ -78,8 +79,8 @@ pub fn give(
     (Done { finished: error.is_none(), given: Some(given), ..Done::default() }, error)
 }
 
-/// Returns the reason why the controller does not have the complete arm, and the parts that the controller already
-/// uses.
+/// Returns the reason why the controller does not have the complete arm. The reason includes the parts of the arm
+/// that the controller already uses.
 fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> Problem {
     let halted = match error {
         Error::Cancelled => true,

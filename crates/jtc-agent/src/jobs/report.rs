@@ -1,4 +1,5 @@
-//! Reports of the last motions. The agent stores the data of these motions, and generates a page on request.
+//! Reports about the last motions of the arm. The agent stores the data of these motions, and generates the page of
+//! a report on request.
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +11,7 @@ use jtc_host::{Arm, Error};
 
 use super::{Job, Task};
 
-/// Largest number of jobs whose report is stored.
+/// Largest number of jobs whose reports are stored.
 const KEPT: usize = 16;
 /// Largest total size of all stored reports, bytes. The report of a motion of ten minutes or more needs about 20 MB.
 const BYTES_MAX: usize = 64 << 20;
@@ -24,28 +25,28 @@ pub struct MotionReport {
     failure: Option<RunFailure>,
 }
 
-/// Data about a motion in addition to its samples.
+/// Data about a motion that its samples do not contain.
 pub(super) struct Made<'a> {
-    /// `approach` or `motion`.
+    /// Phase of the job: `approach` or `motion`.
     pub phase: &'a str,
-    /// Number of motions that the job has finished before this motion, without approaches.
+    /// Number of motions that the job finished before this motion; approaches are not counted.
     pub before: u32,
     /// Outcome of the motion.
     pub outcome: &'a Result<Outcome, Error>,
     /// Statistics of the upload of the motion.
     pub upload: &'a UploadReport,
-    /// Statistics of the connection since the end of the previous motion, or since the start of the run.
+    /// Statistics of the connection since the end of the previous motion, or since the start of the job.
     pub link: LinkStatistics,
     /// Start time of the motion, since 1970.
     pub began: Duration,
-    /// Name of the port.
+    /// Name of the serial port.
     pub port: String,
     /// Bit rate of the serial line, Bd.
     pub baud: Option<u32>,
 }
 
 impl MotionReport {
-    /// Returns the data of a job's motion; `None` if no sample of the motion was received.
+    /// Returns the data of a job's motion; `None` if the agent received no sample of the motion.
     pub(super) fn new(task: &Task<'_>, arm: &Arm, digest: Digest, made: &Made<'_>) -> Option<Self> {
         if digest.samples() == 0 {
             return None;
@@ -61,7 +62,7 @@ impl MotionReport {
             trajectory: task.what.to_owned(),
             start_unix_ns: made.began.as_nanos() as u64,
             ending: Ending { outcome: outcome.into(), reason, ..Ending::default() },
-            // The description is dropped because the page does not show it.
+            // The robot description is dropped because the page of the report does not show it.
             description: None,
             ..RecordingInfo::of(arm)
         };
@@ -84,7 +85,7 @@ impl MotionReport {
         Some(Self { info, digest, facts, failure })
     }
 
-    /// Returns the page, which does not load data from a network.
+    /// Returns the report as a web page that does not load data from a network.
     pub fn html(&self) -> String {
         let Self { info, digest, facts, failure } = self;
         html(&ReportInput { facts, failure: failure.as_ref(), ..ReportInput::new(info, digest) })
@@ -96,7 +97,7 @@ impl MotionReport {
     }
 }
 
-/// Drops the oldest reports until the remaining reports are within the limits.
+/// Removes the oldest reports until the remaining reports are within the limits.
 pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
     let (mut reports, mut bytes) = (0, 0);
     for report in jobs.iter_mut().rev().map(|job| &mut job.done.report) {
@@ -132,7 +133,7 @@ mod tests {
         jobs.iter().filter(|job| job.done.report.is_some()).map(|job| job.number).collect()
     }
 
-    /// The last reports are stored within the limits, and a page can be generated from each of them.
+    /// The reports of the last jobs are stored within the limits, and a page can be generated from each of them.
     #[test]
     fn reports_of_the_last_jobs_are_kept_within_their_memory() {
         let mut jobs: VecDeque<Job> = (0..20).map(|n| job(n, usize::from(n % 10 != 9))).collect();

@@ -1,4 +1,4 @@
-//! Job that runs a motion. The job writes each step into the journal, and ends after a Stop of another client.
+//! Job that runs a motion. The job writes each of its steps into the journal, and ends after a Stop of another client.
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use super::report::{self, Made, MotionReport};
 use super::{ArmEvent, Given, Task, Wish};
 use crate::owner::ClientPort;
 
-/// Interval at which the progress of a motion is reported.
+/// Interval at which the job reports the progress of a motion.
 const MOVING: Duration = Duration::from_secs(1);
 
 /// Motion that the job runs, with the options of the motion.
@@ -28,15 +28,15 @@ const MOVING: Duration = Duration::from_secs(1);
 pub struct Order {
     /// Trajectory or target of the motion.
     pub course: Course,
-    /// `true` if the arm first moves to the first point, unless it is already there.
+    /// `true` if the arm first moves to the first point of the trajectory, unless it is already there.
     pub approach: bool,
-    /// Speed in % of the trajectory's own speed or of the limits. With `None`, a trajectory runs at its own speed, and
-    /// a move or an approach at the default speed.
+    /// Speed in % of the trajectory's own speed, or of the arm's limits. With `None`, a trajectory runs at its own
+    /// speed, and a move or an approach uses the default speed.
     pub speed_percent: Option<f64>,
-    /// Number of runs.
+    /// Number of runs of the trajectory.
     pub repeat: u32,
-    /// `true` if the user confirms that the limits of a controller without extensions are safe for the arm, although
-    /// they differ from the limits of the agent's arm.
+    /// `true` if the user confirms that the limits of a controller without extensions are safe. These limits differ
+    /// from the limits of the agent's arm.
     pub accept_device_limits: bool,
 }
 
@@ -45,24 +45,24 @@ pub struct Order {
 pub struct Done {
     /// `true` if the run was completed.
     pub finished: bool,
-    /// Number of finished motions, without approaches.
+    /// Number of finished motions; approaches are not counted.
     pub runs: u32,
     /// Results of the last motion.
     pub summary: Option<Summary>,
-    /// Report of the last motion, if its size is within the limits.
+    /// Report about the last motion, if its size is within the limits.
     pub report: report::Kept,
     /// Arm parameters that were sent to the controller.
     pub given: Option<Given>,
 }
 
-/// Runs a motion. Returns the progress of the run, and the problem that prevented or ended the run.
+/// Runs a motion. Returns the progress of the run, and the problem that ended the run or prevented its start.
 pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<Problem>) {
     let mut done = Done::default();
     let error = go(task, session, order, &mut done).err();
     (done, error)
 }
 
-/// Arm for the check of a motion, and options of the check.
+/// Arm and options that the check of a motion uses.
 struct Site {
     arm: Arm,
     options: CheckOptions,
@@ -113,7 +113,7 @@ fn go(
     }
 }
 
-/// Returns the arm of the controller if the controller can return it, otherwise the agent's arm.
+/// Returns the arm that the controller reports. If the controller cannot return its arm, returns the agent's arm.
 fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Result<Site, Error> {
     let device = session.device_config()?;
     let arm = if session.has_extensions() { session.device_arm()? } else { task.arm.clone() };
@@ -121,7 +121,7 @@ fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Re
     Ok(Site { arm, options: CheckOptions { accept_device_limits, device, ..CheckOptions::default() } })
 }
 
-/// Returns the trajectory for an order, and writes the notes of the planner into the journal.
+/// Returns the trajectory for an order, and writes the planner's notes into the journal.
 fn trajectory(
     task: &Task<'_>,
     order: &Order,
@@ -140,7 +140,7 @@ fn trajectory(
     Ok(planned.trajectory)
 }
 
-/// Running job.
+/// Job that is running.
 struct RunJob<'a> {
     task: &'a Task<'a>,
     site: &'a Site,
@@ -148,7 +148,7 @@ struct RunJob<'a> {
     done: &'a mut Done,
     /// Statistics of the connection at the end of the previous motion.
     link: LinkStatistics,
-    /// Progress of the upload that was last reported, in tenths.
+    /// Progress of the upload that the job last reported, in tenths.
     upload_shown: usize,
     /// Start time of the motion, since 1970.
     began: Duration,
@@ -169,7 +169,8 @@ impl Observer<ClientPort> for RunJob<'_> {
         before_motion(self.task, &error)
     }
 
-    /// A Stop before the motion begins also cancels the run, because the user who stops wants the arm to stay at rest.
+    /// A Stop before the start of the motion also cancels the run, because the user who stops expects the arm to stay
+    /// at rest.
     fn is_cancelled(&mut self) -> bool {
         self.task.is_halted()
     }
@@ -194,7 +195,7 @@ impl Observer<ClientPort> for RunJob<'_> {
     fn uploading(&mut self, phase: Phase, progress: &Progress) {
         let Task { job, journal, .. } = *self.task;
         let (segments_done, segments) = (progress.segments_done, progress.segments);
-        // Reports the progress of the upload in steps of 10 %.
+        // The job reports the progress of the upload in steps of 10 %.
         if segments_done * 10 >= (self.upload_shown + 1) * segments.max(1) {
             self.upload_shown = segments_done * 10 / segments.max(1);
             let phase = phase.name().to_owned();
@@ -238,15 +239,15 @@ impl Observer<ClientPort> for RunJob<'_> {
 
     fn applied(&mut self, _: Flow, result: &Result<(), Error>) {
         if let Some(done) = self.wish.take() {
-            // The client may have disconnected.
+            // If the client has disconnected, no receiver exists for the result.
             let _ = done.send(result.as_ref().copied().map_err(Problem::of));
         }
     }
 
     fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), Problem> {
         let (task, done) = (self.task, &mut *self.done);
-        // A request that arrives with the last status has no effect. The client receives the answer that the motion has
-        // ended.
+        // A request of the client that arrives with the last status has no effect. The client then receives the answer
+        // that the motion has ended.
         self.wish = None;
         task.http_session.motion_ended(task.wishes);
         let digest = self.digest.take();
@@ -272,7 +273,7 @@ impl Observer<ClientPort> for RunJob<'_> {
     }
 }
 
-/// Returns the reason why a motion was not begun or failed: an error, or a Stop of a client.
+/// Returns the reason why a motion was not begun or has failed: an error, or a Stop of a client.
 fn before_motion(task: &Task<'_>, error: &Error) -> Problem {
     match error {
         Error::Cancelled => task.stopped(),
@@ -281,7 +282,7 @@ fn before_motion(task: &Task<'_>, error: &Error) -> Problem {
     }
 }
 
-/// Returns the reason why the run was not begun.
+/// Returns the reason why the run did not begin.
 fn not_begun(error: &StartError) -> Problem {
     let object = Problem::of(error);
     match error {

@@ -1,5 +1,5 @@
-//! Current held stop of the arm (J-69). The status does not contain the cause of the stop, so the agent requests the
-//! cause from the controller once, when the stop begins.
+//! Current held stop of the arm (J-69). The status does not contain the cause of a held stop. The agent therefore
+//! requests the cause from the controller once, when the stop begins.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -8,30 +8,31 @@ use jtc_wire::{Reactions, Status, StopCause};
 
 use super::HttpSession;
 
-/// Time after which an unanswered query is repeated.
+/// Time after which the agent repeats a query that was not answered.
 const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Default)]
 struct State {
-    /// Number of held stops that have ended. An answer about a stop that has ended is dropped.
+    /// Number of held stops that have ended. The controller's answer about a held stop is dropped if the stop has
+    /// ended.
     ended: u64,
     held: bool,
     asked: Option<Instant>,
-    /// Time of the controller's answer, with the answer itself. `None` in the pair means that the controller does not
+    /// Answer of the controller, and the time of this answer. The inner `None` means that the controller does not
     /// report its reactions.
     told: Option<(Duration, Option<Reactions>)>,
-    /// Joints with an encoder jump, one bit per joint. The value is valid until the torque is off, because the drives
-    /// are then configured again.
+    /// Joints with an encoder jump, one bit per joint. The bits for encoder jumps are valid until the torque is
+    /// off, because the drives are configured again after that.
     jumped: u8,
 }
 
-/// Known data about the current held stop.
+/// Data that the agent knows about the current held stop.
 #[derive(Clone, Default)]
 pub struct Stops(Arc<Mutex<State>>);
 
 impl Stops {
-    /// Returns the cause of the current held stop, and the age of this stop in ms at the serial line's time `now`.
-    /// Returns `None` if no held stop is active, or if its cause is not known.
+    /// Returns the cause of the current held stop. Also returns the age of the held stop in ms at the time `now` of
+    /// the serial line. Returns `None` if no held stop is active, or if the agent does not know its cause.
     pub fn cause(&self, status: &Status, now: Duration) -> Option<(StopCause, u32)> {
         let state = self.lock();
         let (at, reactions) = state.told.as_ref().filter(|_| status.is_held_stop())?;
@@ -45,10 +46,11 @@ impl Stops {
         if labels::has_torque(status) { self.lock().jumped } else { 0 }
     }
 
-    /// Takes a status. If the status shows a new held stop, requests the cause from the controller.
+    /// Processes a status of the controller. If the status shows a new held stop, requests the cause from the
+    /// controller.
     pub(super) fn see(&self, status: &Status, asker: &HttpSession) {
         let Some(stop) = self.begins(status) else { return };
-        // Another query is in progress. The cause is requested at the next check.
+        // The session is busy. The cause is requested after a later status instead.
         let Ok(turn) = asker.turn() else { return };
         self.lock().asked = Some(Instant::now());
         let own = self.clone();
@@ -59,7 +61,8 @@ impl Stops {
         });
     }
 
-    /// Returns the number of the held stop whose cause must be requested. Returns `None` if no request is needed.
+    /// Returns the number of the held stop whose cause must be requested. Returns `None` if no cause must be
+    /// requested.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
         if !labels::has_torque(status) {

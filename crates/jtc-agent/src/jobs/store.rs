@@ -1,4 +1,5 @@
-//! Store of trajectories by number, for runs and for machine controls that can only send numbers.
+//! Store of trajectories, which are identified by number. Machine controls that can send only numbers select a
+//! trajectory by its number.
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -12,63 +13,63 @@ use sha2::{Digest as _, Sha256};
 
 use super::{PoseStore, PoseStoreError};
 
-/// Largest number of a trajectory; the smallest is 1.
+/// Largest number of a trajectory; the smallest number is 1.
 pub const NUMBER_MAX: u16 = 99;
 
-/// Stored trajectory.
+/// Trajectory in the store.
 #[derive(Clone, Debug)]
 pub struct Stored {
     /// Number of the trajectory.
     pub number: u16,
-    /// Name for people.
+    /// Name of the trajectory, which users see.
     pub name: String,
-    /// Points and step of the trajectory.
+    /// Points and time step of the trajectory.
     pub trajectory: Trajectory,
     /// Notes about values that were derived or omitted when the trajectory was read.
     pub notes: Vec<String>,
-    /// Digest of points and step: the digest changes with every point and with the step, but does not depend on the
-    /// name.
+    /// Digest of the points and the time step of the trajectory. The digest changes with every point and with the
+    /// time step, but does not depend on the name.
     pub digest: String,
 }
 
 /// Reason why a trajectory is not stored.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The number is out of range.
+    /// The trajectory number is out of range.
     #[error("trajectory number {0} is out of range (1 to {NUMBER_MAX})")]
     Number(u16),
-    /// Another trajectory already has this number, and the caller does not allow the trajectory to be replaced.
+    /// Another trajectory already has this number, and the caller does not permit its replacement.
     #[error("trajectory {number} already exists, {name}: nothing was replaced")]
     Taken {
-        /// Number of the trajectory.
+        /// Number that both trajectories would have.
         number: u16,
-        /// Name of the trajectory that has this number.
+        /// Name of the trajectory that already has this number.
         name: String,
     },
-    /// Two files have the same number.
+    /// Two trajectory files have the same number.
     #[error("{directory}: two files have the trajectory number {number}", directory = directory.display())]
     Twice {
-        /// Directory of the files.
+        /// Directory of the trajectory files.
         directory: PathBuf,
-        /// Number of both files.
+        /// Number of both trajectory files.
         number: u16,
     },
     /// The trajectory has more points than a controller can store.
     #[error("too many points: {points}, a controller holds at most {POINTS_MAX}")]
     TooMany {
-        /// Number of points.
+        /// Number of points of the trajectory.
         points: usize,
     },
     /// The file does not contain a readable trajectory.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The poses in the same directory cannot be used.
+    /// The poses in the directory of the trajectories cannot be used.
     #[error(transparent)]
     Poses(#[from] PoseStoreError),
-    /// The directory cannot be read or written.
+    /// The directory of the trajectories cannot be read or written.
     #[error("{path}: {source}", path = path.display())]
     Io {
-        /// Path of the file.
+        /// Path of the file or the directory.
         path: PathBuf,
         /// Error of the operating system.
         source: io::Error,
@@ -96,18 +97,18 @@ impl host_kit::Diagnose for StoreError {
     }
 }
 
-/// Trajectories by number. If the store has a directory, the trajectories survive a restart of the agent.
+/// Store of trajectories by number. If the store has a directory, the trajectories survive a restart of the agent.
 pub struct Store {
     directory: Option<PathBuf>,
     kept: Mutex<BTreeMap<u16, Arc<Stored>>>,
-    /// Named poses.
+    /// Store of named poses.
     pub poses: PoseStore,
-    /// Lock for writing the directory; it is separate, so that readers never wait for the disk.
+    /// Lock for writing into the directory. The lock is separate, so that readers never wait for the disk.
     writing: Mutex<()>,
 }
 
 impl Store {
-    /// Returns a store in memory.
+    /// Returns a store that keeps trajectories only in memory.
     pub fn in_memory() -> Self {
         Self {
             directory: None,
@@ -117,12 +118,13 @@ impl Store {
         }
     }
 
-    /// Opens a directory of files with names like `7-pick.csv`. Other files are ignored.
+    /// Opens a directory of trajectory files with names like `7-pick.csv`. Other files in the directory are
+    /// ignored.
     ///
     /// # Errors
     ///
-    /// The directory cannot be read or created, or one of its trajectories is invalid. Not starting is safer than
-    /// running with other trajectories than the users expect.
+    /// The directory cannot be read or created, or one of its trajectories is invalid. The agent then does not start,
+    /// so that it never runs other trajectories than the users expect.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let io = |source| StoreError::Io { path: directory.to_owned(), source };
         fs::create_dir_all(directory).map_err(io)?;
@@ -150,12 +152,12 @@ impl Store {
         self.lock().values().cloned().collect()
     }
 
-    /// Stores the trajectory of `text`, a file in any format that [`Loaded::parse`] accepts, and replaces the
-    /// trajectory of the same number. A run that has begun continues with the old trajectory.
+    /// Stores the trajectory in `text`, and replaces the trajectory that has the same number. `text` is a file in
+    /// any format that [`Loaded::parse`] accepts. A run that has already begun continues with the old trajectory.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]: the existing trajectory of this number is unchanged.
+    /// A [`StoreError`]; the trajectory that has this number is then unchanged.
     pub fn put(&self, number: u16, name: &str, text: &str, degrees: bool) -> Result<Arc<Stored>, StoreError> {
         self.keep((number, name), (text, degrees), false)
     }
@@ -164,7 +166,7 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// [`StoreError::Taken`], and the errors of [`put`](Self::put).
+    /// [`StoreError::Taken`] if the number is in use, and the errors of [`put`](Self::put).
     pub fn put_new(
         &self,
         number: u16,
@@ -175,11 +177,11 @@ impl Store {
         self.keep((number, name), (text, degrees), true)
     }
 
-    /// Checks that the number is free.
+    /// Checks that no trajectory has this number.
     ///
     /// # Errors
     ///
-    /// [`StoreError::Taken`].
+    /// [`StoreError::Taken`] if a trajectory has this number.
     pub fn is_free(&self, number: u16) -> Result<(), StoreError> {
         match self.get(number) {
             Some(stored) => Err(StoreError::Taken { number, name: stored.name.clone() }),
@@ -221,7 +223,7 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// The file cannot be removed. In this case the trajectory stays in the store.
+    /// The trajectory file cannot be removed. If an error is returned, the trajectory stays in the store.
     pub fn delete(&self, number: u16) -> Result<bool, StoreError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(directory) = &self.directory {
@@ -244,7 +246,7 @@ impl Stored {
     }
 }
 
-/// Returns the first 64 bits of SHA-256 over step and points, as text.
+/// Returns the first 64 bits of a SHA-256 hash of the time step and the points, as text.
 fn digest(trajectory: &Trajectory) -> String {
     let mut hash = Sha256::new();
     hash.update(trajectory.step_ms.to_le_bytes());
@@ -257,7 +259,7 @@ fn digest(trajectory: &Trajectory) -> String {
     hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Returns number and name of a trajectory file.
+/// Returns the number and the name in the path of a trajectory file.
 fn numbered(path: &Path) -> Option<(u16, String)> {
     let stem =
         path.file_stem()?.to_str().filter(|_| path.extension().is_some_and(|ending| ending == "csv"))?;
@@ -266,7 +268,7 @@ fn numbered(path: &Path) -> Option<(u16, String)> {
     Some((number, name.to_owned()))
 }
 
-/// Returns a name for a file, at most 64 bytes long.
+/// Returns a trajectory name that is valid in a file name, at most 64 bytes long.
 fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
     let mut short = String::new();
@@ -279,20 +281,20 @@ fn file_name(name: &str) -> String {
     if short.is_empty() { "trajectory".to_owned() } else { short }
 }
 
-/// Writes the file completely or not at all. The old file is removed before the new file receives its name. After a
-/// loss of power, there may therefore be no trajectory of this number, but never two.
+/// Writes the trajectory file completely or not at all. The old file is removed before the new file receives its
+/// name. After a loss of power, there may therefore be no trajectory with this number, but never two.
 fn write(directory: &Path, path: &Path, trajectory: &Trajectory, number: u16) -> io::Result<()> {
     let part = path.with_extension("part");
     let written = fs::write(&part, trajectory.to_exact_csv());
     let written = written.and_then(|()| fs::File::open(&part)?.sync_all());
-    // On a full disk, the incomplete file is removed, so that it does not occupy space.
+    // If the disk is full, the incomplete file is removed, so that it does not occupy space.
     written.inspect_err(|_| drop(fs::remove_file(&part)))?;
     remove(directory, number, Some(path))?;
     fs::rename(&part, path)?;
     fs::File::open(directory)?.sync_all()
 }
 
-/// Removes the files of a number, except `keep`.
+/// Removes all files of a trajectory number, except `keep`.
 fn remove(directory: &Path, number: u16, keep: Option<&Path>) -> io::Result<()> {
     for entry in fs::read_dir(directory)? {
         let path = entry?.path();
@@ -345,10 +347,10 @@ mod tests {
         };
         let first = digest("a", TEXT, false);
         assert!(first.len() == 16 && first.chars().all(|c| c.is_ascii_hexdigit()), "{first}");
-        // The name and the number format do not change the motion, and therefore not the digest.
+        // The name and the number format do not change the motion, and therefore do not change the digest.
         assert_eq!(digest("b", TEXT, true), first);
         assert_eq!(digest("b", &TEXT.replace("0,0\n", "0.0,-0\n"), false), first);
-        // The points, their order and the step change the motion, and therefore the digest.
+        // A change of the points, their order or the time step changes the motion, and therefore the digest.
         for other in [
             TEXT.replace("1,0,", "1,0.000001,"),
             TEXT.replace("1,0,0", "1,0,0.000001"),
@@ -371,8 +373,8 @@ mod tests {
         assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false).is_ok());
     }
 
-    /// While the disk is full, the existing trajectory stays in the store, also after a restart of the agent. When
-    /// space is free again, the next trajectory is stored.
+    /// While the disk is full, the stored trajectory stays in the store, even after a restart of the agent. When
+    /// the disk has free space again, the next trajectory is stored.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_full_disk_leaves_what_had_the_number() {

@@ -8,24 +8,24 @@ use super::{ArmEvent, HttpSession, Journal, Wish};
 use crate::line::ClientId;
 use crate::owner::Line;
 
-/// Error code of a request that was stopped before it moved the arm.
+/// Error code of a request that a Stop ended before it moved the arm.
 pub const STOPPED: &str = "stopped";
 
-/// Running job.
+/// Job that is running, with the data that it uses.
 pub struct Task<'a> {
     /// Number of the job.
     pub job: u64,
     /// Description of the job.
     pub what: &'a str,
-    /// Requests while the job runs.
+    /// Requests of the client to the running job.
     pub wishes: &'a Receiver<Wish>,
-    /// Journal for the steps of the job.
+    /// Journal into which the job writes its steps.
     pub journal: &'a Journal,
-    /// Serial line, which reports a Stop of another client to the job.
+    /// Serial line, which informs the job about a Stop of another client.
     pub line: &'a Line,
-    /// Session of the job's client.
+    /// Session of the client that requested the job.
     pub http_session: &'a HttpSession,
-    /// Arm that is used if the controller cannot return an arm.
+    /// Arm that the job uses if the controller cannot return its arm.
     pub arm: &'a Arm,
 }
 
@@ -35,7 +35,8 @@ impl Task<'_> {
         self.journal.write(ArmEvent::Note { job: self.job, text });
     }
 
-    /// Returns `true` if the arm was stopped or paused after this motion was requested or resumed.
+    /// Returns `true` if a client stopped or paused the arm after this motion was requested or
+    /// resumed.
     pub fn is_halted(&self) -> bool {
         self.line.with(|line, _| line.is_halted(self.http_session.client))
     }
@@ -45,13 +46,13 @@ impl Task<'_> {
         self.line.with(|line, _| line.halted_by(self.http_session.client).to_owned())
     }
 
-    /// Returns the error for a job that was stopped before it moved the arm.
+    /// Returns the error for a job that a Stop ended before it moved the arm.
     pub fn stopped(&self) -> Problem {
         stopped(self.line, self.http_session.client)
     }
 }
 
-/// Returns the error for a request that was stopped before it moved the arm.
+/// Returns the error for a request that a Stop ended before it moved the arm.
 pub fn stopped(line: &Line, client: ClientId) -> Problem {
     let by = line.with(|line, _| line.halted_by(client).to_owned());
     Problem::new(

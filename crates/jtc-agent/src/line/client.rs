@@ -1,4 +1,4 @@
-//! Client on the serial line, with its received frames and its waiting deliveries.
+//! Client on the serial line, with its received frames and its queued deliveries.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -10,21 +10,23 @@ use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 use super::Denied;
 use super::frame_class::HostFrame;
 
-/// Largest number of waiting bytes of a client's frames. This limit is enough for the frames in flight of an upload,
-/// and some commands.
+/// Largest number of queued bytes of a client's frames. This number of bytes is enough for some commands and for the
+/// frames of an upload that are sent without waiting for a response.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
-/// Largest number of waiting frames of a client. Equals the number of frames that a client may send in one burst.
+/// Largest number of queued frames of a client. The largest number of queued frames equals the number of frames that a
+/// client may send in one burst.
 const FRAMES_WAITING: usize = 500;
-/// Largest number of unread bytes of a client, enough for two minutes of statuses.
+/// Largest number of unread bytes of a client; this number is enough for two minutes of statuses.
 const UNREAD_MAX: usize = 1 << 20;
 
 /// Largest number of frames that a client may send, per second and in one burst.
 const FRAMES_PER_S: f64 = 250.0;
 const FRAMES_AT_ONCE: f64 = 500.0;
-/// Largest number of waiting records for refused frames; with each status, one of these records is sent.
+/// Largest number of queued response records for refused frames. Each status delivers at most one response record for
+/// a refused frame.
 const REFUSALS_MAX: usize = 600;
 
-/// Number of a client. Numbers are not reused.
+/// Number that identifies a client. Client numbers are not reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
 
@@ -44,7 +46,7 @@ pub enum Policy {
 }
 
 impl Policy {
-    /// Returns the command of the policy, if the policy has a command.
+    /// Returns the Stop or Pause of the policy; `None` for the policy Continue.
     pub(super) fn command(self) -> Option<ExecCommand> {
         match self {
             Self::Continue => None,
@@ -66,7 +68,7 @@ impl Policy {
 /// Data that describes a client when it connects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Introduction {
-    /// Name of the client that users see.
+    /// Name of the client, which users see.
     pub name: String,
     /// Role of the client.
     pub role: Role,
@@ -79,10 +81,10 @@ pub struct Introduction {
 pub enum Delivery {
     /// Bytes from the controller: statuses, and answers to the client's own requests.
     Bytes(Vec<u8>),
-    /// Reason why a frame of the client was not passed on. The record of the frame follows in a status; the record only
-    /// contains "not allowed".
+    /// Reason why a frame of the client was not passed on to the controller. The response record of the refused frame
+    /// follows in a status; the record only contains "not allowed".
     Denied(Denied),
-    /// Reason why a request about the lease was refused.
+    /// Reason why the agent refused a request about the lease.
     LeaseDenied(Denied),
     /// Name of another client that requests the lease.
     LeaseWanted(String),
@@ -97,13 +99,13 @@ impl Delivery {
     }
 }
 
-/// Reason why a client was disconnected.
+/// Reason why the agent disconnected a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PutOut {
     /// The client sent bytes that are not a host frame.
     #[error("the client sent bytes that are not a frame of this protocol")]
     NoFrame,
-    /// The client sent so many bytes or frames that the other clients would be disturbed.
+    /// The client sent so many bytes or frames that it would disturb the other clients.
     #[error(
         "the client sent more than {FRAMES_PER_S} frames per second, or has more than {FRAMES_WAITING} \
          frames or {WAITING_MAX} bytes in the queue"
@@ -112,7 +114,7 @@ pub enum PutOut {
     /// The lease holder sent no data for several seconds.
     #[error("the client held the lease, and was silent for some seconds")]
     Silent,
-    /// The client does not read.
+    /// The client does not read its data.
     #[error("the client has left more than {UNREAD_MAX} bytes unread")]
     Unread,
 }
@@ -122,29 +124,30 @@ pub(super) struct Client {
     pub introduction: Introduction,
     /// Bytes of an incomplete frame.
     partial: Vec<u8>,
-    /// Frames that wait for the serial line.
+    /// Frames of the client that are queued for the serial line.
     pub waiting: VecDeque<HostFrame>,
     waiting_bytes: usize,
-    /// Number of waiting frames that need the lease.
+    /// Number of queued frames that need the lease.
     commands: usize,
-    /// Records of refused frames.
+    /// Response records of refused frames.
     refusals: VecDeque<Response>,
     deliveries: VecDeque<Delivery>,
     unread: usize,
-    /// End of the hold-off after a Stop or a Pause of another client. Before that time, no motion of this client
+    /// End of the hold-off after a Stop or a Pause of another client. During the hold-off, no motion of this client
     /// begins.
     pub calm_until: Duration,
-    /// Number of the last Stop or Pause that the client knew when it made its present requests.
+    /// Number of the last Stop or Pause that the client knew when it made its last motion request.
     pub asked_after: u64,
     /// Number of Stops and Pauses of other clients since this client connected.
     pub halts: Halts,
-    /// Last sign of life of the client, and the duration of its lease.
+    /// Time when the client was last active, and the duration of its lease.
     pub presence: Presence,
     /// Arrival time of the client's last frame.
     pub heard_at: Duration,
-    /// `true` if the lease of the client has lapsed and the client has not requested a new lease since then.
+    /// `true` if the client's lease has lapsed and the client has not requested the lease again.
     pub lapsed: bool,
-    /// Number of frames that the client may still send at once, and the time of this value.
+    /// Number of frames that the client may still send at once. `allowed_at` is the time at which this number was
+    /// computed.
     allowance: f64,
     allowed_at: Duration,
 }
@@ -171,7 +174,7 @@ impl Client {
         }
     }
 
-    /// Removes bytes from the front of `bytes` until a frame is complete.
+    /// Removes bytes from the front of `bytes` until a frame of the client is complete.
     pub(super) fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<HostFrame>, PutOut> {
         loop {
             let wanted = match self.partial.get(2..4) {
@@ -203,18 +206,18 @@ impl Client {
         if self.allowance < 0.0 { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
-    /// Queues the record of a refused frame, which is sent with one of the next statuses.
+    /// Queues the response record of a refused frame. One of the next statuses delivers the response record.
     pub(super) fn refuse(&mut self, response: Response) -> Result<(), PutOut> {
         self.refusals.push_back(response);
         if self.refusals.len() > REFUSALS_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
-    /// Removes and returns the next queued record of a refused frame.
+    /// Removes and returns the next queued response record of a refused frame.
     pub(super) fn take_refusal(&mut self) -> Option<Response> {
         self.refusals.pop_front()
     }
 
-    /// Queues a frame for the serial line.
+    /// Queues a frame of the client for the serial line.
     pub(super) fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
         self.waiting_bytes += frame.bytes.len();
         self.commands += usize::from(frame.class.needs_lease());
@@ -226,7 +229,7 @@ impl Client {
         }
     }
 
-    /// Removes and returns the next queued frame.
+    /// Removes and returns the next queued frame of the client.
     pub(super) fn take_waiting(&mut self) -> Option<HostFrame> {
         let frame = self.waiting.pop_front()?;
         self.waiting_bytes -= frame.bytes.len();
@@ -234,8 +237,8 @@ impl Client {
         Some(frame)
     }
 
-    /// Removes the queued frames that need the lease; the other frames keep their order. Returns at once if no such
-    /// frame is queued, because every Stop calls this function for all clients.
+    /// Removes the queued frames that need the lease; the remaining frames keep their order. Returns at once if no
+    /// frame that needs the lease is queued, because every Stop calls this function for all clients.
     pub(super) fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();
@@ -246,14 +249,15 @@ impl Client {
         VecDeque::into(taken)
     }
 
-    /// Queues a delivery. Returns an error if the number of unread bytes of the client exceeds the limit.
+    /// Queues a delivery for the client. Returns an error if the number of unread bytes of the client exceeds the
+    /// limit.
     pub(super) fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
         self.unread += delivery.len();
         self.deliveries.push_back(delivery);
         if self.unread > UNREAD_MAX { Err(PutOut::Unread) } else { Ok(()) }
     }
 
-    /// Removes and returns the queued deliveries.
+    /// Removes and returns the queued deliveries of the client.
     pub(super) fn take_deliveries(&mut self) -> Vec<Delivery> {
         self.unread = 0;
         self.deliveries.drain(..).collect()

@@ -1,4 +1,5 @@
-//! Controller side of the serial line: selects the next bytes to write, and the clients that receive each record.
+//! Controller side of the serial line: selects the next bytes to write, and the clients that receive each response
+//! record.
 use std::time::Duration;
 
 use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
@@ -11,7 +12,7 @@ use super::{
 };
 
 impl SharedLine {
-    /// Returns the time at which [`to_device`](Self::to_device) must be called again if no other event occurs before.
+    /// Returns the time of the next call of [`to_device`](Self::to_device), if no other event occurs before.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         let waits = self.clients.values().any(|client| !client.waiting.is_empty());
         let line = match self.tx_queue.due(now) {
@@ -19,13 +20,13 @@ impl SharedLine {
             due => due,
         };
         let lease = self.lease.as_ref().and_then(|lease| lease.until);
-        // A command that waits for the serial line is due as soon as the line is free.
+        // A command that is queued for the serial line must be written as soon as the line is free.
         let own = [self.halts.due(now), self.motion_tracker.due()].into_iter().flatten().min();
         let own = own.filter(|_| self.tx_queue.due(now).is_none());
         [line, lease, own].into_iter().flatten().min()
     }
 
-    /// Returns the bytes to write to the controller now.
+    /// Returns the bytes to be written to the controller now.
     pub fn to_device(&mut self, now: Duration) -> Vec<u8> {
         self.end_lapsed(now);
         self.sent.retain(|sent| now < sent.at + RECORD_TIME);
@@ -60,12 +61,12 @@ impl SharedLine {
         }
     }
 
-    /// Records that the operating system has accepted the bytes at time `now`.
+    /// Records that the operating system accepted the written bytes at time `now`.
     pub fn handed_over(&mut self, now: Duration) {
         self.tx_queue.handed_over(now);
     }
 
-    /// Returns the next frame to write. Frames are taken from the clients in rotation.
+    /// Returns the next frame to be written. The frames of the clients are taken in rotation.
     fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
         if let Some(frame) = self.motion_tracker.frame(now) {
             return Some(Outgoing { client: OWNER, frame });
@@ -87,8 +88,8 @@ impl SharedLine {
             }
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
-            // Frames that the controller returns have no number. The next request for such a frame therefore waits
-            // until the previous request is answered (J-50).
+            // Frames that the controller returns do not contain the number of their request. The next request for a
+            // frame of the controller therefore waits until the previous request is answered (J-50).
             let returns = frame.returns();
             if returns.is_some() && self.returns.is_some() {
                 continue;
@@ -105,7 +106,7 @@ impl SharedLine {
     }
 
     /// Refuses queued frames of clients that have lost the lease. A client whose lease has lapsed takes the lease
-    /// again, if the lease is free and the client's policy permits its motion to continue.
+    /// again if the lease is free and the client's policy lets the motion continue.
     fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
         let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());
@@ -202,10 +203,12 @@ impl SharedLine {
         }
     }
 
-    /// Returns the clients that receive a record. The record of a Stop goes to all clients that requested the Stop.
+    /// Returns the clients that receive a response record. The response record of a Stop goes to all clients that
+    /// requested the Stop.
     fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
         let arrived = response.status == FrameStatus::NoError;
-        // Records arrive in the order of the frames. The record of every earlier frame was therefore lost or damaged.
+        // Response records arrive in the order of the frames. If the response record of an earlier frame has not
+        // arrived, it was therefore lost or damaged.
         let at = self.sent.iter().position(|sent| {
             if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
         });
@@ -217,7 +220,7 @@ impl SharedLine {
         if let Some(returns) =
             self.returns.as_mut().filter(|r| r.client == sent.client && Some(r.kind) == returned)
         {
-            // The requested frame follows, unless the controller refused the request.
+            // The controller sends the requested frame after the response record, unless it refused the request.
             returns.until = if response.accepted() { now + RETURN_TIME } else { now };
         }
         if sent.client == HALTS {

@@ -3,25 +3,25 @@ use jtc_wire::{FrameType, Response};
 
 use super::{ClientId, Denied, FrameClass, Lease, Policy, PutOut, Will};
 
-/// Numbers of events on a line since the thread that owns the serial line was started.
+/// Numbers of events on a line since the start of the thread that owns the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Number of written frames that change a state.
+    /// Number of written frames that change the state of the controller.
     pub sent: u64,
     /// Number of state-changing frames that the controller accepted.
     pub accepted: u64,
     /// Number of state-changing frames that the controller refused.
     pub refused: u64,
-    /// Number of client frames that were not sent to the controller.
+    /// Number of client frames that the agent did not send to the controller.
     pub denied: u64,
-    /// Number of clients that were disconnected.
+    /// Number of clients that the agent disconnected.
     pub put_out: u64,
     /// Number of Stops and Pauses that the controller did not confirm after many tries.
     pub not_taken: u64,
 }
 
 impl Counts {
-    /// Counts an event.
+    /// Adds an event to the counts.
     pub(super) fn count(&mut self, event: &LineEvent) {
         let count = match event {
             LineEvent::Sent { .. } => &mut self.sent,
@@ -39,31 +39,31 @@ impl Counts {
 /// Event on the serial line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineEvent {
-    /// Written frame that changes a state.
+    /// Written frame that changes the state of the controller.
     Sent {
         /// Client that sent the frame.
         client: ClientId,
         /// Type of the frame.
         frame_type: FrameType,
-        /// Class of the frame.
+        /// Class of the written frame.
         class: FrameClass,
-        /// Complete frame.
+        /// Bytes of the complete frame.
         bytes: Vec<u8>,
     },
-    /// Answer of the controller to a frame that changes a state.
+    /// Answer of the controller to a frame that changes its state.
     Answered {
         /// Client that sent the frame.
         client: ClientId,
         /// Answer of the controller.
         response: Response,
     },
-    /// Client frame that was not sent to the controller.
+    /// Client frame that the agent did not send to the controller.
     Denied {
         /// Client that sent the frame.
         client: ClientId,
         /// Type of the frame.
         frame_type: FrameType,
-        /// Reason.
+        /// Reason why the frame was not sent.
         denied: Denied,
     },
     /// Change of the lease holder.
@@ -72,19 +72,19 @@ pub enum LineEvent {
     PolicyApplied {
         /// Client whose policy was applied.
         client: ClientId,
-        /// Applied policy.
+        /// Policy that was applied.
         policy: Policy,
     },
     /// Stop or Pause that was sent many times without a confirmation of the controller.
     NotTaken,
-    /// Change of the motion, or of the client whose policy applies to the motion. `None` means that the motion has
-    /// ended.
+    /// Change of the cause of a motion, or of the client whose policy applies to the motion. `None` means that no
+    /// motion is in progress or expected any more.
     Will(Option<Will>),
     /// Disconnection of a client by the agent.
     PutOut {
-        /// Number of the client.
+        /// Number of the disconnected client.
         client: ClientId,
-        /// Reason.
+        /// Reason why the agent disconnected the client.
         reason: PutOut,
     },
 }

@@ -4,13 +4,15 @@ use jtc_wire::{Command, DataStatus, ExecCommand, FrameRef, FrameType, LOG_NO_BLO
 /// Effect of a host frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameClass {
-    /// Only reads. Every client may send the frame.
+    /// The frame only reads data of the controller. Every client may send a frame of this class.
     Ask,
-    /// Stop or Pause. Every client may send the frame, which overtakes all other frames.
+    /// The frame is a Stop or a Pause. Every client may send a frame of this class, and it overtakes all other
+    /// frames.
     Halt(ExecCommand),
-    /// The frame may begin a motion. The frame is refused if the client requested the motion before a Stop.
+    /// The frame may begin a motion. The frame is refused if the client requested the motion before the last Stop.
     Motion,
-    /// Changes something else. Only the holder of the lease may send the frame.
+    /// The frame changes a state of the controller without a motion. Only the lease holder may send a frame of this
+    /// class.
     Command,
 }
 
@@ -31,13 +33,13 @@ impl FrameClass {
         }
     }
 
-    /// Returns true if only the holder of the lease may send the frame.
+    /// Returns true if only the lease holder may send the frame.
     pub fn needs_lease(self) -> bool {
         matches!(self, Self::Motion | Self::Command)
     }
 }
 
-/// Complete valid frame of a host, and its class.
+/// Complete valid host frame, and its class.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct HostFrame {
     pub bytes: Vec<u8>,
@@ -46,7 +48,7 @@ pub(super) struct HostFrame {
 }
 
 impl HostFrame {
-    /// Parses the bytes; returns `None` if they are not a valid host frame.
+    /// Parses the bytes of a frame; returns `None` if they are not a valid host frame.
     pub(super) fn parse(bytes: Vec<u8>) -> Option<Self> {
         let frame = FrameRef::new_checked(&bytes).filter(|frame| frame.frame_type.from_host())?;
         let (frame_type, class) = (frame.frame_type, FrameClass::of(frame));
@@ -54,24 +56,24 @@ impl HostFrame {
     }
 
     /// Returns true if the frame reads the log of the flight recorder. Viewers may not send this frame, because the
-    /// recorder pauses while its log is read (J-56).
+    /// flight recorder does not record while its log is read (J-56).
     pub(super) fn reads_log(&self) -> bool {
         let command = FrameRef::new_checked(&self.bytes).map(Command::parse);
         matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)
     }
 
-    /// Returns the type of the frame that the controller sends in addition to the record.
+    /// Returns the type of the frame that the controller sends in addition to the response record.
     pub(super) fn returns(&self) -> Option<FrameType> {
         returned_by(self.frame_type)
     }
 
-    /// Returns the record of a frame that the agent refuses before the controller receives it.
+    /// Returns the response record for a frame that the agent refuses.
     pub(super) fn refusal(&self) -> Response {
         Response::good(self.frame_type, DataStatus::NotAllowed, self.bytes.len() as u16)
     }
 }
 
-/// Returns true if the frame may change the arm of the controller (J-51 to J-55).
+/// Returns true if the frame may change the controller's arm (J-51 to J-55).
 pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     use FrameType::*;
     matches!(
@@ -90,7 +92,8 @@ pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     )
 }
 
-/// Returns the type of the frame that the controller sends in answer to this request, in addition to the record.
+/// Returns the type of the frame with which the controller answers this request, in addition to the response
+/// record.
 pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
     match request {
         FrameType::GetInfo => Some(FrameType::Info),

@@ -1,43 +1,45 @@
-//! Lease of the serial line: only the client that holds the lease may send commands. All clients can see the holder's
-//! name.
+//! Lease of the serial line: only the client that holds the lease may send commands. All clients can see the name of
+//! the lease holder.
 use std::time::Duration;
 
 use agent_kit::lease::Presence;
 
 use super::{ClientId, Delivery, Introduction, LineEvent, Policy, PutOut, Role, SharedLine};
 
-/// Name that is reported as the source of a Stop that a disconnected client's policy requested.
+/// Name that is reported instead of a client's name if the policy of a disconnected client caused a Stop.
 pub(super) const POLICY: &str = "the policy of a disconnected client";
-/// Special value instead of the number of a Stop: the policy of the client has cancelled the client's requests.
+/// Special value instead of the number of a Stop. The value means that the client's policy has cancelled the client's
+/// requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
 /// Lease of a client on the serial line.
 pub type Lease = agent_kit::lease::Lease<ClientId>;
 
-/// Reason why a client may not command.
+/// Reason why a client may not send commands.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error, serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Denied {
     /// Another client holds the lease.
     #[error("{holder} has held the lease of this arm for {age_s:.0} s: only one client can hold it at a time", age_s = *age_ms as f64 / 1000.0)]
     Held {
-        /// Name of the holder.
+        /// Name of the lease holder.
         holder: String,
-        /// Time since the holder took the lease, ms.
+        /// Time since the lease holder took the lease, ms.
         age_ms: u64,
     },
     /// Another client already waits for the lease.
     #[error("{by} already waits for the lease of {holder}: only one client can wait for it")]
     Awaited {
-        /// Name of the holder.
+        /// Name of the lease holder.
         holder: String,
-        /// Name of the waiting client.
+        /// Name of the client that already waits for the lease.
         by: String,
     },
-    /// The client may only read and stop.
+    /// The client is a viewer: it may only read and stop.
     #[error("this client can only read and stop: commands need the operator's token")]
     Viewer,
-    /// The arm was stopped or paused after the request, or by another client shortly before the request (hold-off).
+    /// A client stopped or paused the arm after the request, or another client did so shortly before the request
+    /// (hold-off).
     #[error(
         "{by} has stopped the arm: earlier requests were discarded, and motion requests are refused for 3 s"
     )]
@@ -45,11 +47,11 @@ pub enum Denied {
         /// Name of the client that stopped or paused the arm.
         by: String,
     },
-    /// The client was disconnected.
+    /// The agent disconnected the client.
     #[error("this client has lost its connection: the agent or the client ended it")]
     Gone,
-    /// The controller supervises its host, and the lease holder is silent. Queries of other clients would hide the
-    /// silence from the controller (J-59).
+    /// Host supervision of the controller is active, and the lease holder is silent. Queries of other clients would
+    /// prevent the controller from detecting the silence of the lease holder (J-59).
     #[error(
         "{who} is silent: the agent sends no queries of other clients until the arm is at rest, so that the \
          controller can pause the motion"
@@ -64,19 +66,19 @@ pub enum Denied {
 }
 
 impl SharedLine {
-    /// Present lease; `None` if no client holds the lease.
+    /// Returns the present lease; `None` if no client holds the lease.
     pub fn lease(&self) -> Option<&Lease> {
         self.lease.as_ref()
     }
 
-    /// Takes or renews the lease. `lasts` is the time without renewal after which the lease lapses. A lease that the
-    /// client receives later, by a command or from another client, has the same duration. With `None`, the lease lasts
-    /// while the client is connected.
+    /// Takes or renews the lease for a client. `lasts` is the time without renewal after which the lease lapses. If the
+    /// client receives the lease later, by a command or from another client, this lease has the same duration. If
+    /// `lasts` is `None`, the lease lasts while the client is connected.
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, or if this client may not take it. If another client holds the
-    /// lease, the holder receives a request to release it.
+    /// [`Denied`] if another client holds the lease, or if this client may not take it. To request the lease from its
+    /// holder, see [`want_lease`](Self::want_lease).
     pub fn take_lease(
         &mut self,
         client: ClientId,
@@ -93,11 +95,11 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Releases the lease, which passes to the client that has requested it, if any.
+    /// Releases the lease. A client that waits for the lease receives it.
     ///
     /// # Errors
     ///
-    /// [`Denied::NotHolder`].
+    /// [`Denied::NotHolder`] if the client does not hold the lease.
     pub fn release_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
         // If a client releases the lease during a motion, the motion continues.
@@ -106,13 +108,14 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Requests the lease from the client that holds it. The first client that requests the lease stays first until it
-    /// receives the lease, disconnects, or is silent for the duration of its own lease.
+    /// Requests the lease from the client that holds it. The first client that requests the lease keeps its position
+    /// until it receives the lease or disconnects. If the waiting client is silent for the duration of its own lease,
+    /// another client can take its position.
     ///
     /// # Errors
     ///
-    /// [`Denied::Viewer`]; [`Denied::Awaited`]; [`Denied::NotHolder`] if no client holds the lease, so that it can be
-    /// taken.
+    /// [`Denied::Viewer`], [`Denied::Awaited`], or [`Denied::NotHolder`] if no client holds the lease, so that the
+    /// client can take it.
     pub fn want_lease(&mut self, client: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(Introduction { name, role: Role::Operator, .. }) = self.introduction(client).cloned() else {
             return Err(Denied::Viewer);
@@ -133,16 +136,16 @@ impl SharedLine {
         self.clients.get(&id).map(|client| client.presence.lasts)
     }
 
-    /// Records a sign of life of the client.
+    /// Records that the client is active at `now`.
     fn show(&mut self, id: ClientId, now: Duration) {
         if let Some(client) = self.clients.get_mut(&id) {
             client.presence.seen = now;
         }
     }
 
-    /// Disconnects a holder of the lease that no longer sends data, and applies the holder's policy to its motion. A
-    /// client that sends data again later must first reconnect, so that it receives the changes that other clients made
-    /// in the meantime.
+    /// Disconnects a lease holder that no longer sends data, and applies the holder's policy to its motion. The client
+    /// must reconnect before it sends data again. By reconnecting, the client receives the changes that other clients
+    /// have made.
     pub fn lapse(&mut self, client: ClientId, now: Duration) {
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.put_out(client, PutOut::Silent, now);
@@ -170,13 +173,14 @@ impl SharedLine {
                 let age_ms = now.saturating_sub(lease.since).as_millis() as u64;
                 Err(Denied::Held { holder: self.name(lease.holder), age_ms })
             }
-            // Only the client's own policy applies to the motion that the client began.
+            // The policy of the client has ended its motion, so the client receives the lease again only if it
+            // requests the lease.
             None if self.is_over(id) => Err(Denied::NotHolder),
             None => Ok(()),
         }
     }
 
-    /// Records a sign of life of the client, and renews the lease if the client holds it.
+    /// Records that the client is active at `now`, and renews the lease if the client holds it.
     pub fn renew(&mut self, id: ClientId, now: Duration) {
         self.end_lapsed(now);
         self.show(id, now);
@@ -186,7 +190,7 @@ impl SharedLine {
         }
     }
 
-    /// Returns true if the lease of this client has lapsed, and the client's policy has ended its motion.
+    /// Returns true if the lease of this client has lapsed and the client's policy has ended its motion.
     fn is_over(&self, id: ClientId) -> bool {
         let client = self.clients.get(&id);
         client.is_some_and(|client| client.lapsed && client.introduction.policy != Policy::Continue)
@@ -211,7 +215,8 @@ impl SharedLine {
         if self.hold(POLICY, command, now) {
             self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
         } else if let Some(client) = self.clients.get_mut(&holder) {
-            // Prevents a motion that this client was about to begin. Other clients are not affected.
+            // The client may be about to begin a motion; the value `NOT_ASKED` prevents the motion. The value
+            // `NOT_ASKED` does not affect other clients.
             client.asked_after = NOT_ASKED;
         }
     }

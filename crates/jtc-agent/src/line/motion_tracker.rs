@@ -1,5 +1,5 @@
-//! Motion tracker, which determines from frames and statuses if the arm may move. The tracker also repeats the frame
-//! that ends Teaching until the controller confirms it.
+//! Motion tracker, which determines from frames and statuses whether the arm may move. The tracker also repeats the frame that ends
+//! Teaching until the controller confirms it.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
@@ -7,7 +7,8 @@ use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
 use super::Moves;
 use super::frame_class::HostFrame;
 
-/// Time within which the statuses show the motion that a frame begins. A status older than this is not used.
+/// Time within which the statuses show a motion after the frame that begins it. The tracker does not use statuses that are older
+/// than 1 s.
 const SHOWS: Duration = Duration::from_secs(1);
 /// Time after an upload within which the uploaded motion is expected.
 const FOLLOWS: Duration = Duration::from_secs(5);
@@ -18,12 +19,12 @@ const AGAIN: Duration = Duration::from_millis(250);
 pub(super) struct MotionTracker {
     /// Time of the last frame that may begin a motion.
     begun_at: Option<Duration>,
-    /// Time of the last part of a trajectory.
+    /// Time of the last segment of a trajectory.
     uploaded_at: Option<Duration>,
-    /// `true` after Teaching was requested. Teaching can start seconds later, when position hold begins; until then no
-    /// status shows the request.
+    /// `true` after a client requested Teaching. Teaching can start seconds later, when position hold begins. Before Teaching
+    /// starts, no status shows that Teaching was requested.
     teaches: bool,
-    /// Time at which the frame that ends Teaching is due to be sent.
+    /// Time at which the frame that ends Teaching must be sent.
     end_at: Option<Duration>,
 }
 
@@ -34,7 +35,7 @@ impl MotionTracker {
         self.teaches |= frame_type == FrameType::TeachingModeEnable;
     }
 
-    /// Records that a part of a trajectory was sent at `at`.
+    /// Records that a segment of a trajectory was sent at `at`.
     pub(super) fn uploaded(&mut self, at: Duration) {
         self.uploaded_at = Some(at);
     }
@@ -71,15 +72,15 @@ impl MotionTracker {
         }
     }
 
-    /// Returns true during a motion or Teaching, which host supervision (J-59) would end. A paused arm is not supervised, because it
-    /// does not move.
+    /// Returns true during a motion or Teaching, which host supervision (J-59) can end. Host supervision does not apply to a
+    /// paused arm, because the arm does not move.
     pub(super) fn is_supervised(&self, status: Option<&(Duration, Status)>, now: Duration) -> bool {
         let moves = [ControllerState::Operate, ControllerState::Teaching];
         self.begun_at.is_some_and(|at| now.saturating_sub(at) < SHOWS)
             || status.is_some_and(|(_, status)| status.state.is_in(&moves))
     }
 
-    /// Returns true if Teaching may be active, or may begin.
+    /// Returns true if Teaching may be active, or may begin later.
     pub(super) fn may_teach(&self, status: Option<&(Duration, Status)>) -> bool {
         self.teaches || status.is_some_and(|(_, status)| status.state == ControllerState::Teaching)
     }
@@ -89,7 +90,7 @@ impl MotionTracker {
         self.end_at = Some(now);
     }
 
-    /// Returns the frame that ends Teaching if it is due.
+    /// Returns the frame that ends Teaching if the frame must be sent now.
     pub(super) fn frame(&mut self, now: Duration) -> Option<HostFrame> {
         self.end_at.take_if(|at| now >= *at)?;
         self.end_at = Some(now + AGAIN);
@@ -101,7 +102,7 @@ impl MotionTracker {
         self.end_at = None;
     }
 
-    /// Returns the time at which the frame that ends Teaching is due.
+    /// Returns the time at which the frame that ends Teaching must be sent.
     pub(super) fn due(&self) -> Option<Duration> {
         self.end_at
     }

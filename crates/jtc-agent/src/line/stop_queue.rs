@@ -8,21 +8,21 @@ use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Time after which a frame without a record is sent again. The time that three statuses need on the serial line is
-/// added.
+/// Time after which a Stop or Pause without a response record is sent again. The queue adds the time that three
+/// statuses need on the serial line.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Number of times that a frame is sent with the interval [`AWAITED`].
+/// Number of times that a Stop or Pause is sent at the interval [`AWAITED`].
 const TRIES: u32 = 20;
-/// Interval of the later repetitions, which end when the controller answers.
+/// Interval of the later repetitions of a Stop or Pause. The repetitions end when the controller answers.
 const LATER: Duration = Duration::from_secs(1);
 
-/// Stop or Pause, with the clients that have requested it.
+/// Stop or Pause, and the clients that have requested it.
 #[derive(Debug)]
 struct Halt {
     command: ExecCommand,
     askers: Vec<ClientId>,
     tries: u32,
-    /// Time at which the frame is sent again.
+    /// Time at which the Stop or Pause is sent again.
     again_at: Duration,
 }
 
@@ -34,19 +34,20 @@ impl Halt {
     }
 }
 
-/// Stops and Pauses without a record. The requests of several clients share one frame, and each of these clients
-/// receives the record of the frame.
+/// Stops and Pauses that still wait for their response records. The requests of several clients share one frame. Each
+/// of these clients receives the response record of the frame.
 #[derive(Debug, Default)]
 pub(super) struct StopQueue {
     waiting: Option<Halt>,
-    /// Written frames, oldest first.
+    /// Stops and Pauses that were written, oldest first.
     written: VecDeque<Halt>,
     /// `true` if a frame that may begin a motion was written after the last Stop or Pause.
     motion_since: bool,
 }
 
 impl StopQueue {
-    /// Adds the request of a client. A Stop replaces a queued Pause, but a Pause never replaces a Stop.
+    /// Adds a client's request for a Stop or a Pause. A Stop replaces a queued Pause, but a Pause never replaces a
+    /// Stop.
     pub(super) fn ask(&mut self, client: ClientId, command: ExecCommand) {
         let covers = |halt: &Halt| halt.command == ExecCommand::Stop || halt.command == command;
         if let Some(waiting) = &mut self.waiting {
@@ -65,12 +66,12 @@ impl StopQueue {
         }
     }
 
-    /// Returns the frame that must be written before all others.
+    /// Returns the Stop or Pause that must be written before all other frames.
     pub(super) fn frame(&self) -> Option<HostFrame> {
         self.waiting.as_ref().and_then(|halt| HostFrame::parse(fixed::exec(halt.command).to_vec()))
     }
 
-    /// Records that the frame was written. The serial line finishes the last byte of the frame at `at`.
+    /// Records that the Stop or Pause was written. The serial line finishes the last byte of the frame at `at`.
     pub(super) fn written(&mut self, at: Duration, baud: Option<u32>) {
         if let Some(mut halt) = self.waiting.take() {
             halt.tries += 1;
@@ -86,8 +87,8 @@ impl StopQueue {
         self.motion_since = true;
     }
 
-    /// Processes the record of the oldest written frame. Returns the clients that receive the record. If the frame
-    /// arrived damaged at the controller, it is sent again.
+    /// Processes the response record of the oldest written Stop or Pause. Returns the clients that receive the record.
+    /// If the Stop or Pause arrived damaged at the controller, it is sent again.
     pub(super) fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
         let Some(halt) = self.written.pop_front() else { return Vec::new() };
         if !arrived {
@@ -97,7 +98,8 @@ impl StopQueue {
         halt.askers.into_iter().map(|asker| (asker, *response)).collect()
     }
 
-    /// Repeats the frames whose record is overdue. Returns true if one of the frames has now been sent [`TRIES`] times.
+    /// Repeats each Stop or Pause whose response record is overdue. Returns true if a Stop or Pause has now been sent
+    /// [`TRIES`] times.
     pub(super) fn look(&mut self, now: Duration) -> bool {
         let mut many = false;
         while let Some(halt) = self.written.pop_front_if(|halt| now >= halt.again_at) {
@@ -108,7 +110,7 @@ impl StopQueue {
     }
 
     fn again(&mut self, halt: Halt) {
-        // A Pause after a Stop would replace the Stop.
+        // A Pause after a Stop would replace the Stop, so this Pause is not sent again.
         if let Some(stop) = self.written.iter_mut().find(|halt| halt.command == ExecCommand::Stop) {
             return halt.askers.into_iter().for_each(|asker| stop.ask(asker));
         }
@@ -123,7 +125,7 @@ impl StopQueue {
         }
     }
 
-    /// Returns the time at which the next frame is written or repeated.
+    /// Returns the time at which the next Stop or Pause is written or repeated.
     pub(super) fn due(&self, now: Duration) -> Option<Duration> {
         if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
     }
@@ -135,7 +137,7 @@ impl StopQueue {
         again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)
     }
 
-    /// Returns true if every request has received its record.
+    /// Returns true if every requested Stop or Pause has received its response record.
     pub(super) fn are_done(&self) -> bool {
         self.waiting.is_none() && self.written.is_empty()
     }

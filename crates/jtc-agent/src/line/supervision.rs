@@ -1,5 +1,5 @@
-//! Host supervision (J-59) on a shared line: the controller sees all clients as one host. Queries of other clients must
-//! therefore not hide that the lease holder is silent.
+//! Host supervision (J-59) on a shared line: the controller treats all clients as one host. Queries of other clients
+//! must therefore not prevent the controller from detecting a silent lease holder.
 use std::time::Duration;
 
 use jtc_host::session::host_timeout_ms;
@@ -7,13 +7,13 @@ use jtc_wire::{Answer, Command, ControllerState, FrameRef, Response, Status};
 
 use super::{ClientId, Denied, SharedLine};
 
-/// Known state of the controller's host supervision.
+/// State of the controller's host supervision, as far as the agent knows it.
 #[derive(Debug, Default)]
 pub(super) struct Supervision {
-    /// Value of `host_timeout_ms` that was last read or set on this line. `None` if supervision is off or the value is
-    /// not known.
+    /// Timeout: the value of `host_timeout_ms` that was last read or set on this line. `None` if host supervision is
+    /// off or its timeout is not known.
     timeout: Option<Duration>,
-    /// Timeout in a SetSettings whose record has not arrived, ms.
+    /// Timeout in a SetSettings frame whose response record has not arrived, ms.
     written_ms: Option<f64>,
 }
 
@@ -24,21 +24,21 @@ impl Supervision {
         }
     }
 
-    /// Stores the timeout from settings that the controller returns.
+    /// Stores the timeout from the settings that the controller returns.
     pub(super) fn take_answer(&mut self, answer: &Answer<'_>) {
         if let Answer::Settings { values, .. } = answer {
             self.set(host_timeout_ms(values.iter()));
         }
     }
 
-    /// Stores the timeout in a SetSettings that was written.
+    /// Stores the timeout in a SetSettings frame that was written.
     pub(super) fn note_written(&mut self, frame: &[u8]) {
         if let Some(Ok(Command::SetSettings(values))) = FrameRef::new_checked(frame).map(Command::parse) {
             self.written_ms = host_timeout_ms(values.iter());
         }
     }
 
-    /// Processes the record of a SetSettings.
+    /// Processes the response record of a SetSettings frame.
     pub(super) fn take_record(&mut self, response: &Response) {
         let written = self.written_ms.take();
         if response.accepted() {
@@ -46,8 +46,8 @@ impl Supervision {
         }
     }
 
-    /// Takes a status. In Start and Init, the controller may have restarted with other settings, so the stored timeout
-    /// is no longer valid.
+    /// Processes a status of the controller. In Start and Init, the stored timeout is no longer valid, because the
+    /// controller may have restarted with other settings.
     pub(super) fn take_status(&mut self, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.timeout = None;
@@ -56,9 +56,9 @@ impl Supervision {
 }
 
 impl SharedLine {
-    /// Checks that this client may send a query to the controller. While the arm moves under host supervision, other
-    /// clients may send queries only if a frame of the lease holder arrived within half of the timeout. The project's
-    /// own clients send a frame in each third of the timeout.
+    /// Checks that this client may send a query to the controller now. While the arm moves under host supervision,
+    /// other clients may send queries only if the last frame of the lease holder is younger than half of the timeout.
+    /// The project's own clients send a frame within each third of the timeout.
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);

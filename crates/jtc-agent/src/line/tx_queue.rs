@@ -1,9 +1,9 @@
-//! Transmit queue of the serial line. The queue sends whole frames, one after the other, and passes their bytes to the
-//! operating system shortly before the line can send them.
+//! Transmit queue of the serial line. The queue sends complete frames, one after the other. The queue passes the bytes
+//! of a frame to the operating system shortly before the line can send them.
 //!
-//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] bytes are queued in the
-//! operating system. A Stop does not wait for the remainder of a long frame. The queue aborts this frame, and the
-//! controller detects this by the gap after it (J-05).
+//! The queue cannot recall bytes that the operating system has accepted. At most [`AHEAD`] bytes are therefore queued
+//! in the operating system. A Stop does not wait for the remainder of a long frame. For a Stop, the queue aborts a long
+//! frame, and the controller detects this by the gap after the frame (J-05).
 use std::time::Duration;
 
 use jtc_host::port::line_time;
@@ -11,13 +11,13 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Largest number of bytes that are queued in the operating system: 256 (J-05) minus a margin. Each delay of the system
-/// can delay the serial line by up to one byte more than estimated.
+/// Largest number of bytes that are queued in the operating system: the limit of 256 (J-05) minus a margin. Each delay
+/// of the operating system can make the serial line up to one byte later than estimated.
 const AHEAD: usize = 250;
 /// Silence after an aborted frame: 5 ms (J-03), plus a margin because USB adapters may shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
-/// Remainders of frames up to this length, in bytes, are still sent before a Stop, because sending them takes at most
-/// as long as the gap.
+/// Longest remainder of a frame that is still sent before a Stop, in bytes. Sending such a remainder takes at most as
+/// long as the gap.
 const SHORT: usize = 64;
 /// Smallest number of bytes of a longer frame that are written in one step.
 const PIECE: usize = 64;
@@ -27,41 +27,41 @@ const PIECE: usize = 64;
 pub(super) struct Outgoing {
     /// Client that sent the frame.
     pub client: ClientId,
-    /// Whole frame.
+    /// Complete frame.
     pub frame: HostFrame,
 }
 
-/// Result of the transmission of a frame.
+/// Result of the transmission of a frame: written or aborted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Passed {
     /// The last byte of the frame was written.
     Written(Outgoing),
-    /// The frame was aborted before its end.
+    /// The transmission of the frame was aborted before its end.
     Abandoned(Outgoing),
 }
 
-/// Frame whose bytes are currently written.
+/// Frame whose bytes the queue is writing.
 struct Writing {
     outgoing: Outgoing,
     at: usize,
 }
 
-/// Transmit queue, which adapts the bytes that it writes to the rate of the serial line. An urgent frame can overtake
-/// the current frame.
+/// Transmit queue, which writes bytes at the rate of the serial line. An urgent frame can overtake the frame that the
+/// queue is writing.
 pub(super) struct TxQueue {
     baud: Option<u32>,
     urgent: Option<Outgoing>,
     writing: Option<Writing>,
     /// Time at which the serial line will have sent all written bytes.
     free_at: Duration,
-    /// Time at which the serial line begins to send the bytes that are currently passed to the operating system.
+    /// Time at which the serial line begins to send the bytes that the queue is passing to the operating system.
     begins_at: Option<Duration>,
     /// End of the silence after an aborted frame.
     silent_until: Duration,
 }
 
 impl TxQueue {
-    /// Creates the queue of a line with this bit rate in Bd; `None` means that the serial line has no bit rate.
+    /// Creates the queue of a serial line with the bit rate `baud` in Bd; `None` means that the line has no bit rate.
     pub(super) fn new(baud: Option<u32>) -> Self {
         Self {
             baud,
@@ -78,7 +78,7 @@ impl TxQueue {
         self.free_at
     }
 
-    /// Sets the frame that overtakes all other frames.
+    /// Sets the urgent frame, which overtakes all other frames.
     pub(super) fn set_urgent(&mut self, urgent: Option<Outgoing>) {
         self.urgent = urgent;
     }
@@ -93,19 +93,20 @@ impl TxQueue {
         self.writing.is_none() && self.urgent.is_none()
     }
 
-    /// Begins a frame; call it only if [`is_free`](Self::is_free) returns true.
+    /// Begins to write a frame; must be called only if [`is_free`](Self::is_free) returns true.
     pub(super) fn begin(&mut self, outgoing: Outgoing) {
         self.writing = Some(Writing { outgoing, at: 0 });
     }
 
-    /// Returns the time at which [`next`](Self::next) may return more bytes. Returns `None` if no bytes wait.
+    /// Returns the time at which [`next`](Self::next) may return more bytes. Returns `None` if the queue contains no
+    /// bytes.
     pub(super) fn due(&self, now: Duration) -> Option<Duration> {
         if now < self.silent_until {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // If the urgent frame replaces the current frame, the current frame is aborted at the time at which its
-            // next piece could be written.
+            // If an urgent frame replaces the current frame, the queue aborts the current frame. The queue does this
+            // when it could write the next piece of the current frame.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -116,14 +117,14 @@ impl TxQueue {
         Some(now.max(self.free_at.saturating_sub(line_time(ahead, self.baud))))
     }
 
-    /// Returns the bytes to write now, and the frames that end with them.
+    /// Returns the bytes to be written now, and the frames that these bytes complete or that the queue has aborted.
     pub(super) fn next(&mut self, now: Duration) -> (Vec<u8>, Vec<Passed>) {
         let (mut bytes, mut passed) = (Vec::new(), Vec::new());
         if now < self.silent_until {
             return (bytes, passed);
         }
-        // On a line without a rate, no bytes are assumed to be queued. The frames are still written in pieces, so that
-        // a Stop can overtake them.
+        // On a serial line without a bit rate, the queue assumes that the operating system contains no bytes. Frames
+        // are still written in pieces, so that a Stop can overtake them.
         let queued = bytes_in(self.free_at.saturating_sub(now), self.baud);
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
@@ -133,8 +134,8 @@ impl TxQueue {
                 passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
                 return (bytes, passed);
             }
-            // The urgent frame is written when it fits, with the remainder of the current frame, within the limit of
-            // queued bytes. If it were written earlier, it would not arrive sooner.
+            // The urgent frame is written as soon as it fits, with the remainder of the current frame, within the limit
+            // of queued bytes. The urgent frame would not arrive sooner if it were written earlier.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {
@@ -169,14 +170,14 @@ impl TxQueue {
     }
 
     /// Records that the operating system accepted the bytes only now. If the serial line was idle, it began to send
-    /// later than estimated, so it is also free later.
+    /// later than estimated. If the serial line began to send later than estimated, it is also free later.
     pub(super) fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);
         }
     }
 
-    /// Aborts the current frame. Returns the frame, and true if the controller has received a part of it.
+    /// Aborts the frame that is being written. Returns the aborted frame, and true if a part of it was written.
     pub(super) fn give_up(&mut self, now: Duration) -> Option<(Outgoing, bool)> {
         let writing = self.writing.take()?;
         if writing.at > 0 {
@@ -185,19 +186,20 @@ impl TxQueue {
         Some((writing.outgoing, writing.at > 0))
     }
 
-    /// Returns the number of bytes that remain of the current frame.
+    /// Returns the number of bytes of the current frame that are not written yet; `None` if no byte of it was
+    /// written.
     fn rest(&self) -> Option<usize> {
         let writing = self.writing.as_ref().filter(|writing| writing.at > 0)?;
         Some(writing.outgoing.frame.bytes.len() - writing.at)
     }
 
-    /// Returns the current frame, and the number of bytes of this frame that were written.
+    /// Returns the frame that is being written, and the number of its bytes that were written.
     pub(super) fn writing(&self) -> Option<(&Outgoing, usize)> {
         self.writing.as_ref().map(|w| (&w.outgoing, w.at))
     }
 }
 
-/// Returns the number of 8N1 bytes that the serial line sends in a time, rounded up.
+/// Returns the number of 8N1 bytes that the serial line sends in the duration `time`, rounded up.
 fn bytes_in(time: Duration, baud: Option<u32>) -> usize {
     baud.map_or(0, |baud| (time.as_secs_f64() * f64::from(baud) / 10.0).ceil() as usize)
 }

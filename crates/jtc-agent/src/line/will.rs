@@ -6,20 +6,20 @@ use jtc_wire::{ControllerState, ExecCommand, TrajectoryState};
 
 use super::{LineEvent, POLICY, Policy, SharedLine};
 
-/// Cause of a present or expected motion.
+/// Cause of a motion that is in progress or expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moves {
     /// Upload of a trajectory. The arm is at rest, and a motion usually follows.
     Upload,
-    /// Motion, including a paused motion.
+    /// Motion in progress, including a paused motion.
     Motion,
-    /// Teaching. The arm is moved by hand, or may soon be moved by hand.
+    /// Teaching mode. A person moves the arm by hand, or may soon do so.
     Teaching,
 }
 
 impl Moves {
-    /// Returns a text for the cause.
+    /// Returns a text for the cause of the motion.
     pub fn text(self) -> &'static str {
         match self {
             Self::Upload => "an upload",
@@ -32,24 +32,24 @@ impl Moves {
 /// Client whose policy applies to the motion if the agent is killed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Will {
-    /// Name of the client that users see.
+    /// Name of the client, which users see.
     pub client: String,
-    /// Policy of this client.
+    /// Policy of the client.
     pub policy: Policy,
     /// Cause of the motion.
     pub what: Moves,
 }
 
-/// Result of the application of a last will.
+/// Result of applying a last will.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
     /// The arm is at rest.
     Rests,
     /// The motion continues.
     GoesOn,
-    /// The motion was paused before, and the will leaves it paused.
+    /// The motion was paused before, and the last will leaves it paused.
     Paused,
-    /// The command in this variant was sent.
+    /// The agent sent the command in this variant.
     Sent(ExecCommand),
 }
 
@@ -59,13 +59,13 @@ impl SharedLine {
         self.left = (client, policy);
     }
 
-    /// Applies the will of a client whose agent was killed. Sends the command even if the arm seems to be at rest,
-    /// because a status is older than the last command.
+    /// Applies the last will of a client whose agent was killed. Sends the command of the policy even if the arm seems
+    /// to be at rest, because the status may be older than the last command.
     pub fn apply_left(&mut self, client: &str, policy: Policy, now: Duration) -> Applied {
         self.bequeath(client.to_owned(), policy);
         if self.status.is_none() {
-            // The cause of the motion is not known. The will applies until the controller reports that the arm is at
-            // rest.
+            // The agent does not know the cause of the motion. The last will applies until the controller reports that
+            // the arm is at rest.
             self.will = Some(self.will_of(Moves::Motion));
         }
         let moves = self.motion_tracker.may_move(self.status.as_ref(), now);
@@ -73,7 +73,7 @@ impl SharedLine {
             status.trajectory == TrajectoryState::Pause && status.state == ControllerState::HoldPos
         });
         match policy.command() {
-            // The motion is already paused; a second Pause would only delay new clients.
+            // The motion is already paused; a second Pause would only cause a hold-off for new clients.
             Some(ExecCommand::Pause) if stands => Applied::Paused,
             Some(command) if self.hold(POLICY, command, now) => Applied::Sent(command),
             None if moves => Applied::GoesOn,
@@ -81,7 +81,7 @@ impl SharedLine {
         }
     }
 
-    /// Returns the will that applies if the agent is killed now.
+    /// Returns the last will that the next agent applies if this agent is killed now.
     pub fn will(&self) -> Option<&Will> {
         self.will.as_ref()
     }
@@ -96,8 +96,8 @@ impl SharedLine {
         }
     }
 
-    /// Returns the will with the policy of the present or last lease holder. A stronger command that the controller has
-    /// not confirmed yet has priority.
+    /// Returns the last will with the policy of the present or last lease holder. A stronger command that the
+    /// controller has not confirmed yet replaces this policy.
     fn will_of(&self, what: Moves) -> Will {
         let holder = self.lease.as_ref().and_then(|lease| self.introduction(lease.holder));
         let (client, policy) =

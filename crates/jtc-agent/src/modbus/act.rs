@@ -1,4 +1,4 @@
-//! Execution of a PLC's commands, with one client of the serial line that all PLC connections share.
+//! Execution of PLC commands. All PLC connections share one client of the serial line.
 use std::sync::Arc;
 
 use agent_kit::api::Problem;
@@ -16,12 +16,12 @@ use crate::jobs::{
 use crate::line::Denied;
 use crate::owner::ClientPort;
 
-/// Reason why a command was not executed.
+/// Reason why a command of a PLC was not executed.
 pub(super) struct Refusal {
     pub outcome: Outcome,
-    /// Number of the error; 0 if there was no error.
+    /// Number of the error; 0 if the refusal has no error number.
     pub error: u16,
-    /// Reason in words.
+    /// Reason as a text.
     pub why: String,
 }
 
@@ -66,7 +66,8 @@ impl From<Denied> for Refusal {
 }
 
 impl Plc {
-    /// Executes a command completely or not at all. `halt` is the number of the last Stop or Pause before the command.
+    /// Executes a command of a PLC completely or not at all. `halt` is the number of the last Stop or Pause before the
+    /// command.
     pub(super) async fn act(self: &Arc<Self>, order: &Order, halt: u64) -> Result<(), Refusal> {
         if let Some(lost) = self.line.lost() {
             return Err(Refusal { why: lost, ..Refusal::new(Outcome::NoController) });
@@ -98,17 +99,17 @@ impl Plc {
             Command::GripperOn => self.call(&http_session, |session| session.gripper(true)).await,
             Command::GripperOff => self.call(&http_session, |session| session.gripper(false)).await,
             Command::Clear => self.call(&http_session, Session::clear_all).await,
-            // Pause, Stop and Release were already executed when they arrived.
+            // The agent already executed a Pause, a Stop or a Release when the command arrived.
             Command::None | Command::Pause | Command::Stop | Command::Release => Ok(()),
         }
     }
 
-    /// Returns an error if a coil of any connection holds the arm at rest.
+    /// Returns an error if the Stop or Pause coil of any connection holds the arm at rest.
     fn free_to_move(&self) -> Result<(), Refusal> {
         if self.is_held_by_a_coil() { Err(Refusal::new(Outcome::Coil)) } else { Ok(()) }
     }
 
-    /// Takes or renews the lease, which lasts for the watchdog time of the PLC.
+    /// Takes or renews the lease. The lease lasts for the watchdog time of the PLC.
     fn take_lease(&self, http_session: &HttpSession) -> Result<(), Refusal> {
         let (policy, lasts) = self.watchdog();
         let taken = self.line.with(|line, now| {
@@ -118,7 +119,8 @@ impl Plc {
         Ok(taken?)
     }
 
-    /// Returns an error if the arm was stopped after the command, or by another client shortly before the command.
+    /// Returns an error if a client stopped the arm after the command, or if another client did so shortly before the
+    /// command.
     fn ask_to_move(&self, http_session: &HttpSession, halt: u64) -> Result<(), Refusal> {
         Ok(self.line.with(|line, now| line.ask_to_move(http_session.client, halt, now))?)
     }
@@ -139,8 +141,8 @@ impl Plc {
         let number = order.trajectory;
         let stored = self.jobs.store.get(number).ok_or_else(|| Refusal::new(Outcome::NoTrajectory))?;
         self.free_to_move()?;
-        // The session is reserved first. While a job runs, the answer is therefore "busy", and not an error that this
-        // job causes.
+        // The session of the PLC client is reserved first. While a job runs, the answer is therefore "busy", and not
+        // an error that the running job causes.
         let turn = http_session.turn()?;
         self.take_lease(http_session)?;
         let reported = self.reported();
@@ -154,7 +156,8 @@ impl Plc {
         let order = RunOrder {
             course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
-            // The register always has a value. The default value 100 means that the PLC has not chosen a speed.
+            // The speed register always has a value. The default speed value of 100 means that the PLC has not chosen
+            // a speed.
             speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),
             repeat: order.repeat.into(),
             accept_device_limits: false,
@@ -233,14 +236,14 @@ impl Plc {
         if let Some(job) = http_session.job() {
             return Err(Unable::Busy(Some(job)).into());
         }
-        // If the client does not hold the lease, this call has no effect.
+        // If the PLC client does not hold the lease, this call has no effect.
         let _ = self.line.with(|line, now| line.release_lease(http_session.client, now));
         self.line.wake();
         self.resign();
         Ok(())
     }
 
-    /// Takes the lease and runs a short function.
+    /// Takes the lease and runs a short function on the session of the PLC client.
     async fn call<E: Into<Error> + Send + 'static>(
         &self,
         http_session: &HttpSession,

@@ -1,9 +1,9 @@
-//! Addresses and networks of the clients that may connect.
+//! Addresses and networks of the clients that may connect to the Modbus server.
 use std::fmt;
 use std::net::IpAddr;
 use std::str::FromStr;
 
-/// Single address, or network of all addresses that begin with the same bits.
+/// Single address, or network of all addresses that have the same first bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Network {
     address: IpAddr,
@@ -20,7 +20,8 @@ impl Network {
     pub fn contains(&self, address: IpAddr) -> bool {
         let (own, other) = (number(self.address), number(address.to_canonical()));
         let left = own.1 - u32::from(self.bits);
-        // `left` may be the full number of address bits. `checked_shr` then returns `None`.
+        // `left` may be the full number of bits of an address. If `left` is the full number of
+        // bits, `checked_shr` returns `None`.
         own.1 == other.1 && own.0.checked_shr(left).unwrap_or(0) == other.0.checked_shr(left).unwrap_or(0)
     }
 }
@@ -60,7 +61,7 @@ impl fmt::Display for Network {
     }
 }
 
-/// Networks whose addresses may connect.
+/// Networks whose addresses may connect to the Modbus server.
 #[derive(Clone, Debug, Default)]
 pub struct Allowed(Vec<Network>);
 
@@ -70,7 +71,7 @@ impl Allowed {
         Self(networks)
     }
 
-    /// Returns `true` if this address may connect.
+    /// Returns `true` if this address may connect to the Modbus server.
     pub fn contains(&self, address: IpAddr) -> bool {
         if self.0.is_empty() {
             return address.to_canonical().is_loopback();

@@ -1,4 +1,4 @@
-//! Numbers of the commands of a PLC, and of the outcomes and errors of the commands.
+//! Numbers of the commands of a PLC, and of the outcomes and errors of these commands.
 
 macro_rules! numbered {
     ($(#[$doc:meta])* $name:ident { $($(#[$meaning:meta])* $variant:ident = $code:literal, $text:literal;)+ }) => {
@@ -10,17 +10,17 @@ macro_rules! numbered {
         }
 
         impl $name {
-            /// All values.
+            /// All values of the type.
             pub const ALL: &[Self] = &[$(Self::$variant),+];
 
-            /// Returns the description.
+            /// Returns the description of the value.
             pub const fn text(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)+
                 }
             }
 
-            /// Returns the value with this number.
+            /// Returns the value with the number `number`.
             pub fn from_number(number: u16) -> Option<Self> {
                 Self::ALL.iter().copied().find(|one| *one as u16 == number)
             }
@@ -31,56 +31,57 @@ macro_rules! numbered {
 numbered! {
     /// Command of a PLC.
     Command {
-        /// No command.
+        /// No command: the agent only acknowledges the sequence number.
         #[default]
         None = 0, "no command: the agent only acknowledges the number";
         /// Start of a stored trajectory.
         Start = 1, "start a job that checks, uploads and executes the trajectory. `result` 1: the job has begun";
-        /// Pause.
+        /// Pause of the motion.
         Pause = 2, "pause";
-        /// Resume.
+        /// Resumption of a paused motion.
         Resume = 3, "resume after a Pause";
-        /// Stop.
+        /// Stop of the motion.
         Stop = 4, "stop";
-        /// Teaching on.
+        /// Start of Teaching.
         TeachOn = 5, "begin Teaching: a person can lead the arm by hand";
-        /// Teaching off.
+        /// End of Teaching.
         TeachOff = 6, "end Teaching";
-        /// Pump on.
+        /// Switching on the gripper's pump.
         GripperOn = 7, "switch the pump of the gripper on";
-        /// Pump off.
+        /// Switching off the gripper's pump.
         GripperOff = 8, "switch the pump of the gripper off";
-        /// Clear.
+        /// Clearing of all errors.
         Clear = 9, "clear the errors of the controller and of all drives";
-        /// Recover.
+        /// Recovery to position hold.
         Recover = 10, "recover: start a job that brings the controller back to a held arm";
-        /// Recovery with the arm that the controller has stored, or with its defaults if it has none.
+        /// Recovery with the arm that the controller has stored. If the controller has stored no arm,
+        /// it recovers with its defaults.
         RecoverWithDefaults = 11, "recover a controller that has not received its arm: it uses the stored arm, or its defaults if it has none";
-        /// Speed.
+        /// Speed of the present motion and of later motions.
         SetSpeed = 12, "set speed: run the present motion and later ones at `speed` % of their own speed";
         /// Release of the lease.
         Release = 13, "release the lease";
     }
 }
 
-/// Largest number of a command.
+/// Largest command number.
 pub const COMMAND_MAX: u16 = Command::Release as u16;
 
 numbered! {
     /// Outcome of a command.
     Outcome {
-        /// No command yet.
+        /// The PLC has sent no command yet.
         #[default]
         None = 0, "no command yet";
-        /// Done.
+        /// The agent executed the command, or has begun its job.
         Done = 1, "done; a job has begun";
-        /// Wrong sequence number.
+        /// The sequence number of the command is wrong.
         Sequence = 2, "`sequence` is neither `acknowledged` nor `acknowledged` + 1: nothing was done";
-        /// Impossible value.
+        /// A value of the command is invalid.
         Value = 3, "a value is invalid for this command, or the watchdog is off: nothing was done";
-        /// Unknown trajectory.
+        /// No trajectory has the number in the command.
         NoTrajectory = 4, "no trajectory has this number: nothing was done";
-        /// Busy.
+        /// A job or another command of the PLC is running.
         Busy = 5, "a job or another command of this PLC is running: nothing was done";
         /// Another client holds the lease.
         Held = 6, "another client holds the lease: nothing was done";
@@ -92,15 +93,16 @@ numbered! {
         NotReady = 9, "the state of the arm does not permit this command (see `state`, `errors`, `ready`, `paused`): nothing was done";
         /// The controller did not answer.
         NoController = 10, "the controller is silent or did not answer the command: the arm may be moving";
-        /// Refused or failed.
+        /// The command was refused or failed.
         Failed = 11, "the command was refused or failed: `command_error` has the reason";
     }
 }
 
-/// Number for an error code that is not in [`ERRORS`].
+/// Error number for each error code that is not in [`ERRORS`].
 pub const OTHER_ERROR: u16 = 255;
 
-/// Error numbers, with their codes in the API and descriptions. Numbers are never reused.
+/// Error numbers, with the error codes of the API and their descriptions. An error number is never
+/// used for another error code.
 #[rustfmt::skip]
 pub const ERRORS: &[(u16, &str, &str)] = &[
     (1, "stopped", "a client stopped or paused the arm before this command moved it"),
@@ -138,7 +140,7 @@ pub const ERRORS: &[(u16, &str, &str)] = &[
     (33, "encoder-jumped", "an encoder has jumped (`encoder_jumped`): first reset its drive"),
 ];
 
-/// Returns the number of an error.
+/// Returns the number of an error code.
 pub fn error_number(code: &str) -> u16 {
     ERRORS.iter().find(|(_, name, _)| *name == code).map_or(OTHER_ERROR, |(number, ..)| *number)
 }

@@ -1,15 +1,16 @@
-//! Body of the fuzz target `modbus_stream`, which uses only this file and `pdu` of this crate.
+//! Body of the fuzz target `modbus_stream`. The body of the fuzz target uses only this file and the file `pdu` of the
+//! crate.
 use super::pdu::{Device, Exception, HEADER_LEN, Header, Table, answer};
 
-/// Longest response with its header that the standard permits, bytes.
+/// Longest response, including its header, that the Modbus standard permits, in bytes.
 const RESPONSE_MAX: usize = 260;
 
-/// Device with sixteen entries in each table; higher addresses do not exist.
+/// Modbus device with sixteen entries in each table; higher addresses do not exist.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub(super) struct Sixteen {
     coils: [bool; 16],
     registers: [u16; 16],
-    /// Number of writing requests.
+    /// Number of executed write requests.
     pub(super) writes: usize,
 }
 
@@ -42,13 +43,13 @@ impl Device for Sixteen {
     }
 }
 
-/// Simulates a connection that sends these bytes. Checks that each request gets one response with the same transaction
-/// number and a permitted length. Checks that the response shows if the request was executed. Also checks that a
-/// refused request does not write, and that written values can be read back.
+/// Simulates a connection that sends the bytes `data`. Checks that each request receives one response with the same
+/// transaction number and a permitted length. Checks that the response shows whether the device executed the request.
+/// Also checks that a refused request writes nothing, and that written values can be read back.
 ///
 /// # Panics
 ///
-/// A check fails.
+/// One of the checks fails.
 pub fn modbus_stream(mut data: &[u8]) {
     let mut device = Sixteen::default();
     while let Some((head, rest)) = data.split_first_chunk::<HEADER_LEN>() {
@@ -70,7 +71,7 @@ pub fn modbus_stream(mut data: &[u8]) {
         let writes = [5, 6, 15, 16].contains(&pdu[0]);
         assert_eq!(device.writes, before.writes + usize::from(writes));
         if writes {
-            // Written values must be read back from the same addresses, packed as the standard requires.
+            // Written values must be readable at the same addresses, packed as the Modbus standard requires.
             let (read, count) = match pdu[0] {
                 5 => (1, [0, 1]),
                 6 => (3, [0, 1]),
@@ -92,7 +93,7 @@ pub fn modbus_stream(mut data: &[u8]) {
     }
 }
 
-/// Sets the bits after `count` to zero.
+/// Sets all bits after the first `count` bits to zero.
 fn masked(bytes: &[u8], count: usize) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if let Some(last) = bytes.last_mut().filter(|_| !count.is_multiple_of(8)) {

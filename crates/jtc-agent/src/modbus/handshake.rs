@@ -1,34 +1,34 @@
-//! Holding registers, and the handshake that converts register writes to commands. Each command is executed once, even
-//! if writes are repeated or answers are lost.
+//! Holding registers of the Modbus server, and the handshake that converts register writes to commands. The agent
+//! executes each command once, even if writes are repeated or answers are lost.
 use super::codes::{Command, Outcome};
 use super::map::{HOLDINGS, WATCHDOG_MIN, holding};
 use super::pdu::Exception;
 
-/// Command with the parameter values at the time when the sequence number was written.
+/// Command of a PLC, with the parameter values at the time when the PLC wrote the sequence number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Order {
-    /// Sequence number.
+    /// Sequence number of the command.
     pub sequence: u16,
-    /// Command.
+    /// Command of the PLC.
     pub command: Command,
-    /// Number of the trajectory.
+    /// Number of the trajectory that the command starts.
     pub trajectory: u16,
     /// Speed, %.
     pub speed: u16,
-    /// Number of runs.
+    /// Number of runs of the trajectory.
     pub repeat: u16,
-    /// `true` if the arm first moves to the first point, unless it is already there.
+    /// `true` if the arm first moves to the first point of the trajectory, unless it is already there.
     pub approach: bool,
-    /// Watchdog, ms.
+    /// Watchdog time of the PLC, ms.
     pub watchdog_ms: u16,
 }
 
-/// Holding registers of the commanding PLC, and its last command.
+/// Holding registers of the PLC that sends commands, and the last command of this PLC.
 ///
 /// The sequence number of a command must follow the sequence number of the last command. A command with any other
-/// number is not executed. A write that is repeated after a lost answer therefore has no effect. A PLC may repeat
-/// values that it wrote before the agent was started. These values have no effect either, because each agent starts
-/// with a different number.
+/// sequence number is not executed. If an answer is lost and the PLC repeats its write, the repeated write therefore
+/// has no effect. A PLC may also repeat values that it wrote before the start of the agent. Values that were written
+/// before the start of the agent have no effect, because each agent starts with a different sequence number.
 #[derive(Clone, Debug)]
 pub struct Handshake {
     values: [u16; holding::COUNT],
@@ -40,7 +40,7 @@ pub struct Handshake {
 }
 
 impl Handshake {
-    /// Returns a handshake whose last command has this sequence number.
+    /// Creates a handshake whose last command has the sequence number `sequence`.
     pub fn new(sequence: u16) -> Self {
         let mut new = Self {
             values: [0; holding::COUNT],
@@ -53,24 +53,25 @@ impl Handshake {
         new
     }
 
-    /// Resets the registers, because they contain values of another PLC. The sequence number is not reset.
+    /// Resets the registers to their defaults, because they contain values of another PLC. The sequence number is not
+    /// reset.
     pub fn forget(&mut self) {
         self.values = HOLDINGS.map(|row| row.default);
         self.values[holding::SEQUENCE] = self.taken;
     }
 
-    /// Returns all registers, from address 0.
+    /// Returns the values of all holding registers, from address 0.
     pub fn values(&self) -> &[u16; holding::COUNT] {
         &self.values
     }
 
-    /// Returns the time without a request after which the policy applies, ms; 0 if the watchdog is off.
+    /// Returns the watchdog time, ms; 0 if the watchdog is off. After the watchdog time without a request, the policy
+    /// applies.
     pub fn watchdog_ms(&self) -> u16 {
         self.values[holding::WATCHDOG]
     }
 
-    /// Returns the last acknowledged sequence number, the outcome of this command, and the number of the command's
-    /// error.
+    /// Returns the last acknowledged sequence number, and the outcome and the error number of its command.
     pub fn last(&self) -> (u16, Outcome, u16) {
         (self.acknowledged, self.outcome, self.error)
     }
@@ -80,7 +81,7 @@ impl Handshake {
         self.taken != self.acknowledged
     }
 
-    /// Checks that these values may be written. If `commands` is `true`, this PLC holds the lease and cannot switch its
+    /// Checks that a PLC may write these values. If `commands` is `true`, the PLC holds the lease and cannot switch its
     /// watchdog off.
     ///
     /// # Errors
@@ -102,8 +103,8 @@ impl Handshake {
         Ok(())
     }
 
-    /// Writes values that [`check`](Self::check) has accepted, in one step. Returns the command that the values
-    /// complete, if any.
+    /// Writes values in one step; [`check`](Self::check) must have accepted the values. Returns a command if the
+    /// written values complete a command.
     pub fn write(&mut self, at: u16, values: &[u16]) -> Option<Order> {
         let at = usize::from(at);
         for (register, value) in self.values.iter_mut().skip(at).zip(values) {
@@ -122,7 +123,7 @@ impl Handshake {
         let value = |register: usize| self.values[register];
         Some(Order {
             sequence,
-            // The value was checked before.
+            // `check` has already validated the number of the command.
             command: Command::from_number(value(holding::COMMAND)).unwrap_or_default(),
             trajectory: value(holding::TRAJECTORY),
             speed: value(holding::SPEED),
@@ -132,7 +133,8 @@ impl Handshake {
         })
     }
 
-    /// Reports the outcome of a command. Has no effect unless `sequence` belongs to the last accepted command.
+    /// Reports the outcome of a command. Has no effect unless `sequence` is the sequence number of the last accepted
+    /// command.
     pub fn acknowledge(&mut self, sequence: u16, outcome: Outcome, error: u16) {
         if sequence == self.taken {
             (self.acknowledged, self.outcome, self.error) = (sequence, outcome, error);
@@ -157,17 +159,17 @@ mod tests {
     fn a_command_is_what_was_written_when_its_number_came() {
         let mut handshake = Handshake::new(41);
         assert_eq!(handshake.values()[holding::SEQUENCE], 41);
-        // While the registers are only partly written, in any order, no command is executed.
+        // While only some registers of a command are written, in any order, no command is executed.
         assert_eq!(write(&mut handshake, holding::COMMAND, &[START]), Ok(None));
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[3]), Ok(None));
         let order = write(&mut handshake, holding::SEQUENCE, &[42]).expect("it may be").expect("a command");
         assert_eq!((order.command, order.trajectory, order.speed, order.repeat), (Command::Start, 3, 100, 1));
         assert!(handshake.is_pending());
-        // A new number of the trajectory applies to the next command.
+        // A new trajectory number applies to the next command.
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[4]), Ok(None));
         handshake.acknowledge(42, Outcome::Done, 0);
         assert_eq!((handshake.last(), handshake.is_pending()), ((42, Outcome::Done, 0), false));
-        // A single write sets all registers.
+        // A single write request sets all registers.
         let all = [500, 2, 5, 20, 7, 1, START, 43];
         let order = write(&mut handshake, 0, &all).expect("it may be").expect("a command");
         let whole = Order {
@@ -240,8 +242,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any writes in any order, only the next sequence number starts a command. The command uses the register
-        /// values at that time.
+        /// For any writes in any order, only the next valid sequence number starts a command. The command uses the
+        /// register values at the time when the sequence number was written.
         #[test]
         fn nothing_is_done_without_a_new_number(
             first in any::<u16>(),
@@ -250,8 +252,8 @@ mod tests {
             let mut handshake = Handshake::new(first);
             let mut last = first;
             for (at, mut values, near) in writes {
-                // Sequence numbers near the last number are included. Otherwise the test would almost never use the
-                // next number.
+                // The test also writes sequence numbers near the last number. Otherwise, random values would almost
+                // never contain the next valid sequence number.
                 let place = holding::SEQUENCE.checked_sub(usize::from(at)).filter(|place| *place < values.len());
                 if let Some(place) = place.filter(|_| near) {
                     values[place] = last.wrapping_add(values[place] % 3);

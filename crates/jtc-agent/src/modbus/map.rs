@@ -1,4 +1,4 @@
-//! Register map. The server and its documentation page use the same tables.
+//! Register map of the Modbus server. The server and its documentation page use the same tables of registers.
 use std::time::Duration;
 
 use jtc_host::held_stop;
@@ -10,8 +10,8 @@ use super::codes::{Outcome, error_number};
 use super::pdu::Exception;
 use crate::jobs::{Job, NUMBER_MAX, Stage};
 
-/// Version of this map. The version increases when the meaning of an address changes. The version stays the same when
-/// entries are added at the end.
+/// Version of the register map. The version increases when the meaning of a register address changes. The version
+/// stays the same when registers are added at the end.
 pub const VERSION: u16 = 1;
 /// Register value that means "not known".
 pub const UNKNOWN: u16 = u16::MAX;
@@ -21,39 +21,39 @@ pub const FRESH: Duration = Duration::from_secs(1);
 /// Interval at which the heartbeat counter increases.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 
-/// Lease holder as seen from one connection.
+/// Lease holder from the point of view of one PLC connection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Holder {
-    /// No client.
+    /// No client holds the lease.
     #[default]
     Nobody = 0,
     /// The PLC of this connection holds the lease.
     Own = 1,
-    /// Another client.
+    /// Another client holds the lease.
     Other = 2,
 }
 
-/// Values that a connection can read.
+/// Values that a PLC connection can read.
 #[derive(Clone, Debug, Default)]
 pub struct View {
     /// Present time by the agent's clock.
     pub now: Duration,
     /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
-    /// `true` if the port was lost.
+    /// `true` if the serial port was lost.
     pub lost: bool,
-    /// Age and contents of the last status.
+    /// Age of the last status, and the contents of this status.
     pub status: Option<(Duration, Status)>,
-    /// Cause and age (ms) of the current held stop.
+    /// Cause of the current held stop, and the age of this stop in ms.
     pub stop: Option<(StopCause, u32)>,
     /// Joints with an encoder jump, one bit per joint.
     pub jumped: u8,
     /// Speed override, %.
     pub speed: Option<u16>,
-    /// Lease holder.
+    /// Lease holder from the point of view of this PLC connection.
     pub holder: Holder,
-    /// `true` if another client waits for the lease of the PLC.
+    /// `true` if another client waits for the lease that the PLC holds.
     pub wanted: bool,
     /// Last job that a PLC began.
     pub job: Option<Job>,
@@ -74,7 +74,7 @@ impl View {
         self.status(u32::from(UNKNOWN), |status| status.joints.get(n).map_or(u32::from(UNKNOWN), read))
     }
 
-    /// Returns the bits of a joint's measured value; NaN if the value is not known.
+    /// Returns the bits of a measured value of a joint; NaN if the value is not known.
     fn measured(&self, n: usize, read: impl FnOnce(&jtc_wire::JointStatus) -> f32) -> u32 {
         let known = |status: &Status| {
             let joint = status.joints.get(n).filter(|_| is_measured(status, n));
@@ -83,19 +83,20 @@ impl View {
         self.status(f32::NAN, known).to_bits()
     }
 
-    /// Returns a value of the cause of the current held stop; 0 if no held stop is active, or if its cause is not
+    /// Returns a number about the cause of the current held stop; 0 if no held stop is active, or if its cause is not
     /// known.
     fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
         self.stop.as_ref().map_or(0, |(cause, _)| read(cause))
     }
 
-    /// Returns the bits of a value or limit of the cause. Returns NaN if the cause has no such value.
+    /// Returns the bits of a value or limit that belongs to the cause of a held stop. Returns NaN if the cause has no
+    /// value or limit.
     fn figure(&self, read: impl FnOnce((Option<f32>, Option<f32>)) -> Option<f32>) -> u32 {
         let known = self.stop.as_ref().and_then(|(cause, _)| read(held_stop::figures(cause)));
         known.unwrap_or(f32::NAN).to_bits()
     }
 
-    /// Returns a value of the last job; 0 before the first job.
+    /// Returns a number about the last job; 0 before the first job.
     fn job(&self, read: impl FnOnce(&Job) -> u32) -> u32 {
         self.job.as_ref().map_or(0, read)
     }
@@ -123,10 +124,10 @@ impl View {
     }
 }
 
-/// Format of a value in registers. The first of two registers contains the upper 16 bits.
+/// Format of a value in Modbus registers. In a value of two registers, the first register contains the upper 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Single unsigned register.
+    /// One register, unsigned.
     U16,
     /// Two registers, unsigned.
     U32,
@@ -140,7 +141,7 @@ impl Form {
         if self == Self::U16 { 1 } else { 2 }
     }
 
-    /// Returns the name of the format for the documentation.
+    /// Returns the name of this format for the documentation.
     pub fn name(self) -> &'static str {
         match self {
             Self::U16 => "u16",
@@ -154,15 +155,15 @@ impl Form {
 pub struct Input {
     /// Address of the first register, from 0.
     pub at: u16,
-    /// Number of values, which is one or one per joint.
+    /// Number of values in the group: one, or one per joint.
     pub count: u16,
-    /// Format of each value.
+    /// Format of each value in the group.
     pub form: Form,
-    /// Name of the value.
+    /// Name of the values in the group.
     pub name: &'static str,
-    /// Meaning of the value.
+    /// Meaning of the values in the group.
     pub meaning: &'static str,
-    /// Function that returns the n-th value.
+    /// Function that returns the n-th value of the group.
     pub value: fn(&View, usize) -> u32,
 }
 
@@ -180,9 +181,9 @@ pub struct DiscreteInput {
 pub struct Holding {
     /// Name of the register.
     pub name: &'static str,
-    /// Smallest and largest value.
+    /// Smallest and largest valid value of the register.
     pub range: (u16, u16),
-    /// Value before the first write.
+    /// Value of the register before the first write.
     pub default: u16,
     /// Meaning of the register.
     pub meaning: &'static str,
@@ -282,29 +283,29 @@ pub const DISCRETE_INPUTS: &[DiscreteInput] = &[
     DiscreteInput { name: "held_stop", meaning: "the arm is in a held stop. No motion is executed until `command` 9 has cleared the held stop", value: |v| v.reports(Status::is_held_stop) },
 ];
 
-/// Addresses of the holding registers.
+/// Addresses of the holding registers, from 0.
 pub mod holding {
-    /// Time without a request after which the policy applies, ms.
+    /// Watchdog time, ms: after this time without a request, the policy applies.
     pub const WATCHDOG: usize = 0;
-    /// Policy that applies to a motion after this time.
+    /// Policy that applies to a motion after the watchdog time.
     pub const POLICY: usize = 1;
-    /// Number of the trajectory.
+    /// Number of the trajectory to run.
     pub const TRAJECTORY: usize = 2;
-    /// Speed, %.
+    /// Speed of a motion, %.
     pub const SPEED: usize = 3;
-    /// Number of runs.
+    /// Number of runs of the trajectory.
     pub const REPEAT: usize = 4;
-    /// Selection of a motion to the first point before the trajectory.
+    /// Selects whether the arm first moves to the first point of the trajectory.
     pub const APPROACH: usize = 5;
-    /// Command.
+    /// Command of the PLC.
     pub const COMMAND: usize = 6;
-    /// Sequence number, which triggers the command.
+    /// Sequence number of the command. Writing the sequence number triggers the command.
     pub const SEQUENCE: usize = 7;
     /// Number of holding registers.
     pub const COUNT: usize = 8;
 }
 
-/// Shortest watchdog, ms.
+/// Shortest watchdog time, ms.
 pub const WATCHDOG_MIN: u16 = 100;
 
 /// Holding registers, from address 0.
@@ -326,13 +327,13 @@ pub const HOLDINGS: [Holding; holding::COUNT] = [
 pub const STOP: usize = 0;
 /// Address of the coil that pauses the arm.
 pub const PAUSE: usize = 1;
-/// Coils from address 0, with name and meaning.
+/// Coils from address 0, with their names and meanings.
 pub const COILS: [(&str, &str); 2] = [
     ("stop", "a change from 0 to 1 stops the motion on its path, at once"),
     ("pause", "a change from 0 to 1 pauses the motion on its path, at once"),
 ];
 
-/// Returns all input registers.
+/// Returns the values of all input registers.
 pub fn inputs(view: &View) -> Vec<u16> {
     let mut all = Vec::new();
     for row in INPUTS {
@@ -351,7 +352,7 @@ pub fn inputs(view: &View) -> Vec<u16> {
 ///
 /// # Errors
 ///
-/// [`Exception::Address`].
+/// [`Exception::Address`] if one of the entries does not exist.
 pub fn span<T: Clone>(all: &[T], at: u16, count: usize) -> Result<Vec<T>, Exception> {
     let at = usize::from(at);
     all.get(at..at + count).map(<[T]>::to_vec).ok_or(Exception::Address)
@@ -380,8 +381,8 @@ mod tests {
         }
     }
 
-    /// The registers have the word order that the documentation page describes. The expected words were computed by
-    /// hand: 1.5 is 3FC00000, 70000 is 00011170.
+    /// The two registers of a 32-bit value have the order that the documentation page describes. The expected words
+    /// were computed by hand: 1.5 is 3FC00000, 70000 is 00011170.
     #[test]
     fn two_registers_have_the_upper_half_first() {
         let mut status = Status { point: 70_000, ..Status::default() };
@@ -406,7 +407,7 @@ mod tests {
             jumped: 0b100,
             ..View::default()
         };
-        // 61.5 is 42760000, 54 is 42580000.
+        // The words of 61.5 are 42760000, and those of 54 are 42580000.
         assert_eq!(inputs(&view)[86..94], [2, 2, 0x4276, 0, 0x4258, 0, 12, 0b100]);
         let bit = |view: &View| (DISCRETE_INPUTS[13].value)(view);
         assert!(bit(&view) && !view.is_ready());

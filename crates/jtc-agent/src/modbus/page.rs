@@ -1,4 +1,4 @@
-//! Tables of docs/modbus.md, generated from the tables in the code.
+//! Tables of docs/modbus.md, which are generated from the tables in the code.
 use std::fmt::Write as _;
 
 use jtc_host::held_stop;
@@ -8,7 +8,7 @@ use jtc_wire::words::{JOINT_INTERNAL, JTC_ERRORS};
 use super::codes::{Command, ERRORS, OTHER_ERROR, Outcome};
 use super::map::{COILS, DISCRETE_INPUTS, HOLDINGS, INPUTS, VERSION};
 
-/// Returns all tables as Markdown.
+/// Returns all tables of the page as Markdown.
 pub fn tables() -> String {
     let mut page = format!("Version {VERSION} of the map.\n\n");
     let mut table = |title: &str, head: &[&str], rows: Vec<Vec<String>>| {

@@ -1,16 +1,17 @@
-//! Requests and responses of Modbus TCP. The module does not do I/O: its functions take the bytes of a request and
-//! return the bytes of the response.
+//! Requests and responses of Modbus TCP. The module does no I/O: its functions take the bytes of a request and return
+//! the bytes of the response.
 //!
-//! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b.
-//! A request is checked in the order of the standard's state diagrams (function, quantity, address) and then executed.
-//! For any received bytes, the server sends a response or closes the connection. A write is executed completely or not
-//! at all.
+//! The Modbus standard consists of *Modbus Application Protocol* V1.1b3 and *Messaging on TCP/IP Implementation Guide*
+//! V1.0b. A request is checked in the order of the state diagrams in the standard (function, quantity, address) and
+//! then executed. For any received bytes, the server sends a response or closes the connection. A write request is
+//! executed completely or not at all.
 
-/// Length of the header before a request, bytes. The header contains transaction, protocol, length and unit.
+/// Length of the header of a Modbus request, bytes. The header contains the transaction number, the protocol, the
+/// length and the unit.
 pub const HEADER_LEN: usize = 7;
 /// Longest request or response after the header, bytes.
 const PDU_MAX: usize = 253;
-/// Largest quantities in one request that the standard permits.
+/// Largest numbers of bits or registers in one request that the Modbus standard permits.
 const READ_BITS_MAX: u16 = 2000;
 const READ_REGISTERS_MAX: u16 = 125;
 const WRITE_BITS_MAX: u16 = 1968;
@@ -29,57 +30,58 @@ pub enum Table {
     InputRegisters,
 }
 
-/// Reason why a request is not executed, with its exception code in the standard.
+/// Reason why a request is not executed, with its exception code in the Modbus standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exception {
-    /// The device does not have the function.
+    /// The device does not have the requested function.
     Function = 1,
     /// An address of the request does not exist.
     Address = 2,
-    /// A quantity, a length or a value is invalid.
+    /// A quantity, a length or a value in the request is invalid.
     Value = 3,
-    /// The device failed. In this server: the controller cannot be reached.
+    /// The device has failed. In this server, exception 4 means that the controller cannot be reached.
     Failure = 4,
-    /// The device is busy. In this server: another connection sends the commands.
+    /// The device is busy. In this server, exception 6 means that another connection sends the commands.
     Busy = 6,
 }
 
-/// Device that answers requests.
+/// Modbus device that answers requests.
 pub trait Device {
     /// Returns `count` bits of a table from address `at`.
     ///
     /// # Errors
     ///
-    /// [`Exception`].
+    /// An [`Exception`] if the request is not executed.
     fn bits(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<bool>, Exception>;
 
     /// Returns `count` registers of a table from address `at`.
     ///
     /// # Errors
     ///
-    /// [`Exception`].
+    /// An [`Exception`] if the request is not executed.
     fn registers(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception>;
 
-    /// Writes all coils from address `at` on, or none of them.
+    /// Writes all coils from address `at`, or none of them.
     ///
     /// # Errors
     ///
-    /// [`Exception`]: nothing was written.
+    /// An [`Exception`] if the request is not executed; no coil is written in this case.
     fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception>;
 
-    /// Writes all holding registers from address `at` on, or none of them.
+    /// Writes all holding registers from address `at`, or none of them.
     ///
     /// # Errors
     ///
-    /// [`Exception`]: nothing was written.
+    /// An [`Exception`] if the request is not executed; no register is written in this case.
     fn write_registers(&mut self, at: u16, values: &[u16]) -> Result<(), Exception>;
 }
 
-/// Header of a request.
+/// Header of a Modbus request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Request number of the client. The response contains the same number and the same unit.
+    /// Transaction number that the client has chosen, and the unit. The response contains the same transaction number
+    /// and the same unit as the request.
     transaction: [u8; 2],
     unit: u8,
     /// Length of the request after the header, bytes.
@@ -87,8 +89,8 @@ pub struct Header {
 }
 
 impl Header {
-    /// Parses a header; returns `None` if it is not a Modbus header or has an invalid length. In this case the server
-    /// cannot find the start of the next request.
+    /// Parses a header; returns `None` if the bytes are not a Modbus header or contain an invalid length. After an
+    /// invalid header, the server cannot find the start of the next request.
     pub fn parse(bytes: [u8; HEADER_LEN]) -> Option<Self> {
         let [t0, t1, p0, p1, l0, l1, unit] = bytes;
         let len = usize::from(u16::from_be_bytes([l0, l1])).checked_sub(1)?;
@@ -96,7 +98,7 @@ impl Header {
         whole.then_some(Self { transaction: [t0, t1], unit, len })
     }
 
-    /// Returns the response with its header.
+    /// Returns the response, with its header.
     pub fn respond(&self, pdu: &[u8]) -> Vec<u8> {
         let len = (pdu.len() + 1) as u16;
         let head = [self.transaction, [0, 0], len.to_be_bytes()];
@@ -104,7 +106,7 @@ impl Header {
     }
 }
 
-/// Returns the response of a device to a request, and `true` if the request was executed.
+/// Returns the response of a device to a request, and `true` if the device executed the request.
 pub fn answer(pdu: &[u8], device: &mut impl Device) -> (Vec<u8>, bool) {
     let function = pdu.first().copied().unwrap_or(0);
     match act(pdu, device) {
@@ -178,13 +180,13 @@ fn read_registers(
     Ok([function, (2 * values.len()) as u8].into_iter().chain(bytes).collect())
 }
 
-/// Returns the data if it is exactly two words.
+/// Returns the two words in the data of a request. Returns an error if the data has another length.
 fn two(rest: &[u8]) -> Result<(u16, u16), Exception> {
     let [a, b, c, d] = rest.try_into().map_err(|_| Exception::Value)?;
     Ok((u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])))
 }
 
-/// Returns an address, and a quantity from 1 to `most`.
+/// Returns the address and the quantity in a request; the quantity must be from 1 to `most`.
 fn span(rest: &[u8], most: u16) -> Result<(u16, u16), Exception> {
     two(rest).and_then(|(at, count)| quantity(count, most).map(|_| (at, count)))
 }
@@ -193,7 +195,7 @@ fn quantity(count: u16, most: u16) -> Result<usize, Exception> {
     if (1..=most).contains(&count) { Ok(usize::from(count)) } else { Err(Exception::Value) }
 }
 
-/// Returns an address, a quantity, and the data, whose length must match the quantity.
+/// Returns the address, the quantity and the values in a request. The length of the values must match the quantity.
 fn many(rest: &[u8], most: u16, len: fn(usize) -> usize) -> Result<(u16, usize, &[u8]), Exception> {
     let (head, data) = rest.split_at_checked(5).ok_or(Exception::Value)?;
     let (at, count) = two(&head[..4])?;
@@ -213,7 +215,7 @@ mod tests {
         answer(pdu, device).0
     }
 
-    /// Requests in the form of the standard's examples (V1.1b3, 6.1 to 6.12).
+    /// Requests in the form of the examples in the Modbus standard (V1.1b3, 6.1 to 6.12).
     #[test]
     fn requests_are_answered_as_the_standard_has_it() {
         let mut device = Sixteen::default();
@@ -264,8 +266,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any request, the response has the same function code and is not too long. No request writes more entries
-        /// than exist.
+        /// For any request, the response has the same function code and a permitted length. No request writes more
+        /// entries than the device has.
         #[test]
         fn any_bytes_are_answered(function in 0..24_u8, rest in prop::collection::vec(any::<u8>(), 0..PDU_MAX)) {
             let pdu: Vec<u8> = [function].into_iter().chain(rest).collect();

@@ -1,4 +1,4 @@
-//! Requests of PLCs: the values that PLCs read, the connection that may send commands, and the outcome of commands.
+//! Requests of PLCs: the values that PLCs read, the connection that may send commands, and the outcomes of commands.
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,17 +16,17 @@ use crate::line::{Introduction, Policy, Role};
 use crate::log::CommandLog;
 use crate::owner::Line;
 
-/// Name of the PLC client on the line.
+/// Name of the PLC client on the serial line.
 const NAME: &str = "the PLC (Modbus)";
-/// Duration of silence after which a connection that sends commands counts as lost. The limit is `GONE`, or more if the
-/// watchdog time is longer. Without a watchdog, the limit is `GONE_UNWATCHED`.
+/// Duration of silence after which the connection that sends commands counts as lost. The limit is `GONE`; a longer watchdog
+/// time replaces this limit. If the watchdog is off, the limit is `GONE_UNWATCHED`.
 const GONE: Duration = Duration::from_secs(1);
 const GONE_UNWATCHED: Duration = Duration::from_secs(60);
 
 /// Connection of a PLC.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection {
-    /// Number of the connection. Numbers are not reused.
+    /// Number of the connection. Connection numbers are not reused.
     pub number: u64,
     /// Network address of the PLC.
     pub peer: SocketAddr,
@@ -46,8 +46,8 @@ struct State {
     /// Coil values of each connection that has written a coil.
     coils: BTreeMap<u64, [bool; COILS.len()]>,
     http_session: Arc<HttpSession>,
-    /// Last job. The next two fields contain the number of the last event that was read, and the number of finished
-    /// runs.
+    /// Last job that a PLC began. `looked` is the number of the last event that was read, and `runs` is the number of runs
+    /// that the job has finished.
     job: Option<u64>,
     looked: u64,
     runs: u32,
@@ -55,7 +55,7 @@ struct State {
     asked: Option<Instant>,
 }
 
-/// Modbus device that all connections share.
+/// Modbus device that all PLC connections share.
 pub struct Plc {
     pub(super) line: Line,
     pub(super) jobs: Arc<Jobs>,
@@ -65,8 +65,7 @@ pub struct Plc {
 }
 
 impl Plc {
-    /// Creates the Modbus device of a serial line. The first command must have the sequence number that follows
-    /// `sequence`.
+    /// Creates the Modbus device of a serial line. The first command must have the sequence number after `sequence`.
     pub fn new(
         line: Line,
         jobs: Arc<Jobs>,
@@ -78,7 +77,7 @@ impl Plc {
             handshake: Handshake::new(sequence),
             operator: None,
             coils: BTreeMap::new(),
-            // The client is added to the line now, so that Stops of other clients apply to this client even before its
+            // The PLC client is added to the line now. Stops of other clients therefore apply to this client even before its
             // first request.
             http_session: http_session(&line),
             job: None,
@@ -90,7 +89,7 @@ impl Plc {
         Arc::new(Self { line, jobs, log, simulated, state: Mutex::new(state) })
     }
 
-    /// Returns the response to a request.
+    /// Returns the response to a request of a PLC.
     pub fn respond(self: &Arc<Self>, connection: &Connection, request: &[u8]) -> Vec<u8> {
         self.lock().asked = Some(Instant::now());
         let (response, done) = pdu::answer(request, &mut Asking { plc: self, connection });
@@ -100,7 +99,7 @@ impl Plc {
         response
     }
 
-    /// Removes a connection. The lease lasts until the watchdog time has passed, so that the PLC can reconnect.
+    /// Processes the end of a connection. The lease lasts until the watchdog time has passed, so that the PLC can reconnect.
     pub fn left(&self, connection: &Connection) {
         let mut state = self.lock();
         state.coils.remove(&connection.number);
@@ -109,8 +108,8 @@ impl Plc {
         }
     }
 
-    /// Returns `true` if this connection must not be closed: the connection sends commands, or one of its coils holds
-    /// the arm at rest.
+    /// Returns `true` if the connection sends commands, or if one of its coils holds the arm at rest. The server must not
+    /// close such a connection in favour of a new connection.
     pub fn needs_its_place(&self, connection: u64) -> bool {
         let state = self.lock();
         let holds = state.coils.get(&connection).is_some_and(|coils| coils.contains(&true));
@@ -120,12 +119,12 @@ impl Plc {
             })
     }
 
-    /// Returns `true` if a request was received within the time `within`.
+    /// Returns `true` if a PLC sent a request within the last `within`.
     pub fn is_asked(&self, within: Duration) -> bool {
         self.lock().asked.is_some_and(|asked| asked.elapsed() < within)
     }
 
-    /// Sets the displayed speed override, %.
+    /// Sets the speed override that PLCs can read, %.
     pub fn set_speed(&self, percent: Option<u16>) {
         self.lock().speed = percent;
     }
@@ -135,27 +134,29 @@ impl Plc {
         (state.job, state.runs, state.looked) = (Some(job), 0, 0);
     }
 
-    /// Returns the client of the line that sends the commands.
+    /// Returns the client of the serial line that sends the commands of PLCs.
     pub(super) fn http_session(&self) -> Arc<HttpSession> {
         let mut state = self.lock();
         if self.line.with(|line, _| line.introduction(state.http_session.client).is_none()) {
-            // The client was disconnected from the line.
+            // The line disconnected the previous client, so a new client is added.
             state.http_session = http_session(&self.line);
         }
         state.http_session.clone()
     }
 
-    /// Returns `true` if a coil of any connection is 1, which holds the arm at rest.
+    /// Returns `true` if a coil of any connection is 1. A coil with the value 1 holds the arm at rest.
     pub(super) fn is_held_by_a_coil(&self) -> bool {
         self.lock().coils.values().any(|coils| coils.contains(&true))
     }
 
-    /// Returns the policy for a motion when the PLC is silent or disconnected, and the time after which this policy applies.
+    /// Returns the policy for a motion if the PLC is silent or disconnected. Also returns the time after which the policy
+    /// applies.
     pub(super) fn watchdog(&self) -> (Policy, Duration) {
         watchdog(&self.lock().handshake)
     }
 
-    /// Releases the lease that the PLC holds.
+    /// Ends the right of the present connection to write holding registers, so that another connection can send
+    /// commands.
     pub(super) fn resign(&self) {
         if let Some(operator) = &mut self.lock().operator {
             operator.connection = None;
@@ -196,7 +197,7 @@ impl Plc {
             let lives = |until: Option<Duration>| until.is_none_or(|until| now < until);
             if line.lease().is_some_and(|lease| lease.holder == client && lives(lease.until)) {
                 line.set_policy(client, policy);
-                // The client holds the lease, so this cannot fail.
+                // The client holds the lease, so renewing it cannot fail.
                 let _ = line.take_lease(client, Some(lasts), now);
             }
         });
@@ -246,7 +247,7 @@ impl Plc {
         }
     }
 
-    /// Returns the number of runs that a running job has finished.
+    /// Returns the number of runs that a job has finished.
     fn runs(&self, state: &mut State, job: u64) -> u32 {
         if self.jobs.journal.last() != state.looked {
             let excerpt = self.jobs.journal.after(state.looked, Some(job), usize::from(u16::MAX));
@@ -260,7 +261,7 @@ impl Plc {
         state.runs
     }
 
-    /// Sends a Stop or a Pause of a connection, ahead of all other frames.
+    /// Sends a Stop or a Pause of a connection before all other frames.
     fn halt(&self, connection: &Connection, command: ExecCommand) -> Result<(), Exception> {
         let (name, lost) = (format!("the PLC at {}", connection.peer.ip()), self.line.lost());
         let facts = json!({
@@ -279,7 +280,7 @@ impl Plc {
         Ok(())
     }
 
-    /// Executes a command and acknowledges it.
+    /// Executes a command of a PLC and acknowledges it.
     fn obey(self: &Arc<Self>, connection: Connection, order: Order, busy: bool) {
         let halt = match order.command {
             Command::Stop => Some(ExecCommand::Stop),
@@ -295,7 +296,7 @@ impl Plc {
             let outcome = if busy { Outcome::Busy } else { Outcome::Done };
             return self.lock().handshake.acknowledge(order.sequence, outcome, 0);
         }
-        // A Stop between now and the start of the command prevents the command.
+        // If a client requests a Stop before the command starts, the command does not start.
         let (plc, halt) = (self.clone(), self.line.last_halt());
         tokio::spawn(async move {
             let refusal = plc.act(&order, halt).await.err();
@@ -324,8 +325,8 @@ impl Operator {
 }
 
 impl State {
-    /// Assigns the holding registers to this connection, unless another connection uses them. `leased` is `true` if a
-    /// PLC holds the lease.
+    /// Assigns the holding registers to this connection, unless another connection uses the registers. `leased` is `true` if
+    /// a PLC holds the lease.
     fn operate(&mut self, connection: &Connection, leased: bool) -> Result<(), Exception> {
         let address = connection.peer.ip();
         let same = self.operator.as_ref().is_some_and(|operator| operator.address == address);
@@ -356,7 +357,7 @@ fn watchdog(handshake: &Handshake) -> (Policy, Duration) {
     (policy, Duration::from_millis(handshake.watchdog_ms().into()))
 }
 
-/// Connection of the present request.
+/// Connection that sends the present request.
 struct Asking<'a> {
     plc: &'a Arc<Plc>,
     connection: &'a Connection,
@@ -390,7 +391,7 @@ impl Device for Asking<'_> {
         let before = coils;
         coils[usize::from(at)..][..values.len()].copy_from_slice(values);
         let rises = |coil: usize| coils[coil] && !before[coil];
-        // A Stop has priority over a Pause.
+        // The Stop coil has priority over the Pause coil.
         if rises(map::STOP) {
             self.plc.halt(self.connection, ExecCommand::Stop)?;
         } else if rises(map::PAUSE) {

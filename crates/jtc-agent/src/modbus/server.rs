@@ -1,4 +1,4 @@
-//! Connections of PLCs, with limits for their addresses, number and request rate.
+//! Connections of PLCs, with limits for their addresses, their number and their request rate.
 use std::collections::BTreeMap;
 use std::io;
 use std::net::TcpListener;
@@ -17,35 +17,36 @@ use super::allow::Allowed;
 use super::pdu::{HEADER_LEN, Header};
 use super::plc::{Connection, Plc};
 
-/// Largest number of connections.
+/// Largest number of PLC connections.
 pub const CONNECTIONS_MAX: usize = 8;
-/// Duration of silence after which a connection may be closed for a new connection. Connections that send commands or
-/// hold the arm by a coil are never closed for this reason.
+/// Duration of silence after which the server may close a connection in favour of a new connection. In favour of a
+/// new connection, the server never closes a connection that sends commands or holds the arm at rest with a coil.
 const GIVES_WAY: Duration = Duration::from_secs(2);
-/// Duration of silence after which a connection is closed, which is longer than the longest watchdog time.
+/// Duration of silence after which the server closes any connection. The duration is longer than the longest watchdog
+/// time.
 const IDLE: Duration = Duration::from_secs(90);
-/// Longest time in which a response may stay unread.
+/// Longest time for which a response may stay unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
 /// Largest number of requests of a connection, per second and in one burst.
 const REQUESTS_PER_S: f64 = 250.0;
 const REQUESTS_AT_ONCE: f64 = 50.0;
-/// Interval at which the end condition is checked.
+/// Interval at which the server checks whether it must end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Interval at which the agent reads the speed override from the controller while a PLC sends requests.
 const SPEED: Duration = Duration::from_secs(2);
 
-/// Modbus server on a separate thread. The server ends on drop.
+/// Modbus server on a separate thread. The server ends when this value is dropped.
 pub struct Server {
     ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Server {
-    /// Serves `plc` at `listener` for the allowed addresses.
+    /// Serves `plc` at `listener` for connections from the allowed addresses.
     ///
     /// # Errors
     ///
-    /// The system cannot start threads, or the listener fails.
+    /// The operating system cannot start threads, or the listener fails.
     pub fn start(listener: TcpListener, allowed: Allowed, plc: Arc<Plc>) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -73,7 +74,7 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of the server thread was already printed.
+            // If the server thread has panicked, the panic was already printed.
             drop(thread.join());
         }
     }
@@ -85,7 +86,7 @@ async fn until(ended: &AtomicBool) {
     }
 }
 
-/// Updates the displayed speed override from the controller.
+/// Reads the speed override from the controller repeatedly, so that PLCs can read it.
 async fn ask_speed(plc: &Plc) {
     loop {
         if plc.is_asked(SPEED) && plc.line.lost().is_none() {
@@ -97,9 +98,9 @@ async fn ask_speed(plc: &Plc) {
     }
 }
 
-/// Open connection.
+/// Open connection of a PLC.
 struct Open {
-    /// Time of the last request, ms.
+    /// Time of the last request of the connection, ms.
     seen: Arc<AtomicU64>,
     abort: AbortHandle,
 }
@@ -111,11 +112,11 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
     let (connections, start, mut last) = (Connections::default(), Instant::now(), 0);
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
-            // The program has reached its limit of open files for the moment.
+            // The program has reached its limit of open files, so it waits before it accepts the next connection.
             tokio::time::sleep(LOOK).await;
             continue;
         };
-        // Dropping the stream closes the connection immediately.
+        // When the stream is dropped, the connection closes immediately.
         if !allowed.contains(peer.ip()) {
             plc.refused(peer, "this address is not allowed: --modbus-allow lists the allowed addresses");
             continue;
@@ -130,15 +131,16 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
         let gone = Gone { connection, plc: plc.clone(), connections: connections.clone() };
         let mut open = lock(&connections);
         let conversing = converse(stream, gone, seen.clone(), start);
-        // The connection cannot end before it is in the list, because the lock is held and the connection runs on this
-        // thread.
+        // The connection cannot end before it is added to the list, because the lock is held and the connection runs
+        // on this thread.
         open.insert(last, Open { seen, abort: tokio::spawn(conversing).abort_handle() });
     }
 }
 
-/// Ensures that another connection is possible, if necessary by closing an idle connection. Returns `false` if no
-/// connection can be closed, because each connection sends commands, holds the arm by a coil, or was not idle long
-/// enough. If all connections hold the arm, the arm is at rest and no motion can begin.
+/// Ensures that the server can accept another connection. If necessary, closes an idle connection. Returns `false` if
+/// no connection can be closed. For a new connection, the server closes no connection that sends commands, holds the
+/// arm at rest with a coil, or was not idle long enough. If all connections hold the arm at rest, no motion can
+/// begin.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {
@@ -164,7 +166,7 @@ fn millis(since: Instant) -> u64 {
     u64::try_from(since.elapsed().as_millis()).unwrap_or(u64::MAX)
 }
 
-/// Guard that removes its connection from the list on drop.
+/// Guard that removes its connection from the list when it is dropped.
 struct Gone {
     connection: Connection,
     plc: Arc<Plc>,
@@ -178,15 +180,15 @@ impl Drop for Gone {
     }
 }
 
-/// Answers requests until the client or the server disconnects, or the client sends invalid Modbus.
+/// Answers the requests of a PLC until one side disconnects, or until the PLC sends invalid Modbus.
 async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start: Instant) {
-    // A response must be sent at once, without waiting for more data.
+    // Each response must be sent at once, without waiting for more data.
     let _ = stream.set_nodelay(true);
     let mut pace = Pace::new();
     let mut request = Vec::new();
     loop {
         let Ok(Some(header)) = timeout(IDLE, read(&mut stream, &mut request)).await else { return };
-        // The rate is limited per connection, so that a fast client delays only itself.
+        // The request rate is limited per connection, so a fast PLC delays only itself.
         tokio::time::sleep(pace.wait(Instant::now())).await;
         seen.store(millis(start), Ordering::Relaxed);
         let response = header.respond(&gone.plc.respond(&gone.connection, &request));
@@ -196,7 +198,7 @@ async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start
     }
 }
 
-/// Reads a request; returns `None` if the connection has ended.
+/// Reads a request of a PLC; returns `None` if the connection has ended.
 async fn read(stream: &mut TcpStream, request: &mut Vec<u8>) -> Option<Header> {
     let mut head = [0; HEADER_LEN];
     stream.read_exact(&mut head).await.ok()?;
@@ -206,7 +208,7 @@ async fn read(stream: &mut TcpStream, request: &mut Vec<u8>) -> Option<Header> {
     Some(header)
 }
 
-/// Rate limit of a connection.
+/// Limit for the request rate of a connection.
 struct Pace {
     allowance: f64,
     at: Instant,
@@ -217,7 +219,7 @@ impl Pace {
         Self { allowance: REQUESTS_AT_ONCE, at: Instant::now() }
     }
 
-    /// Returns the time for which the next request must wait.
+    /// Returns the time for which the next request of the connection must wait.
     fn wait(&mut self, now: Instant) -> Duration {
         let passed = now.saturating_duration_since(self.at).as_secs_f64();
         self.allowance = (self.allowance + passed * REQUESTS_PER_S).min(REQUESTS_AT_ONCE) - 1.0;
@@ -234,8 +236,8 @@ mod tests {
     fn whoever_asks_faster_than_it_may_waits() {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
-        // The client sends each request after the answer to the previous request. The first requests form a burst, and
-        // the later requests are sent at the limited rate.
+        // The simulated client sends each request after the answer to its previous request. The first requests form a
+        // burst; the later requests are sent at the limited rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

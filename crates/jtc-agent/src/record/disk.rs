@@ -1,4 +1,5 @@
-//! Writer of recordings, in a separate thread, so that a slow or full disk does not delay other threads.
+//! Writer of recordings, which runs in a separate thread. A slow or full disk therefore does not delay
+//! other threads.
 #[cfg(test)]
 mod tests;
 
@@ -16,11 +17,12 @@ use serde_json::{Value, json};
 
 use super::retention::{Begun, Retention};
 
-/// Largest number of samples that wait for the disk. The queue is large enough for minutes of statuses.
+/// Largest number of samples that are queued for the disk. The queue is long enough for several minutes
+/// of statuses.
 const WAITING_MAX: usize = 1 << 13;
-/// Number of queue entries that are reserved for the start and end of recordings.
+/// Number of queue entries that are reserved for the start and the end of recordings.
 const RESERVED: usize = 64;
-/// Time after which a failed write is repeated.
+/// Time after which the writer repeats a failed write.
 const AGAIN: Duration = Duration::from_secs(5);
 
 /// Message to the writer's thread.
@@ -31,10 +33,10 @@ enum Message {
     End(Ending, u64),
 }
 
-/// Notice for the user.
+/// Notice about recordings for the user.
 #[derive(Clone, Debug)]
 pub struct Notice {
-    /// Keyword for logs.
+    /// Keyword of the notice for logs.
     pub what: &'static str,
     /// Details of the notice in JSON.
     pub facts: Value,
@@ -42,14 +44,14 @@ pub struct Notice {
     pub warning: Option<String>,
 }
 
-/// Callback for a notice, on the writer's thread.
+/// Callback for a notice, which runs on the writer's thread.
 pub type Notify = Box<dyn FnMut(Notice) + Send>;
 
-/// Input of the writer's queue.
+/// Input of the queue to the writer's thread.
 pub(super) struct Disk {
     queue: SyncSender<Message>,
     waiting: Arc<AtomicUsize>,
-    /// Number of samples of this recording that did not fit into the queue.
+    /// Number of samples of the current recording that did not fit into the queue.
     lost: u64,
 }
 
@@ -82,32 +84,33 @@ impl Disk {
         sent
     }
 
-    /// Begins a recording. Like the other methods, this method never waits.
+    /// Begins a recording. Like the other methods of the queue, this method never waits for the disk.
     pub(super) fn open(&mut self, info: RecordingInfo) {
         self.lost = 0;
         self.send(Message::Begin(Box::new(info)), 0);
     }
 
-    /// Queues a sample. If the queue is full, the sample is counted as lost.
+    /// Queues a sample for the current recording. If the queue is full, the sample counts as lost.
     pub(super) fn write(&mut self, sample: &Sample) {
         if !self.send(Message::Sample(Box::new(*sample)), RESERVED) {
             self.lost += 1;
         }
     }
 
-    /// Adds samples that were lost before they reached this queue to the count of lost samples.
+    /// Adds `samples` to the count of lost samples. These samples were lost before they reached the
+    /// queue of the writer.
     pub(super) fn lose(&mut self, samples: u64) {
         self.lost += samples;
     }
 
-    /// Ends the recording.
+    /// Ends the current recording.
     pub(super) fn close(&mut self, ending: Ending) {
         let lost = std::mem::take(&mut self.lost);
         self.send(Message::End(ending, lost), 0);
     }
 }
 
-/// File that is being written.
+/// Recording file that is being written.
 struct Open {
     recorder: Recorder,
     begun: Begun,
@@ -118,12 +121,12 @@ struct Writer {
     retention: Retention,
     notify: Notify,
     open: Option<Open>,
-    /// Current recording, which is kept even while its file cannot be written.
+    /// Current recording. The writer keeps the current recording even while its file cannot be written.
     wanted: Option<Box<RecordingInfo>>,
     failed: Option<Instant>,
-    /// Interval until the next attempt.
+    /// Interval until the next attempt to write.
     again: Duration,
-    /// Number of samples that could not be written.
+    /// Number of samples of the recording that could not be written.
     lost: u64,
 }
 
@@ -143,7 +146,7 @@ impl Writer {
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    // The queue was closed before the recording ended.
+                    // The queue closed before the end of the recording.
                     self.end(&Ending::default());
                     return;
                 }
@@ -189,7 +192,7 @@ impl Writer {
         (self.notify)(Notice { what, facts, warning });
     }
 
-    /// Removes old recordings until `bytes` more bytes fit within the limit.
+    /// Removes the oldest recordings until `bytes` more bytes fit within the limit.
     fn make_room(&mut self, bytes: u64) {
         for path in self.retention.make_room(bytes) {
             self.notice("recording-removed", json!({ "file": path }), None);
@@ -201,7 +204,8 @@ impl Writer {
         let Some(info) = &self.wanted else { return };
         let made = self.retention.begin(host_kit::unix_time()).map_err(|e| e.to_string());
         let begun = made.and_then(|(file, begun)| {
-            // The file header is written now, so that a disk error is found before the first sample.
+            // The writer writes the file header now, so that it finds a disk error before the first
+            // sample.
             let recorder = Recorder::on(file, &begun.path, info)
                 .and_then(|mut recorder| recorder.flush().map(|()| recorder));
             match recorder {
@@ -226,7 +230,7 @@ impl Writer {
         }
     }
 
-    /// Handles a write error. Reports only the first error until a write succeeds again.
+    /// Processes a write error. Reports only the first of several consecutive write errors.
     fn fail(&mut self, error: &str) {
         let file = self.break_off();
         if self.failed.replace(Instant::now()).is_none() {
@@ -237,17 +241,19 @@ impl Writer {
         }
     }
 
-    /// Closes the file without completing it.
+    /// Closes the recording file without completing it.
     fn break_off(&mut self) -> Option<PathBuf> {
         let Open { recorder, begun } = self.open.take()?;
         let (path, samples) = (begun.path.clone(), recorder.samples());
-        // Dropping the recorder tries to complete the file. A failure of this attempt is ignored.
+        // When the recorder is dropped, it tries to complete the file. A failure of this attempt to
+        // complete the file is ignored.
         drop(recorder);
         self.retention.break_off(begun, samples);
         Some(path)
     }
 
-    /// Passes all data to the operating system. Begins a new file if the present file is too long.
+    /// Passes all samples to the operating system. Begins a new recording file if the present file is
+    /// too long.
     fn flush(&mut self) {
         let Some(open) = &mut self.open else { return };
         if let Err(error) = open.recorder.flush() {
@@ -272,7 +278,7 @@ impl Writer {
         self.wanted = None;
     }
 
-    /// Completes the file.
+    /// Completes the recording file.
     fn complete(&mut self, ending: &Ending) {
         let ending = Ending { lost_samples: std::mem::take(&mut self.lost), ..ending.clone() };
         let Some(Open { recorder, begun }) = self.open.take() else { return };

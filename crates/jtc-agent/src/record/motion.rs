@@ -1,4 +1,4 @@
-//! Finds the start and end of recordings from the statuses only, so that motions of all clients are recorded.
+//! Finds the start and the end of recordings in the statuses. The motions of all clients are therefore recorded.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -8,15 +8,16 @@ use jtc_wire::{ControllerState, Status, TrajectoryState};
 
 /// Time before a motion that is included in the recording.
 const BEFORE: Duration = Duration::from_millis(500);
-/// Largest number of statuses that are included from before a motion.
+/// Largest number of statuses before a motion that the recording includes.
 const BEFORE_MAX: usize = 256;
-/// Time at rest after a motion before its recording ends.
+/// Time at rest after a motion until its recording ends.
 const REST: Duration = Duration::from_millis(500);
-/// Longest time from the end of a motion to the end of its recording, even if the arm is not yet completely at rest.
+/// Longest time from the end of a motion to the end of its recording, even if the arm is not completely at rest.
 const OVER: Duration = Duration::from_secs(5);
-/// Time at rest after which recording stops in a pause, or in Teaching if no person guides the arm.
+/// Time at rest in a pause, or in Teaching if no person moves the arm, after which statuses are no longer recorded. The
+/// recording does not end; it continues when the arm moves.
 const STANDS: Duration = Duration::from_secs(10);
-/// Time for which a Jog is effective (J-58), plus its transmission time on the serial line.
+/// Time for which a Jog is effective (J-58), plus the transmission time of its frame on the serial line.
 const JOG: Duration = Duration::from_millis(400);
 /// Time without a status after which the recording of a motion ends, because the connection is considered lost.
 pub(super) const SILENT: Duration = Duration::from_secs(2);
@@ -24,11 +25,11 @@ pub(super) const SILENT: Duration = Duration::from_secs(2);
 /// Kinds of motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Motion {
-    /// Motion along a trajectory: a run, or the approach to its first point.
+    /// Motion along a trajectory: a run of the trajectory, or the approach to its first point.
     Execution,
     /// Jog: joints with commanded velocities.
     Jog,
-    /// Teaching: a person guides the arm by hand.
+    /// Teaching: a person moves the arm by hand.
     Teaching,
 }
 
@@ -43,23 +44,23 @@ impl Motion {
     }
 }
 
-/// Step of a recording.
+/// Action that starts, continues or ends a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Step {
-    /// Begins a recording whose first status arrived at this time.
+    /// Start of a recording: the kind of the motion, and the arrival time of the first status.
     Begin(Motion, Duration),
-    /// Adds a status.
+    /// Next status of the recording.
     Status(Duration, Box<Status>),
-    /// Ends the recording.
+    /// End of the recording.
     End(Ending),
 }
 
-/// Recording in progress.
+/// Recording that is in progress.
 struct Open {
     motion: Motion,
-    /// Time since which the arm has been at rest in a pause, or in Teaching while no person guides the arm.
+    /// Time since which the arm has been at rest: in a pause, or in Teaching while no person moves the arm.
     stands: Option<Duration>,
-    /// Time of the end of the motion. The next field is the time since which the arm has been at rest.
+    /// Time of the end of the motion. `rests` is the time since which the arm has been at rest after the motion.
     over: Option<Duration>,
     rests: Option<Duration>,
     last: Status,
@@ -75,7 +76,7 @@ pub(super) struct Follower {
 }
 
 impl Follower {
-    /// Handles a Jog that was sent.
+    /// Processes a Jog frame that was sent.
     pub(super) fn jog(&mut self, now: Duration) {
         self.jogged = Some(now);
     }
@@ -89,7 +90,7 @@ impl Follower {
     pub(super) fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
         let mut steps = self.silence(now);
         let motion = self.motion(now, status);
-        // Each motion is stored in a separate recording, even if it begins directly after the previous motion.
+        // Each motion has its own recording, even if it begins directly after the previous motion.
         let another = motion.is_some_and(|motion| {
             self.open.as_ref().is_some_and(|open| open.motion != motion)
                 || motion == Motion::Execution && self.begins_anew(status)
@@ -123,7 +124,7 @@ impl Follower {
         steps
     }
 
-    /// Handles the absence of statuses until `now`.
+    /// Processes the absence of statuses until `now`.
     pub(super) fn silence(&mut self, now: Duration) -> Vec<Step> {
         let silent = self.last.is_some_and(|(at, ..)| now.saturating_sub(at) > SILENT);
         if !silent {
@@ -132,7 +133,7 @@ impl Follower {
         self.end("fault", &format!("no status received for {} s", SILENT.as_secs()))
     }
 
-    /// Ends the recording with `reason`, because no more statuses will be processed.
+    /// Ends the recording with `reason`, because the recorder processes no more statuses.
     pub(super) fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
         self.last = None;
         self.before.clear();
@@ -140,10 +141,10 @@ impl Follower {
         self.open.take().map(|_| Step::End(ending)).into_iter().collect()
     }
 
-    /// Returns the kind of motion, if the arm moves.
+    /// Returns the kind of the current motion; `None` if the arm does not move.
     fn motion(&mut self, now: Duration, status: &Status) -> Option<Motion> {
         if status.state != ControllerState::HoldPos {
-            // A Jog is effective only in HoldPos.
+            // A Jog is effective only in the state HoldPos.
             self.jogged = None;
         }
         if status.is_executing() {
@@ -158,7 +159,7 @@ impl Follower {
         }
     }
 
-    /// Returns `true` if this status belongs to a different execution than the last status.
+    /// Returns `true` if this status belongs to a different execution than the previous status.
     fn begins_anew(&self, status: &Status) -> bool {
         self.last.is_none_or(|(_, trajectory, point)| {
             !matches!(trajectory, TrajectoryState::Execute | TrajectoryState::Pause) || status.point < point
@@ -191,7 +192,7 @@ impl Open {
     }
 }
 
-/// Returns how a motion with this last status ended.
+/// Returns the outcome of a motion whose last status is `status`.
 fn ending(motion: Motion, status: &Status) -> Ending {
     let fault = status.state == ControllerState::Error || status.errors != 0;
     let (outcome, reason) = match (motion, status.trajectory.known()) {
@@ -208,12 +209,12 @@ fn ending(motion: Motion, status: &Status) -> Ending {
 mod tests {
     use super::*;
 
-    /// Arm that sends a status every 40 ms.
+    /// Simulated arm that sends a status every 40 ms.
     struct Arm {
         follower: Follower,
         now: Duration,
         status: Status,
-        /// Begin and end of each recording, with the number of statuses between them.
+        /// Start and end of each recording, with the number of statuses between them.
         seen: Vec<String>,
         statuses: usize,
     }
@@ -286,7 +287,7 @@ mod tests {
         arm.is(HoldPos, Stop, 0.0);
         arm.run_ms(60_000);
         assert_eq!(arm.take(), ["begin execution", "stopped"]);
-        // The recording contains the statuses of 0.5 s before the motion, 4.4 s in motion, and 0.5 s at rest.
+        // The recording contains the statuses of 0.5 s before the motion, 4.4 s of motion, and 0.5 s at rest.
         assert!((130..=140).contains(&arm.statuses), "{}", arm.statuses);
     }
 
@@ -300,7 +301,8 @@ mod tests {
             arm.is(HoldPos, end, 0.0);
             arm.run_ms(200);
         }
-        // In the first case the next motion begins after a short rest. In the second case it begins between two statuses.
+        // In the first case, the next motion begins after a short rest. In the second case, the next motion begins
+        // between two statuses.
         arm.is(Operate, Execute, 0.3);
         arm.run_ms(400);
         arm.status.point = 0;

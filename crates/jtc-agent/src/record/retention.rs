@@ -1,29 +1,29 @@
-//! Recording directory: file names, size limit, and deletion of the oldest recordings.
+//! Recording directory: file names, limit of the total size, and removal of the oldest recordings.
 //!
-//! A list file in the directory names the recordings that agents have made there, so that no other file is ever removed. The list file is
-//! locked, so two agents cannot use the same directory.
+//! A list file in the directory contains the names of the recordings that agents have made in this directory. Agents remove only files
+//! whose names are in the list file. An agent locks the list file, so two agents cannot use the same directory.
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Name of the list file.
+/// Name of the list file in the recording directory.
 pub(super) const LIST: &str = ".jtc-recordings";
 /// File name extension of a complete recording.
 const WHOLE: &str = ".mcap";
 /// File name extension of a recording that is incomplete or in progress. Every command can read an incomplete recording.
 const PART: &str = ".part.mcap";
-/// Number of lines about removed files at which the list file is rewritten.
+/// Number of lines about removed files after which the agent rewrites the list file.
 const GONE_MAX: usize = 10_000;
 
-/// Recording that an agent has made in this directory.
+/// Recording that an agent has made in the recording directory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Own {
-    /// File name without extension.
+    /// File name of the recording without extension.
     name: String,
-    /// Length of the file in bytes; 0 if the length is unknown. A file with a different length was changed by another program and is never
-    /// removed.
+    /// Length of the file in bytes; 0 if the length is unknown. If a file has a different length than the list file states, another
+    /// program has changed the file. The agent never removes a file that another program has changed.
     bytes: u64,
     /// `true` if the recording is incomplete or in progress.
     part: bool,
@@ -38,7 +38,7 @@ impl Own {
 /// Function that creates a new file.
 type Make = fn(&Path) -> io::Result<File>;
 
-/// Recording directory.
+/// Directory that contains recordings.
 pub(super) struct Retention {
     dir: PathBuf,
     make: Make,
@@ -50,7 +50,7 @@ pub(super) struct Retention {
     gone: usize,
 }
 
-/// Recording in progress.
+/// Recording that is in progress.
 pub(super) struct Begun {
     /// Path of the recording file.
     pub path: PathBuf,
@@ -58,11 +58,11 @@ pub(super) struct Begun {
 }
 
 impl Retention {
-    /// Opens or creates a directory. `limit` is the largest total size of all recordings, bytes.
+    /// Opens or creates a recording directory. `limit` is the largest total size of all recordings, bytes.
     ///
     /// # Errors
     ///
-    /// The directory cannot be created or written, or another agent uses it.
+    /// The recording directory cannot be created or written, or another agent uses it.
     pub(super) fn open(dir: &Path, limit: u64) -> io::Result<Self> {
         std::fs::create_dir_all(dir)?;
         let path = dir.join(LIST);
@@ -86,7 +86,7 @@ impl Retention {
         Ok(retention)
     }
 
-    /// Processes a line of the list file. Ignores invalid lines.
+    /// Processes a line of the list file. Ignores an invalid line of the list file.
     fn take_line(&mut self, line: &str) {
         let mut words = line.split(' ');
         let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
@@ -102,8 +102,8 @@ impl Retention {
         }
     }
 
-    /// Checks the listed files, and removes from the list the files that another program has removed or changed. The length of a recording
-    /// is unknown if its agent was killed.
+    /// Checks the files in the list. Removes from the list the files that another program has removed or changed. If an agent was killed
+    /// during a recording, the length of this recording is unknown.
     fn look(&mut self) {
         let dir = self.dir.clone();
         self.own.retain_mut(|own| match length(&own.path(&dir)) {
@@ -115,12 +115,12 @@ impl Retention {
         });
     }
 
-    /// Rewrites the list without removed files.
+    /// Rewrites the list file without the names of removed files.
     fn rewrite(&mut self) -> io::Result<()> {
         let mut text = String::new();
         let line =
             |own: &Own| format!("{} {} {}\n", if own.part { "part" } else { "end" }, own.name, own.bytes);
-        // The numbers of removed recordings are not used again.
+        // The numbers of removed recordings must not be used again.
         if self.number > 0 {
             text += &format!("gone {}\n", name(Duration::ZERO, self.number));
         }
@@ -131,22 +131,23 @@ impl Retention {
         Ok(())
     }
 
-    /// Appends a line to the list. After a failed write, removes the incomplete line.
+    /// Appends a line to the list file. After a failed write, removes the incomplete line from the list file.
     fn note(&mut self, line: &str) -> io::Result<()> {
         let end = self.list.seek(SeekFrom::End(0))?;
         let written = self.list.write_all(format!("{line}\n").as_bytes());
         if written.is_err() {
-            // Even if this truncation fails, the list is still valid.
+            // Even if truncating the list file fails, the list file is still valid.
             let _ = self.list.set_len(end);
         }
         written
     }
 
-    /// Creates a recording file with the next number. `now` is the time since 1970. The file name is added to the list first.
+    /// Creates a recording file with the next number. `now` is the time since 1970. The file name is added to the list file before the
+    /// recording file is created.
     ///
     /// # Errors
     ///
-    /// The disk cannot be written.
+    /// The recording directory cannot be written.
     pub(super) fn begin(&mut self, now: Duration) -> io::Result<(File, Begun)> {
         loop {
             let name = name(now, self.number + 1);
@@ -163,11 +164,11 @@ impl Retention {
         }
     }
 
-    /// Completes a recording and gives the file its final name.
+    /// Completes a recording and gives its file the final name.
     ///
     /// # Errors
     ///
-    /// The recording file could not be renamed and keeps the name of an incomplete recording.
+    /// The recording file could not be renamed, and keeps the name of an incomplete recording.
     pub(super) fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
         let bytes = length(&begun.path).unwrap_or(0);
         let mut own = Own { name: begun.name, bytes, part: true };
@@ -179,12 +180,12 @@ impl Retention {
         renamed.and(noted).map(|()| whole)
     }
 
-    /// Closes a recording file without completing it. The file is deleted only if it contains no samples.
+    /// Closes a recording file without completing it. The recording file is deleted only if it contains no samples.
     pub(super) fn break_off(&mut self, begun: Begun, samples: u64) {
         if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
             let _ = self.note(&format!("gone {}", begun.name));
             self.gone += 1;
-            // The next recording may use the number of the deleted file.
+            // The next recording may use the number of the deleted recording.
             self.number -= u64::from(number_of(&begun.name) == Some(self.number));
             return;
         }
@@ -200,7 +201,7 @@ impl Retention {
             && let Some(oldest) = self.own.pop_front()
         {
             let path = oldest.path(&self.dir);
-            // If another program has replaced the recording by another file, this file is not removed.
+            // If another program has replaced the recording by another file, the agent does not remove this file.
             if length(&path) == Some(oldest.bytes) && std::fs::remove_file(&path).is_ok() {
                 removed.push(path);
             }
@@ -208,19 +209,20 @@ impl Retention {
             let _ = self.note(&format!("gone {}", oldest.name));
         }
         if self.gone > GONE_MAX {
-            // If the rewrite fails, the old list is still valid.
+            // An error is ignored. If the list file then lacks the name of a recording, a later agent does not remove
+            // this recording.
             let _ = self.rewrite();
         }
         removed
     }
 
-    /// Returns the file size in bytes after which a recording continues in a new file. The old parts of a long recording can then be
-    /// removed.
+    /// Returns the file size in bytes above which a recording continues in a new file. The agent can then remove the old files of a
+    /// long recording.
     pub(super) fn longest(&self) -> u64 {
         self.limit / 4
     }
 
-    /// Replaces the function that creates files.
+    /// Replaces the function that creates recording files.
     #[cfg(test)]
     pub(super) fn making(self, make: Make) -> Self {
         Self { make, ..self }
@@ -235,13 +237,13 @@ fn make(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Returns the length of the file at this path. For a symbolic link, the result is the length of the link, not of its target.
+/// Returns the length of the file at this path. For a symbolic link, the result is the length of the link itself, not of its target.
 fn length(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
 }
 
-/// Returns a name that consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers always increase with time. The
-/// names also increase with time, unless the clock was set back.
+/// Returns the name of a recording, which consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers of recordings
+/// always increase with time. The names of recordings also increase with time, unless the clock was set back.
 fn name(now: Duration, number: u64) -> String {
     let since = now.as_secs();
     let (year, month, day) = date((since / 86_400) as i64);
@@ -249,7 +251,7 @@ fn name(now: Duration, number: u64) -> String {
     format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z-{number:06}")
 }
 
-/// Returns the number in a name; `None` for names in another format.
+/// Returns the number in the name of a recording; `None` for names in another format.
 fn number_of(name: &str) -> Option<u64> {
     let (time, number) = name.split_once('-')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
@@ -273,10 +275,11 @@ fn date(days: i64) -> (i64, i64, i64) {
 mod tests {
     use super::*;
 
-    /// 2026-11-23 15:44:12 UTC.
+    /// The time 2026-11-23 15:44:12 UTC.
     const NOW: Duration = Duration::from_secs(1_795_448_652);
 
-    /// Creates a recording of `bytes` bytes. If `whole` is false, the agent is killed before the recording is complete.
+    /// Creates a recording with a length of `bytes` bytes. If `whole` is false, the recording stays incomplete, as if its agent had been
+    /// killed.
     fn make(retention: &mut Retention, bytes: usize, whole: bool) -> PathBuf {
         make_at(retention, NOW, bytes, whole)
     }
@@ -321,7 +324,7 @@ mod tests {
         assert!(retention.make_room(5000).is_empty() && others.exists());
     }
 
-    /// The oldest recording is removed first and no number is used twice, even if the clock of the computer is changed.
+    /// Recordings are removed in the order of their creation, and no number is used twice, even if the clock of the computer is changed.
     #[test]
     fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {
         let dir = tempfile::tempdir().unwrap();
@@ -350,7 +353,7 @@ mod tests {
         let error = Retention::open(dir.path(), 1000).err().unwrap();
         assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
         drop(retention);
-        // An incomplete line is ignored.
+        // An incomplete line of the list file is ignored.
         let mut list = OpenOptions::new().append(true).open(dir.path().join(LIST)).unwrap();
         list.write_all(b"end 20261123T154412Z-0000").unwrap();
         drop(list);

@@ -1,4 +1,4 @@
-//! Last will of a killed agent, which the next agent applies when it starts.
+//! Applies the last will of a killed agent when the next agent starts.
 use std::time::{Duration, Instant};
 
 use jtc_host::Session;
@@ -13,13 +13,13 @@ use crate::record::Notice;
 
 /// Time within which a connected controller sends a status.
 const REPORTS: Duration = Duration::from_secs(1);
-/// Longest wait for the confirmation of a Stop. After this time, the line still repeats the Stop.
+/// Longest wait until the controller confirms a Stop. After 1 s, the line continues to repeat the Stop.
 const TAKES: Duration = Duration::from_secs(1);
-/// Interval of checks.
+/// Interval at which a condition on the line is checked.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Applies the policy in the file to the motion that the controller executes. Returns a notice about the file and the result; `None` if no
-/// file exists.
+/// Applies the policy in the file of the last will to the motion that the controller executes. Returns a notice about the last will and
+/// the result; `None` if no file exists.
 pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     let (client, policy) = match found {
         Found::Nothing => {
@@ -41,16 +41,17 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
 }
 
-/// Reads `host_timeout_ms` from the controller, so that the line knows the value. A motion that a killed program has started may still be
-/// in progress. The line uses this timeout to refuse requests of other clients, because the controller would treat such requests as signs
-/// of life of the killed program (J-59). Has no effect if the controller does not have this setting or does not answer.
+/// Reads `host_timeout_ms` from the controller, so that the line knows this value. A motion that a killed program has started may still be
+/// in progress. The controller would treat requests of other clients as signs that the killed program still runs (J-59). The line
+/// therefore uses the timeout to refuse requests of other clients. Has no effect if the controller does not have the setting
+/// `host_timeout_ms` or does not answer.
 pub fn read_host_timeout(line: &Line) {
     let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
-    // The result is not used, because the line itself reads the value from the answer.
+    // The result is not used, because the line itself reads the setting in the controller's answer.
     let _ = Session::new(line.connect(introduction)).settings();
 }
 
-/// Waits for a condition on the line; returns `true` if it was met.
+/// Waits until a condition on the line is met; returns `true` if it was met within `time`.
 fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> bool {
     let end = Instant::now() + time;
     loop {
@@ -64,8 +65,8 @@ fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> boo
     }
 }
 
-/// Describes the result as a text. `reports` is true if statuses of the controller arrive. `taken` is true if the controller has confirmed
-/// the command.
+/// Returns a text about the result of applying the last will. `reports` is true if the controller sends statuses. `taken` is true if the
+/// controller has confirmed the command.
 fn in_words(applied: Applied, reports: bool, taken: bool) -> String {
     let sent = match applied {
         Applied::Rests => return "the arm no longer moves".into(),

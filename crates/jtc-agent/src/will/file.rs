@@ -1,4 +1,5 @@
-//! File of a last will. Each port has a separate file. Only the owner can read the file. The agent writes it completely or not at all.
+//! File that contains a last will. Each serial port has a separate file. Only the owner can read the file of a last will. The agent
+//! writes the file completely or not at all.
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -7,21 +8,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::line::{Moves, Policy, Will};
 
-/// Version of the file format.
+/// Version of the format of the file.
 const VERSION: u32 = 1;
-/// Upper limit of the file length, bytes. Valid files are always shorter.
+/// Upper limit of the file length, bytes. A valid file is always shorter than this limit.
 const LEN_MAX: u64 = 16 << 10;
-/// Longest displayed name, characters.
+/// Longest name that is displayed, in characters.
 const NAME_MAX: usize = 100;
 
-/// Contents of the file.
+/// Contents of the file of a last will.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
     version: u32,
-    /// Name of the port.
+    /// Name of the serial port.
     port: String,
-    /// Name of the client that users see.
+    /// Name of the client, which users see.
     pub client: String,
     /// Policy of the client.
     pub policy: Policy,
@@ -31,26 +32,26 @@ pub struct Stored {
     pub since_unix_s: f64,
 }
 
-/// State of the file when an agent starts.
+/// State of the file of a last will when an agent starts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
     /// No file exists, because the previous agent has ended properly or no motion was in progress.
     Nothing,
-    /// Will of an agent that was killed during a motion.
+    /// Last will of an agent that was killed during a motion.
     Left(Stored),
-    /// Invalid contents, with the reason. The policy is unknown.
+    /// The file has invalid contents; the text is the reason. If the file has invalid contents, the policy is unknown.
     Doubtful(String),
 }
 
-/// Returns the path of a port's file in this folder. The name of the port is used as the user has specified it. A name that identifies the
-/// adapter (by-id) never changes, but a device name may change.
+/// Returns the path of the last will of a serial port in the directory `folder`. The path contains the name of the port as the user has
+/// specified it. A port name that identifies the adapter (by-id) never changes, but a device name may change.
 pub(super) fn path(folder: &Path, port: &str) -> PathBuf {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'.' || byte == b'-';
     let escaped = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("_{byte:02x}") };
     folder.join(format!("moves-{}.json", port.bytes().map(escaped).collect::<String>()))
 }
 
-/// Reads the file at this path for this port.
+/// Reads the last will at this path for a serial port.
 pub(super) fn read(path: &Path, port: &str) -> Found {
     let metadata = match fs::symlink_metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Found::Nothing,
@@ -102,8 +103,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the complete file in one step. After this write, the file is valid even if the agent is killed. After the disk has stored the
-/// file, the file also survives a loss of power.
+/// Writes the complete file of the last will in one step. After the write, the file is valid even if the agent is killed. When the disk
+/// has stored the file, the file also survives a loss of power.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };
@@ -112,21 +113,21 @@ pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> 
     let mut file = begin(&part)?;
     let written = file.write_all(&text).and_then(|()| fs::rename(&part, path));
     if written.is_err() {
-        // An error here is ignored, because the first error is reported.
+        // An error of the removal is ignored, because the error of the write is reported.
         let _ = fs::remove_file(&part);
     }
     written?;
     file.sync_all()
 }
 
-/// Empties a file that can be neither replaced nor removed, so that its contents are invalid. Truncating a file is possible even on a full
-/// disk.
+/// Truncates a file that can be neither replaced nor removed, so that its contents are invalid. Truncating a file is possible even on a
+/// full disk.
 pub(super) fn spoil(path: &Path) {
-    // If truncating the file fails too, the error is ignored.
+    // If truncating the file also fails, the error is ignored.
     let _ = OpenOptions::new().write(true).truncate(true).open(path);
 }
 
-/// Removes the file.
+/// Removes the file of the last will.
 pub(super) fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -134,7 +135,7 @@ pub(super) fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Checks that files can be written to the folder; creates the folder if it is missing.
+/// Checks that files can be written to the folder of `path`; creates the folder if it is missing.
 pub(super) fn try_out(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         let mut builder = fs::DirBuilder::new();
@@ -152,7 +153,7 @@ fn part_of(path: &Path) -> PathBuf {
     path.with_extension("part")
 }
 
-/// Creates a file that only its owner can read, and replaces an incomplete file of a killed agent.
+/// Creates a file that only its owner can read. Replaces an incomplete file that a killed agent has left.
 fn begin(part: &Path) -> io::Result<File> {
     remove(part)?;
     let mut options = OpenOptions::new();
@@ -218,7 +219,7 @@ mod tests {
         doubtful("another port");
         write(&path, PORT, &will(Policy::Continue), 0.0).expect("there is room");
         let good = fs::read_to_string(&path).expect("text");
-        // A file that is truncated at any byte is reported as damaged and is never read as another policy.
+        // If the file is truncated at any byte, the agent reports it as damaged, and never reads another policy from it.
         for n in 0..good.len() {
             fs::write(&path, &good[..n]).expect("a file");
             doubtful("damaged");

@@ -1,4 +1,4 @@
-//! Keeper that writes and removes the file of a last will. The keeper updates the file as soon as the disk accepts a write.
+//! Keeper that writes and removes the file of a last will. The keeper updates the file as soon as the disk accepts the write.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,20 +10,21 @@ use super::file::{self, Found};
 use crate::line::{LineEvent, Will};
 use crate::record::{Notice, Notify};
 
-/// Time after which a failed write is repeated.
+/// Time after which the keeper repeats a failed write.
 const AGAIN: Duration = Duration::from_secs(5);
 /// Longest wait for the disk when the keeper ends.
 const LAST: Duration = Duration::from_secs(1);
 
-/// Intended contents of the file, with the start of the motion.
+/// Required contents of the file, and the start time of the motion.
 type Wanted = Option<(Will, f64)>;
 
 struct Slot {
     wanted: Wanted,
-    /// `true` until the will of the previous agent is applied. Until then, the file of the previous agent must be kept.
+    /// `true` until the agent has applied the last will of the previous agent. Before that, the keeper must not change the file of the
+    /// previous agent.
     held: bool,
     ended: bool,
-    /// `true` after the thread has ended.
+    /// `true` after the keeper's thread has ended.
     done: bool,
 }
 
@@ -38,7 +39,7 @@ impl Shared {
     }
 }
 
-/// Receiver that passes events of the serial line to the keeper. Never waits.
+/// Receiver that passes events of the serial line to the keeper. Never waits for the keeper.
 pub struct Witness(Arc<Shared>);
 
 impl Witness {
@@ -53,16 +54,16 @@ impl Witness {
     }
 }
 
-/// Keeper of a port's file. If the arm moves when the keeper is dropped, the file is not removed.
+/// Keeper of the last will of one serial port. If the arm moves when the keeper is dropped, the file of the last will is not removed.
 pub struct Keeper(Arc<Shared>);
 
 impl Keeper {
-    /// Starts the keeper of the file of `port` in `folder`. Also returns the present contents, which stay unchanged until
-    /// [`settle`](Self::settle) is called.
+    /// Starts the keeper of the last will of `port` in the directory `folder`. Also returns the present contents of the file. The
+    /// contents stay unchanged until [`settle`](Self::settle) is called.
     ///
     /// # Errors
     ///
-    /// The system cannot start threads.
+    /// The operating system cannot start threads.
     pub fn begin(folder: &Path, port: &str, notify: Notify) -> io::Result<(Self, Found)> {
         let path = file::path(folder, port);
         let found = file::read(&path, port);
@@ -85,8 +86,8 @@ impl Keeper {
         Witness(self.0.clone())
     }
 
-    /// Reports to the keeper that the will of the previous agent was applied. After this call, the keeper updates the file with each will
-    /// that the line reports. The present will is `will`. `since` is the start of a motion that still continues.
+    /// Informs the keeper that the last will of the previous agent was applied. After this call, the keeper updates the file with each
+    /// will that the line reports. `will` is the present last will. `since` is the start of a motion that still continues.
     pub fn settle(&self, will: Option<Will>, since: Option<f64>) {
         let mut slot = self.0.lock();
         slot.held = false;
@@ -100,7 +101,7 @@ impl Keeper {
         self.0.changed.notify_all();
     }
 
-    /// Reports to the keeper that the arm was at rest when the agent ended.
+    /// Informs the keeper that the arm was at rest when the agent ended.
     pub fn forget(&self) {
         self.0.lock().wanted = None;
         self.0.changed.notify_all();
@@ -128,12 +129,12 @@ fn now() -> f64 {
     host_kit::unix_time().as_secs_f64()
 }
 
-/// State of the writing thread.
+/// State of the thread that writes the file.
 struct Writer {
     shared: Arc<Shared>,
     path: PathBuf,
     port: String,
-    /// Present contents of the file; `None` if they are unknown.
+    /// Present contents of the file; `None` if the contents are unknown.
     there: Option<Wanted>,
     fails: bool,
     notify: Notify,
@@ -141,7 +142,7 @@ struct Writer {
 
 impl Writer {
     fn run(&mut self) {
-        // The folder is checked before the first motion, so that a write error is found early.
+        // The keeper checks the folder before the first motion, so that it finds a write error early.
         let tried = file::try_out(&self.path);
         self.report(tried);
         while let Some(wanted) = self.next() {
@@ -150,7 +151,8 @@ impl Writer {
                 None => file::remove(&self.path),
             };
             if done.is_err() {
-                // The contents of the file are outdated. If the next agent finds an invalid file, it stops the arm.
+                // The contents of the file are outdated, so the file is made invalid. If the next agent finds an invalid file, it stops
+                // the arm.
                 file::spoil(&self.path);
             }
             self.there = done.is_ok().then_some(wanted);
@@ -160,14 +162,14 @@ impl Writer {
         self.shared.changed.notify_all();
     }
 
-    /// Waits until the contents must change, and returns the new contents. Returns `None` when the keeper ends.
+    /// Waits until the contents of the file must change, and returns the new contents. Returns `None` when the keeper ends.
     fn next(&self) -> Option<Wanted> {
         let mut slot = self.shared.lock();
         let mut tried = self.fails.then(|| slot.wanted.clone());
         let end = Instant::now() + AGAIN;
         loop {
             let is_there = self.there.as_ref() == Some(&slot.wanted);
-            // A failed write is repeated after an interval, or at once if the contents have changed.
+            // The keeper repeats a failed write after an interval, or at once if the required contents have changed.
             if !slot.held && !is_there && tried.as_ref() != Some(&slot.wanted) {
                 return Some(slot.wanted.clone());
             }
@@ -186,7 +188,7 @@ impl Writer {
         }
     }
 
-    /// Reports the first write error, and the first success after it.
+    /// Reports the first write error, and the first successful write after it.
     fn report(&mut self, done: io::Result<()>) {
         let path = self.path.display().to_string();
         match &done {
@@ -256,7 +258,7 @@ mod tests {
         drop(keeper);
         let (keeper, found, _notices) = begin(dir.path());
         let Found::Left(stored) = &found else { panic!("{found:?}") };
-        // The file and its time stay unchanged until the will is applied, even if the agent ends before that.
+        // The file and its time stay unchanged until the last will is applied, even if the agent ends earlier.
         drop(keeper);
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());
@@ -306,7 +308,7 @@ mod tests {
         keeper.settle(None, None);
         keeper.witness().see(&moves(Policy::Continue));
         until(dir.path(), "continue", left(Policy::Continue));
-        // No file can be created at this path after this call. The directory simulates a full disk.
+        // After this call, no file can be created at this path. The directory at this path simulates a full disk.
         let part = file::path(dir.path(), PORT).with_extension("part");
         std::fs::create_dir(&part).expect("a folder");
         keeper.witness().see(&moves(Policy::Stop));

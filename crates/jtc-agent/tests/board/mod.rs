@@ -1,4 +1,4 @@
-//! Simulates the controller at a serial line, bit by bit in virtual time. The simulation and the tested code share only the parser of
+//! Simulated controller at a serial line, bit by bit in virtual time. The simulation and the tested code share only the parser of
 //! `jtc-wire`.
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,39 +7,40 @@ use jtc_agent::line::{ClientId, Delivery};
 use jtc_agent::{Introduction, Policy, Role, SharedLine};
 use jtc_wire::{DataStatus, FRAME_MAX, FrameType, LinkEvent, Receiver, Response, Status};
 
-/// Step of the virtual time, µs; a byte at 115,200 Bd takes 86.8 µs.
+/// Step of the virtual time, µs; at 115,200 Bd, one byte takes 86.8 µs.
 const STEP_US: u64 = 20;
-/// Longest interval between two calls of the owner of the line, µs.
+/// Longest interval between two calls of the line's owner, µs.
 const TURN_US: u64 = 2000;
 /// Interval between two statuses, µs.
 const REPORT_US: u64 = 15_500;
 
-/// Line and board.
+/// Serial line with the simulated controller board.
 pub(crate) struct Board {
     pub line: SharedLine,
     baud: f64,
     now_us: u64,
-    /// Bytes that the operating system has accepted. The next field is the time at which the first of these bytes has been sent.
+    /// Bytes that the operating system has accepted. `byte_over_us` is the time at which the first queued byte has been sent.
     queue: VecDeque<u8>,
     byte_over_us: f64,
-    /// Largest number of queued bytes so far.
+    /// Largest number of bytes that were queued in the operating system so far.
     pub queued_most: usize,
-    /// Delay before the operating system accepts the bytes of each write, µs. The next field contains the bytes of the present write and
+    /// Delay before the operating system accepts the bytes of each write, µs. `handed_over` contains the bytes of the present write, and
     /// the time at which the operating system accepts them.
     pub held_up_us: VecDeque<u64>,
     handed_over: Option<(u64, Vec<u8>)>,
     receiver: Receiver<Vec<u8>>,
     records: VecDeque<Response>,
-    /// Frames that arrived at the board, with their time, type (`None` for an invalid frame) and first bytes.
+    /// Frames that arrived at the board. Each entry contains the time, the type (`None` for an invalid frame) and the first bytes of the
+    /// frame.
     pub frames: Vec<(Duration, Option<FrameType>, Vec<u8>)>,
-    /// Bytes of each write to the operating system, with the time.
+    /// Time and bytes of each write to the operating system.
     pub written: Vec<(Duration, Vec<u8>)>,
     pub status: Status,
     /// Number of bytes that will arrive damaged, beginning with the next byte.
     pub damaged: usize,
-    /// Time before which no status is sent.
+    /// Time until which the board sends no status.
     pub deaf_until: Duration,
-    /// Type of frame that the board refuses.
+    /// Type of the frames that the board refuses.
     pub refuses: Option<FrameType>,
 }
 
@@ -141,7 +142,7 @@ impl Board {
         self.frames.iter().filter(|(_, t, _)| *t == Some(frame_type)).count()
     }
 
-    /// Returns the records that a client has received, and the reasons for its refused requests.
+    /// Returns the response records that a client has received, and the reasons for its refused requests.
     pub(crate) fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
         let (mut records, mut denied) = (Vec::new(), Vec::new());
         for delivery in self.line.take_deliveries(client).expect("it is there") {

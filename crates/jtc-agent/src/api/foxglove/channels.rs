@@ -1,11 +1,11 @@
-//! Channels, and the subscriptions of a client.
+//! Channels of the Foxglove protocol, and the subscriptions of a client.
 use std::collections::BTreeMap;
 
 use jtc_host::recording::Topic;
 
 use super::protocol::{Channel, Service, Shape, Subscription};
 
-/// Number of the channel that carries the status as text. All other channels transmit numeric values.
+/// Number of the channel that contains the status as text. All other channels contain numeric values.
 pub(super) const STATUS: u32 = Topic::ALL.len() as u32 + 1;
 const STATUS_SCHEMA: &str = r#"{
   "type": "object",
@@ -23,16 +23,16 @@ const STATUS_SCHEMA: &str = r#"{
   }
 }"#;
 
-/// Numbers of the services.
+/// Numbers of the services that a client can call.
 pub(super) const STOP: u32 = 1;
 pub(super) const PAUSE: u32 = 2;
 
-/// Returns the topic of a channel; `None` for the text channel and for unknown channels.
+/// Returns the topic of a channel; `None` for the text channel and for an unknown channel.
 pub(super) fn topic(channel: u32) -> Option<Topic> {
     Topic::ALL.get((channel as usize).checked_sub(1)?).copied()
 }
 
-/// Returns all channels.
+/// Returns all channels that the agent offers.
 pub(super) fn channels() -> Vec<Channel<'static>> {
     let numbered = (1..).zip(Topic::ALL).map(|(id, topic)| {
         let (schema_name, schema) = topic.schema();
@@ -49,7 +49,7 @@ pub(super) fn channels() -> Vec<Channel<'static>> {
     numbered.chain([status]).collect()
 }
 
-/// Returns the services Stop and Pause.
+/// Returns the services that a client can call: Stop and Pause.
 pub(super) fn services() -> Vec<Service<'static>> {
     let shape =
         |schema_name, schema| Shape { encoding: "json", schema_name, schema_encoding: "jsonschema", schema };
@@ -66,7 +66,7 @@ pub(super) fn services() -> Vec<Service<'static>> {
     vec![service(STOP, "stop"), service(PAUSE, "pause")]
 }
 
-/// Subscription, with its channel and `true` if constant data must still be sent.
+/// Channel of a subscription, and `true` if the constant data of this channel must still be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Subscribed {
     channel: u32,
@@ -78,7 +78,7 @@ struct Subscribed {
 pub(super) struct Subscriptions(BTreeMap<u32, Subscribed>);
 
 impl Subscriptions {
-    /// Adds a subscription. The error is a message for the user.
+    /// Adds a subscription of the client. The error is a message for the user.
     pub(super) fn add(
         &mut self,
         Subscription { id, channel_id: channel }: &Subscription,
@@ -99,12 +99,12 @@ impl Subscriptions {
         Ok(())
     }
 
-    /// Removes a subscription.
+    /// Removes a subscription of the client.
     pub(super) fn remove(&mut self, id: u32) {
         self.0.remove(&id);
     }
 
-    /// Returns the subscriptions of constant data for which the data was not sent yet.
+    /// Returns the subscriptions of constant data that still wait for their data.
     pub(super) fn take_latched(&mut self) -> Vec<u32> {
         let due = |(id, subscribed): (&u32, &mut Subscribed)| {
             std::mem::take(&mut subscribed.latched).then_some(*id)
@@ -112,7 +112,7 @@ impl Subscriptions {
         self.0.iter_mut().filter_map(due).collect()
     }
 
-    /// Returns the subscription and channel numbers of all subscriptions to changing data.
+    /// Returns the subscription number and the channel number of each subscription to changing data.
     pub(super) fn live(&self) -> Vec<(u32, u32)> {
         let live =
             self.0.iter().filter(|(_, subscribed)| topic(subscribed.channel) != Some(Topic::Description));

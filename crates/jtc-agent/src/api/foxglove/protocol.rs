@@ -1,15 +1,15 @@
-//! Messages of the Foxglove WebSocket protocol, version 1. Text messages are JSON objects with the key `op`; the first
-//! byte of a binary message is its type. Numbers are little-endian.
+//! Messages of the Foxglove WebSocket protocol, version 1. A text message is a JSON object with the key `op`. The
+//! first byte of a binary message is its type. Numbers in binary messages are little-endian.
 use std::collections::BTreeMap;
 
-/// Names of the protocol in the handshake; both are accepted.
+/// Names of the protocol that the agent accepts in the handshake.
 pub(super) const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
-/// Text messages to a client.
+/// Text messages of the agent to a client.
 #[derive(serde::Serialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub(super) enum ToClient<'a> {
-    /// First message.
+    /// First message to each client.
     ServerInfo {
         name: &'a str,
         capabilities: &'a [&'a str],
@@ -17,19 +17,19 @@ pub(super) enum ToClient<'a> {
         metadata: BTreeMap<&'a str, String>,
         session_id: &'a str,
     },
-    /// Message for the user; level 0: information, 1: warning, 2: error.
+    /// Message for the user. Level 0 is information, level 1 a warning, level 2 an error.
     Status { level: u8, message: String },
     /// Channels that a client can subscribe to.
     Advertise { channels: Vec<Channel<'a>> },
     /// Services that a client can call.
     AdvertiseServices { services: Vec<Service<'a>> },
-    /// Failed call of a service.
+    /// Failed call of a service, with the reason.
     ServiceCallFailure { service_id: u32, call_id: u32, message: String },
 }
 
 impl ToClient<'_> {
     pub(super) fn text(&self) -> String {
-        // The message contains only strings and numbers, so this cannot fail.
+        // The message contains only strings and numbers, so the conversion to JSON cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
@@ -55,7 +55,7 @@ pub(super) struct Service<'a> {
     pub response: Shape<'a>,
 }
 
-/// Format of a request or a response of a service.
+/// Format of the request or of the response of a service.
 #[derive(serde::Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Shape<'a> {
@@ -65,7 +65,7 @@ pub(super) struct Shape<'a> {
     pub schema: &'a str,
 }
 
-/// Text messages of a client.
+/// Text messages of a client to the agent.
 #[derive(serde::Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub(super) enum FromClient {
@@ -75,7 +75,7 @@ pub(super) enum FromClient {
     Unsubscribe {
         subscription_ids: Vec<u32>,
     },
-    /// Message about a capability that the server has not announced.
+    /// Message about a function of the protocol that the server has not announced.
     #[serde(other)]
     Other,
 }
@@ -97,7 +97,7 @@ pub(super) fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> 
     bytes
 }
 
-/// Call of a service.
+/// Call of a service by a client.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Call<'a> {
     pub service: u32,
@@ -116,7 +116,7 @@ impl<'a> Call<'a> {
         Some(Self { service, call, encoding })
     }
 
-    /// Returns the response message, in the encoding of the call.
+    /// Returns the response message to the call, in the encoding of the call.
     pub(super) fn answer(&self, payload: &[u8]) -> Vec<u8> {
         let mut bytes = vec![3];
         bytes.extend(self.service.to_le_bytes());
@@ -137,7 +137,7 @@ fn number(bytes: &[u8]) -> Option<(u32, &[u8])> {
 mod tests {
     use super::*;
 
-    /// Expected bytes computed by hand from the tables of the protocol's specification.
+    /// The expected bytes were computed by hand from the tables in the specification of the protocol.
     #[test]
     fn binary_messages_have_the_bytes_of_the_specification() {
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Tests with a slow, small or full disk.
+//! Tests of recordings on a slow, small or full disk.
 use std::sync::Mutex;
 use std::sync::mpsc::channel;
 
@@ -21,7 +21,7 @@ fn finished() -> Ending {
     Ending { outcome: "finished".into(), ..Ending::default() }
 }
 
-/// Returns a writer, and the receiver of its notices.
+/// Returns a writer of recordings, and the receiver of its notices.
 fn writer(retention: Retention) -> (Writer, Receiver<Notice>) {
     let (notices, reported) = channel();
     let notify = Box::new(move |notice| notices.send(notice).expect("it is awaited"));
@@ -35,7 +35,8 @@ fn files(dir: &tempfile::TempDir) -> Vec<PathBuf> {
     all
 }
 
-/// A blocked disk does not delay other threads, and lost samples are counted. The queue always has a free entry for the end of a recording.
+/// If the disk is blocked, it does not delay other threads, and the writer counts the lost samples. The queue always has a free entry for
+/// the end of a recording.
 #[test]
 fn what_finds_no_room_is_counted() {
     let (mut disk, messages) = Disk::new();
@@ -52,8 +53,7 @@ fn what_finds_no_room_is_counted() {
     assert_eq!(*lost, 100_005 - samples as u64);
 }
 
-/// All files together stay within the limit. A long motion continues in the next file, and no sample is missing or
-/// duplicated.
+/// All recording files together stay within the limit. A long motion continues in the next file. No sample is missing or duplicated.
 #[test]
 fn recordings_stay_within_their_limit() {
     const LIMIT: u64 = 400_000;
@@ -88,7 +88,7 @@ fn recordings_stay_within_their_limit() {
     assert!(warned.len() == 1 && warned[0].contains("3 samples are missing"), "{warned:?}");
 }
 
-/// A full disk is reported once. When there is space again, recording continues, even in the middle of a motion.
+/// A full disk is reported once. When the disk has space again, recording continues, even in the middle of a motion.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_reported_once_and_recording_goes_on() {

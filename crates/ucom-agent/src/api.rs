@@ -1,4 +1,4 @@
-//! API of the agent: HTTP requests and a stream of events.
+//! API of the agent: HTTP requests, and a stream of events.
 mod boards;
 mod commands;
 mod events;
@@ -39,9 +39,9 @@ use objects::{LeaseObject, StatusObject};
 
 /// Maximum length of a request body, in bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Maximum length of a request body with images, in bytes: 1 MiB for each image, as text.
+/// Maximum length of a request body with firmware images, in bytes. The length is enough for 1 MiB per image, as text.
 const IMAGES_MAX: usize = 6 << 20;
-/// Maximum number of requests with images that are read at the same time.
+/// Maximum number of requests with firmware images that the agent reads at the same time.
 const UPDATES_READ: usize = 2;
 /// Maximum duration of a request.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
@@ -51,22 +51,22 @@ const REQUEST_TIME: Duration = Duration::from_secs(10);
 pub struct Agent {
     shared: Arc<Shared>,
     gate: Gate,
-    /// Number that identifies this run of the agent; clients can compare it.
+    /// Number that identifies this run of the agent; clients compare it to detect a restart.
     id: Arc<str>,
     bus: Arc<str>,
     simulated: bool,
     sockets: Sockets,
     events: Arc<Events>,
-    /// Semaphore that limits the number of requests with images at the same time.
+    /// Semaphore that limits how many requests with firmware images the agent reads at the same time.
     images: Arc<Semaphore>,
 }
 
 impl Agent {
-    /// Creates the agent of a bus. `bus` is the display name of the bus.
+    /// Creates the agent of one bus. `bus` is the name of the bus that users see.
     ///
     /// # Errors
     ///
-    /// The system has no random numbers.
+    /// The operating system provides no random numbers.
     pub fn new(
         owner: &Owner,
         access: Access,
@@ -96,7 +96,7 @@ impl Agent {
         })
     }
 
-    /// Returns the router with all requests.
+    /// Returns the router for all HTTP requests.
     pub fn router(self) -> Router {
         let (router, description) = described().split_for_parts();
         router
@@ -182,7 +182,7 @@ fn described() -> OpenApiRouter<Agent> {
     others.merge(images)
 }
 
-/// Error responses that a command can receive, in addition to the error responses of every request.
+/// Error responses of commands, in addition to the error responses that every request can receive.
 struct Denials;
 
 impl IntoResponses for Denials {
@@ -234,7 +234,7 @@ struct SentObject {
     )
 )]
 async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
-    // The identity of the client matters only for later requests of this client.
+    // The identity of the client affects only the later requests of this client.
     let client = match asker.caller.role {
         Role::Operator => agent.client(&asker).ok(),
         Role::Viewer => None,
@@ -244,7 +244,8 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
     let facts = json!({ "command": "stop", "from": asker.caller.peer.to_string(), "by": by, "lost": lost });
     match client {
         Some(_) => agent.gate.note("halt", facts),
-        // A client without a lease can send such requests without limit.
+        // A client without a lease can send any number of Stops, so the log contains only the first of them in full
+        // and counts the others.
         None => agent.gate.note_repeated("halt", asker.caller.peer, facts),
     }
     if let Some(lost) = lost {

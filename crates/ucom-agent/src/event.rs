@@ -1,4 +1,4 @@
-//! Events of a chain and its jobs.
+//! Events of a chain of boards and of its jobs.
 use agent_kit::api::Problem;
 use utoipa::ToSchema;
 
@@ -132,7 +132,8 @@ pub enum ChainEvent {
 }
 
 impl ChainEvent {
-    /// Returns the name of the event in the log of commands, which contains lease changes, Stops and their results.
+    /// Returns the name of the event in the command log. The command log contains lease changes, Stops and their
+    /// results.
     pub(crate) fn logged(&self) -> Option<&'static str> {
         match self {
             Self::Lease { .. } => Some("lease"),
@@ -157,5 +158,5 @@ impl agent_kit::journal::JournalEvent for ChainEvent {
     }
 }
 
-/// Numbered events of a chain.
+/// Numbered events of a chain of boards.
 pub(crate) type Journal = agent_kit::journal::Journal<ChainEvent>;

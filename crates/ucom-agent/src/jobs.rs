@@ -1,4 +1,4 @@
-//! Jobs: requests that take longer than one HTTP request, with their stages and results.
+//! Jobs: requests that take longer than one HTTP request. Each job has a stage and a result.
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -8,21 +8,21 @@ use ucom::Admin;
 use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{BoardSeen, LoadForecast};
 
-/// Maximum number of stored jobs.
+/// Maximum number of jobs that the agent stores.
 const KEPT: usize = 256;
 
-/// Stage of a job.
+/// Stage of a job: running, or the outcome after its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
     Running,
     Finished,
-    /// Cancelled by a client, or by a Stop.
+    /// A client or a Stop cancelled the job.
     Cancelled,
     Failed,
 }
 
 impl Stage {
-    /// Returns the name of the stage.
+    /// Returns the name of the job's stage.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -38,9 +38,9 @@ impl Stage {
 pub(crate) enum Done {
     /// Boards of the chain, and notes about unusual observations.
     Chain(Vec<BoardSeen>, Vec<String>),
-    /// Findings of a doctor.
+    /// Findings of a doctor job.
     Findings(Vec<Finding>),
-    /// Result of an update for each board.
+    /// Result of a firmware update for each board.
     Update(UpdateReport),
     /// Running boards with their flags, and the predicted bus load.
     Running(Vec<(u8, Admin)>, LoadForecast),

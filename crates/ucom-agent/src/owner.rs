@@ -1,4 +1,4 @@
-//! Owner of a bus: a single thread that runs a session on the bus for all clients.
+//! Owner of a bus: the single thread that runs a session on the bus for all clients.
 mod ask;
 mod operator;
 mod shared;
@@ -18,18 +18,20 @@ pub(crate) use host_kit::owner::Kind;
 pub(crate) use shared::Shared;
 pub(crate) use worker::Worker;
 
-/// Configuration of the boards that is known before the bus is opened.
+/// Configuration for the boards, which must be known before the bus is opened.
 #[derive(Clone, Debug, Default)]
 pub struct Config {
-    /// Protocol profile of these boards.
+    /// Protocol profile of the boards.
     pub profile: Profile,
-    /// Signal table: the meaning of the words of these boards.
+    /// Signal table, which describes the words of the boards.
     pub signals: SignalTable,
-    /// Cache for the signal names.
+    /// Cache for the signal names of the boards.
     pub cache: Cache,
-    /// List of the clean-up steps that would be missing if the process ended now. The code that ends the process prints this list.
+    /// List of the clean-up steps that would be missing if the process ended now. The code that ends the process prints the list
+    /// of missing clean-up steps.
     pub cleanup: CleanupList,
-    /// Inventory file that records the images written by updates. If `None`, the agent keeps these records only while it runs.
+    /// Inventory file that contains records of the images that updates wrote. If `None`, the agent keeps records of written images
+    /// only while it runs.
     pub inventory: Option<PathBuf>,
 }
 
@@ -40,13 +42,13 @@ pub struct Owner {
 }
 
 impl Owner {
-    /// Opens the bus of this URL. Scans for boards, unless another PC is the master of the bus.
+    /// Opens the bus at this URL. Scans the bus for boards, unless another PC is the master of the bus.
     ///
     /// # Errors
     ///
     /// The URL is invalid, or the bus cannot be opened.
     pub fn open(url: &str, config: Config) -> Result<Self, SessionError> {
-        // The thread sends heartbeats and Stops, so it must not wait for the disk.
+        // The owner's thread sends heartbeats and Stops, so it must not wait for the disk.
         let config = Config { cache: config.cache.in_memory(), ..config };
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         let link = Link::on(Box::new(Prompt(bus)), url);
@@ -56,13 +58,13 @@ impl Owner {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Returns a function that returns the reason why the bus was lost; `None` if the bus was not lost.
+    /// Returns a function that reports why the bus was lost. The returned function returns `None` while the bus is available.
     pub fn lost(&self) -> impl Fn() -> Option<String> + Send + use<> {
         let shared = self.shared.clone();
         move || shared.lost()
     }
 
-    /// Stops the running boards and releases the bus.
+    /// Stops the boards that this agent has started, and releases the bus.
     pub fn end(mut self) {
         self.join();
     }
@@ -70,7 +72,7 @@ impl Owner {
     fn join(&mut self) {
         self.shared.end();
         if let Some(thread) = self.thread.take() {
-            // A panic of that thread was already printed.
+            // If the owner's thread has panicked, the panic was already printed.
             drop(thread.join());
         }
     }
@@ -82,7 +84,7 @@ impl Drop for Owner {
     }
 }
 
-/// Guard that marks the bus as lost when it is dropped, even after a panic of the thread.
+/// Guard that marks the bus as lost when the guard is dropped, even after a panic of the thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {

@@ -12,31 +12,32 @@ use ucom_host::session::Known;
 /// Last known values of a board.
 #[derive(Clone)]
 pub(crate) struct Values {
-    /// Names, types, scales and units.
+    /// Names, types, scales and units of the values.
     pub known: Arc<Known>,
-    /// Last received outputs.
+    /// Outputs that the board sent last.
     pub outputs: Option<Snapshot>,
-    /// Inputs that were last set or read.
+    /// Inputs of the board that were last set or read.
     pub inputs: Vec<Option<u16>>,
-    /// Parameters that this agent wrote last.
+    /// Parameters of the board that this agent wrote last.
     pub parameters: Vec<ParValue>,
 }
 
 /// State of the bus and the boards at one time.
 #[derive(Clone)]
 pub(crate) struct BusSnapshot {
-    /// Time of the snapshot in the clock of the session, in µs. The next field is the time in the clock of the agent.
+    /// Time of the snapshot by the clock of the bus session, in µs. `at` is the time of the snapshot by the clock of
+    /// the agent.
     pub now_us: u64,
     pub at: Instant,
     pub profile: Profile,
     pub boards: Boards,
     pub statistics: Statistics,
     pub controller: Option<Controller>,
-    /// `true` if the agent sends heartbeats.
+    /// `true` if the agent is the master of the bus and sends heartbeats.
     pub is_master: bool,
     /// Time of the last frame from another PC, in µs.
     pub competing_us: Option<u64>,
-    /// Texts about board numbers that two boards share.
+    /// Messages about board numbers that two boards share.
     pub shared: Vec<String>,
     pub values: BTreeMap<u8, Values>,
 }
@@ -57,7 +58,7 @@ impl BusSnapshot {
         }
     }
 
-    /// Returns the current time of the session, in µs.
+    /// Returns the current time of the bus session, in µs.
     pub(crate) fn clock_us(&self) -> u64 {
         self.now_us + self.at.elapsed().as_micros() as u64
     }

@@ -1,4 +1,4 @@
-//! Tests with a client that uses only HTTP: numbers, boards, values, control loops, inputs, events, and a Stop.
+//! Tests with a client that uses only HTTP. The tests cover numbers, boards, values, control loops, inputs, events, and a Stop.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -40,7 +40,7 @@ fn d24_a_chain_is_scanned_numbered_and_listed() {
         .collect();
     let places = config.boards.iter().zip(1..).map(|(board, place)| (place, u64::from(board.flash_id)));
     assert_eq!(found, places.collect::<Vec<_>>(), "{boards}");
-    // If the chain differs from the expected chain, the job fails. The error lists the boards on the bus.
+    // If the chain differs from the expected chain, the job fails. The error of the job lists the boards on the bus.
     let expected = json!({ "expected": [{ "board": 1, "flash_number": 9 }] });
     let job = served.job("POST /api/init", &key, Some(expected));
     assert_eq!(
@@ -60,7 +60,8 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("start")), "{error}");
     let (status, started) = served.api("POST /api/boards/1/start", Some(&key), None);
     assert_eq!((status, started["state"].as_str()), (200, Some("started")), "{started}");
-    // A value that was neither set nor read is unknown. Otherwise a client that reads all values and writes them back would write zeros.
+    // A value that was neither set nor read is unknown. If such values were 0, a client that reads all values and writes them back would
+    // write zeros.
     let known = |of: &Value| {
         of["inputs"]
             .as_array()
@@ -76,7 +77,8 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     let (_, values) = served.api("GET /api/boards/1/values", None, None);
     assert_eq!(known(&values).iter().filter(|known| **known).count(), 1, "{values}");
     assert_eq!(value(&values, "inputs", "set_position")["value"], 7.0, "{values}");
-    // Each board runs once, even if the request lists it several times. The inputs of the board are read when it is started.
+    // Each board runs once, even if the request lists the board several times. The agent reads the inputs of a board when the board is
+    // started.
     let (mut peer, boards) = (served.chain.peer(), [vec![1; 200], vec![2]].concat());
     let job = served.job("POST /api/run", &key, Some(json!({ "boards": boards, "active": true })));
     assert_eq!(job["stage"], "finished", "{job}");
@@ -97,7 +99,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     let offers: Vec<&str> =
         board["offers"]["inputs"].as_array().expect("names").iter().filter_map(Value::as_str).collect();
     assert!(offers.iter().any(|name| name.starts_with("set_position")), "{offers:?}");
-    // Setting an input by its name moves the axis. Without the signal table, values are raw words.
+    // A client moves the axis by setting an input by its name. Without the signal table, the values are raw words.
     let set = |value: Value| {
         let request = "PUT /api/boards/1/inputs/set_position";
         served.api(request, Some(&key), Some(json!({ "value": value })))
@@ -115,7 +117,8 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         }
         patience.pause(format_args!("the position 1500: {values}"));
     }
-    // A text that contains a raw word is also valid. An invalid name or value is refused with an explanation, and changes nothing.
+    // A text that contains a raw word is also a valid value. The agent refuses an invalid name or value with an explanation, and changes
+    // nothing.
     assert_eq!(set(json!("0x05DC")).1["value"], 1500.0);
     for (name, given, status, part) in [
         ("set_positon", json!(1), 422, "set_position"),
@@ -134,14 +137,14 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         board["offers"]["parameters"][0].as_str().expect("a name").split(' ').next().unwrap_or_default();
     let (status, sent) = served.api(&format!("PUT /api/boards/1/parameters/{name}"), Some(&key), body);
     assert_eq!((status, sent["value"].as_f64()), (200, Some(120.0)), "{sent}");
-    // The outputs are turned off and one board is stopped; the other board still runs.
+    // The test turns the outputs off and stops one board; the other board still runs.
     let off = served.api("PUT /api/boards/1/outputs", Some(&key), Some(json!({ "active": false })));
     assert_eq!(off.0, 204, "{}", off.1);
     served.board_when(1, "inactive", |board| board["active"] == false);
     let (status, stopped) = served.api("POST /api/boards/1/stop", Some(&key), None);
     assert_eq!((status, stopped["state"].as_str()), (200, Some("exloader")), "{stopped}");
     assert_eq!(served.board(2)["state"], "running");
-    // After a reset the board has no number.
+    // After a reset, the board has no number.
     let (status, reset) = served.api("POST /api/boards/1/reset", Some(&key), None);
     assert_eq!((status, reset["reports"].as_array().map(Vec::len)), (200, Some(1)), "{reset}");
     let (status, error) = served.api("POST /api/boards/1/start", Some(&key), None);
@@ -160,7 +163,8 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let http = served.clone();
         move || http.get("POST /api/stop").0
     });
-    // The frame is MCA_ADMIN_DATA to all boards with all flags 0. The frame is sent three times, because one frame can be lost.
+    // The expected frame is MCA_ADMIN_DATA to all boards with all flags 0. The agent sends the frame of a Stop three times, because one
+    // frame can be lost.
     for _ in 0..3 {
         frame(&mut *peer, 0x600, &[0, 0, 0, 0]);
     }
@@ -173,19 +177,19 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let board = served.board_when(number, "stopped", |board| board["state"] == "exloader");
         assert_eq!(board["active"], false, "{board}");
     }
-    // After another client's Stop, motion requests are refused for a while and then accepted again.
+    // After another client's Stop, the agent refuses motion requests during the hold-off and accepts them later.
     let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     std::thread::sleep(Duration::from_millis(3100));
     served.run(&key, &[1]);
-    // A Stop with the key of the client itself does not cause this hold-off.
+    // A Stop with the client's own key does not cause a hold-off for this client.
     assert_eq!(served.api("POST /api/stop", Some(&key), None).0, 200);
     served.board_when(1, "stopped", |board| board["state"] == "exloader");
     served.run(&key, &[1]);
     text_with(&served.log, &["\"halt\"", "\"command\":\"run\"", "\"joined\""]);
 }
 
-/// A Stop ends a job in progress before the job moves anything.
+/// A Stop ends a job that is in progress before the job moves a board.
 #[test]
 fn a_run_that_is_stopped_while_it_begins_does_not_begin() {
     let (served, key) = Served::numbered(2);
@@ -201,7 +205,8 @@ fn a_run_that_is_stopped_while_it_begins_does_not_begin() {
     }
 }
 
-/// D-51: a board is reported as late after 1.5 s without a heartbeat, as lost after 3 s, and as back with the next heartbeat.
+/// D-51: the agent reports a board as late after 1.5 s without a heartbeat, and as lost after 3 s. D-51: the agent reports a lost board
+/// as back with its next heartbeat.
 #[test]
 fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
     let (served, key) = Served::numbered(2);
@@ -226,12 +231,13 @@ fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
             assert_eq!(served.board(1)["heartbeat"], "alive");
         }
     }
-    // The last heartbeat came up to one second before the fault.
+    // The board sent its last heartbeat up to one second before the fault.
     assert!((0.4..1.7).contains(&at[0]) && (1.9..3.2).contains(&at[1]), "{at:?}");
     assert!((1.4..1.6).contains(&(at[1] - at[0])) && at[2] < 6.7, "{at:?}");
 }
 
-/// D-37, D-50: if a board leaves its control loop without a command, the agent reports an event, and the values of the board are stale.
+/// D-37, D-50: if a board leaves its control loop without a command, the agent reports an event, and the values of the board are
+/// outdated.
 #[test]
 fn d50_a_board_that_misses_its_pc_is_an_event_and_its_values_are_stale() {
     let (served, key) = Served::numbered(1);
@@ -253,8 +259,8 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     let (_, status) = other.api("GET /api/status", None, None);
     assert_eq!(status["competing_master"], true, "{status}");
     let theirs = other.lease("bob", 60.0, "stop");
-    // The status reports the other master while it is present, not only when its first frame arrives. During this
-    // time a doctor sends no queries.
+    // The status reports the other master as long as it is present, not only when its first frame arrives. While the other master is
+    // present, a doctor job sends no queries.
     for _ in 0..40 {
         std::thread::sleep(Duration::from_millis(100));
         let (_, status) = other.api("GET /api/status", None, None);
@@ -271,10 +277,11 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     assert_eq!(job["stage"], "failed", "{job}");
     assert!(job["error"]["message"].as_str().is_some_and(|m| m.contains("PC")), "{job}");
     other.end();
-    // A bus without another master is not affected. The lease is taken here, because the steps above take long on a busy computer.
+    // A bus without another master works normally. The test takes the lease only now, because the steps above take long on a busy
+    // computer.
     let (served, key) = Served::numbered(2);
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
-    // The agent also sends no queries for a viewer.
+    // If another master is present, the agent also sends no queries for a viewer.
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     served.chain.fault("foreign-master");
     std::thread::sleep(Duration::from_millis(1000));
@@ -317,13 +324,13 @@ fn the_lease_is_asked_for_given_and_its_policy_stops_what_runs() {
     assert_eq!(served.api("POST /api/boards/1/start", Some(&bob), None).0, 409);
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     assert_eq!(served.api("GET /api/status", None, None).1["lease"]["holder"], "bob");
-    // By default, the boards of a client are stopped after the client disconnects.
+    // By default, the agent stops the boards of a client after the client has disconnected.
     served.run(&bob, &[1]);
     let last = served.last_event();
     let (number, halt) = served.event(last, "halt", |event| event["kind"] == "halt");
     assert!(halt["by"].as_str().is_some_and(|by| by.contains("bob")), "{halt}");
     served.event(number, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1]));
-    // With the policy `continue`, the boards continue to run.
+    // With the policy `continue`, the boards of the client continue to run.
     let carl = served.lease("carl", 1.0, "continue");
     std::thread::sleep(Duration::from_millis(3100));
     let carl = match served.api("PUT /api/lease", Some(&carl), None).1["held"].as_bool() {
@@ -360,7 +367,7 @@ fn a_stream_has_bus_boards_values_and_events_as_they_come() {
     assert!(last > 3, "{kinds:?}");
 }
 
-/// D-01: board numbers are 0 to 31. Other numbers are refused before any frame is sent, and the agent continues to work.
+/// D-01: board numbers are 0 to 31. The agent refuses board numbers above 31 before it sends any frame, and continues to work.
 #[test]
 fn d01_numbers_that_no_board_can_have_are_refused() {
     let (served, key) = Served::numbered(1);
@@ -391,8 +398,8 @@ fn a_bus_that_is_gone_is_named() {
     served.event(0, "lost", |event| event["kind"] == "lost");
 }
 
-/// D-08, D-50: the agent sends heartbeats only for its own commands. If another PC is lost, the agent does not send
-/// heartbeats to keep the boards of that PC running.
+/// D-08, D-50: the agent sends heartbeats only for its own commands. If another PC is lost, the agent does not send heartbeats for the
+/// boards that the other PC has started.
 #[test]
 fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none() {
     let (served, key) = Served::numbered(1);
@@ -412,7 +419,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
     };
     stop();
     is_master(false);
-    // Another PC is the master now. The agent does not become the master, neither by a Stop nor by a lease without commands.
+    // Another PC is now the master of the bus. The agent does not become the master by a Stop, nor by a lease without commands.
     served.chain.fault("foreign-master");
     std::thread::sleep(Duration::from_millis(1500));
     for lease in [false, true] {
@@ -421,7 +428,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
         }
         stop();
         is_master(false);
-        // The lease of this test must not lapse in the meantime.
+        // The lease of this test must not lapse before the check.
         assert_eq!(status()["lease"].is_null(), !lease, "{}", status());
         let beat = |frame: &can_link::CanFrame| frame.id().value() == 0x680 && frame.data().is_empty();
         let (mut peer, begun, mut beats) = (served.chain.peer(), Instant::now(), 0);
@@ -433,7 +440,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
     }
 }
 
-/// If a disk does not respond, this does not delay a Stop, heartbeat or query.
+/// A disk that does not respond does not delay a Stop, a heartbeat or a query.
 #[cfg(unix)]
 #[test]
 fn a_stop_does_not_wait_for_the_disk_with_the_names() {
@@ -443,7 +450,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
     served.run(&key, &[1]);
     let kept = || std::fs::read_dir(dir.path()).expect("a directory").flatten().next();
     until("the names of board 1 on the disk", || kept().is_some());
-    // Opening the file of the other board never returns.
+    // The test replaces the names file of the other board by a pipe. Opening the pipe blocks.
     let name = kept().expect("a file").file_name().into_string().expect("a name");
     let date = name.split('-').nth(2).expect("a date");
     let board = served.board(2);
@@ -453,7 +460,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|made| made.success()));
     let asker = std::thread::spawn({
         let http = served.clone();
-        // This thread reads and writes the names of board 2.
+        // This thread makes the agent read and write the names of board 2.
         move || {
             [http.get("GET /api/boards/2/values").0, http.api("POST /api/boards/2/start", Some(&key), None).0]
         }
@@ -466,7 +473,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
         let received = peer.receive(Duration::from_millis(10)).expect("the bus is there");
         received.is_some_and(|frame| frame.id().value() == 0x600)
     });
-    // From here on, the disk responds again.
+    // The disk responds again when the test opens the pipe.
     drop(std::fs::OpenOptions::new().read(true).write(true).open(&pipe));
     assert!(stop, "a Stop waits for the disk");
     assert_eq!(asker.join().expect("it is answered"), [409, 200]);

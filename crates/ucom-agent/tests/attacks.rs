@@ -1,4 +1,5 @@
-//! Attacks by clients without permission, as listed in docs/security.md. The tests of the arm agent try the same attacks.
+//! Attacks by clients without permission, as listed in docs/security.md. The tests of the arm agent (jtc-agent) try the
+//! same attacks.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -105,7 +106,7 @@ fn who_may_look_changes_nothing() {
         ("DELETE /api/jobs/1", None),
     ];
     for (request, body) in commands {
-        // The result does not change with the key of the lease holder.
+        // The key of the lease holder does not change the result.
         for key in [None, Some(key.as_str())] {
             let (status, error) = served.api_as(Some(&served.tokens.viewer), request, key, body.clone());
             assert_eq!(status, 403, "{request}: {error}");
@@ -123,7 +124,7 @@ fn who_may_look_changes_nothing() {
     assert!(!log.contains("\"command\""), "{log}");
 }
 
-/// The agent reads images into memory only for the lease holder, and at most two at a time.
+/// The agent reads firmware images into memory only for the lease holder, and at most two images at the same time.
 #[test]
 fn images_are_read_of_who_commands_alone_and_two_at_once() {
     let served = Served::start(1);
@@ -163,11 +164,11 @@ fn images_are_read_of_who_commands_alone_and_two_at_once() {
     assert_eq!(third.join().expect("it is answered"), 422);
 }
 
-/// A client may send any number of Stops. These Stops do not fill the bus or the event list.
+/// A client may send any number of Stops. Many Stops do not fill the bus or the event list.
 #[test]
 fn stops_without_end_are_counted_and_sent_together() {
     let served = Served::start(1);
-    // The first scan of the agent has ended, and the agent accepts each Stop.
+    // The agent has ended its first scan, and accepts each Stop.
     let (status, _) = served.get("POST /api/stop");
     assert_eq!(status, 200);
     served.event(0, "stopped", |event| event["kind"] == "stopped");

@@ -1,4 +1,5 @@
-//! Clients that use up all connections. These tests are a separate program because they open many connections.
+//! Tests with clients that use up all connections of the agent. The tests with many connections are a
+//! separate program because they open all connections that a process may open.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

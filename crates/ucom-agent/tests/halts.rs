@@ -1,4 +1,5 @@
-//! Tests that a request from before a Stop moves nothing after the Stop, for any delay of the request and for a Stop of any client.
+//! Tests that a request that was made before a Stop moves no board after the Stop. The test uses different delays of the request,
+//! and Stops of different clients.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -8,14 +9,14 @@ use std::time::Duration;
 use common::Served;
 use serde_json::{Value, json};
 
-/// Time that exceeds the hold-off of three seconds after a Stop of another client.
+/// Time that is longer than the hold-off of three seconds after a Stop of another client.
 const CALM: Duration = Duration::from_millis(3_300);
 
 fn last_halt(served: &Served) -> u64 {
     served.api("GET /api/status", None, None).1["last_halt"].as_u64().expect("a number")
 }
 
-/// Stops the boards, with or without a key, and returns the number of the Stop.
+/// Stops the boards, with or without a lease key, and returns the number of the Stop.
 fn stop(served: &Served, key: Option<&str>) -> u64 {
     let (status, sent) = served.api("POST /api/stop", key, None);
     assert_eq!(status, 200, "{sent}");
@@ -24,13 +25,13 @@ fn stop(served: &Served, key: Option<&str>) -> u64 {
     number
 }
 
-/// Checks that the request was refused, and that the message contains the name of the client that requested the Stop.
+/// Checks that the agent refused the request, and that the message contains the name of the client that requested the Stop.
 fn is_stopped((status, error): (u16, Value), by: &str) {
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     assert!(error["message"].as_str().is_some_and(|text| text.starts_with(by)), "{error}");
 }
 
-/// Sends the header of a request, without the body.
+/// Sends the head of a request, without the body.
 fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
     let (address, token, length) = (served.address, &served.tokens.operator, body.len());
     let mut socket = TcpStream::connect(address).expect("it listens");
@@ -40,12 +41,12 @@ fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
          Content-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
     )
     .expect("it reads");
-    // At this time, the agent has received the header.
+    // After this wait, the agent has received the head of the request.
     std::thread::sleep(Duration::from_millis(300));
     socket
 }
 
-/// Sends the body, and returns the answer.
+/// Sends the body of a request, and returns the answer.
 fn finish(mut socket: TcpStream, body: &str) -> String {
     socket.write_all(body.as_bytes()).expect("it reads");
     let mut answer = String::new();
@@ -53,7 +54,7 @@ fn finish(mut socket: TcpStream, body: &str) -> String {
     answer
 }
 
-/// Checks that no application runs, which proves that no start was sent.
+/// Checks that no application runs on any board, which proves that the agent has sent no start.
 fn nothing_runs(served: &Served) {
     let (_, boards) = served.api("GET /api/boards", None, None);
     for board in boards.as_array().expect("boards") {
@@ -88,7 +89,7 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
         json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true }).to_string();
     let late = [("POST /api/run", &run), ("POST /api/updates", &update)]
         .map(|(request, body)| (begin(&served, request, &key, body), body));
-    // A request is also refused after a Stop of the client itself, although this Stop causes no hold-off.
+    // The agent also refuses a request after the client's own Stop, although this Stop causes no hold-off.
     stop(&served, Some(&key));
     let last = served.last_event();
     for (socket, body) in late {
@@ -99,7 +100,7 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
     let begun = all["events"].as_array().expect("events").iter().any(|e| e["event"]["kind"] == "begun");
     assert!(!begun, "{all}");
     nothing_runs(&served);
-    // A new request for the same run succeeds.
+    // A new request for the run succeeds.
     served.run(&key, &[1, 2]);
 }
 
@@ -120,7 +121,7 @@ fn stops_that_no_agent_has_counted_are_refused_with_what_it_has() {
         let (status, error) = served.api(&format!("{request}?asked_after=7"), Some(&key), body.clone());
         let found = (status, &error["value"], &error["limit"]);
         assert_eq!(found, (400, &json!(7.0), &json!(1.0)), "{request}: {error}");
-        // After a Stop, each of these requests is refused, whichever client requested the Stop.
+        // The agent refuses each of these requests if it is older than the Stop, whichever client requested the Stop.
         is_stopped(served.api(&format!("{request}?asked_after=0"), Some(&key), body), "anna");
     }
     nothing_runs(&served);
@@ -142,19 +143,19 @@ fn an_input_behind_ones_own_stop_is_refused_and_what_ends_something_is_not() {
     let halt = stop(&served, Some(&key));
     is_stopped(set(&format!("?asked_after={before}"), 700), "anna");
     served.event(last, "stopped", |event| event["kind"] == "stopped");
-    // A request to switch outputs off moves nothing, so the agent executes it even if it is older than the Stop.
+    // A request to switch outputs off moves no board. The agent therefore executes the request even if it is older than the Stop.
     let off = json!({ "active": false });
     let (_, error) =
         served.api(&format!("PUT /api/boards/1/outputs?asked_after={before}"), Some(&key), Some(off));
     assert_ne!(error["code"], "stopped", "{error}");
-    // A Stop of the client itself causes no hold-off for a request that contains the number of this Stop, or no number.
+    // A client's own Stop causes no hold-off for requests that contain the number of this Stop, or no number.
     let job =
         served.begin(&format!("POST /api/run?asked_after={halt}"), &key, Some(json!({ "boards": [1] })));
     assert_eq!(served.over(job)["stage"], "finished");
     assert_eq!(set("", 700).0, 200);
 }
 
-/// Every status contains its time, so that a client can detect old messages even if messages arrive regularly.
+/// Every status contains its time. A client can therefore detect old messages even if messages arrive regularly.
 #[test]
 fn each_status_has_the_time_when_it_was_made() {
     let served = Served::start(1);

@@ -1,4 +1,4 @@
-//! Tests that the command log contains completed commands and their results, even of clients that have disconnected.
+//! Tests that the command log contains the executed commands and their results, even for clients that have disconnected.
 use crate::common;
 
 use std::io::Write as _;
@@ -28,7 +28,8 @@ fn what_a_client_has_done_is_in_the_log_when_it_hangs_up() {
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
     let first = served.board(1)["offers"]["parameters"][0].as_str().expect("a name").to_owned();
     let (name, token) = (first.split(' ').next().unwrap_or_default(), served.tokens.operator.clone());
-    // The client disconnects before it gets an answer. The test repeats this until the agent has executed one command anyway.
+    // The client disconnects before it receives an answer. The test sends the command again until the agent has executed the
+    // command of a disconnected client.
     let done = (100..140).find(|word| {
         let body = json!({ "value": word }).to_string();
         let request = format!(
@@ -73,7 +74,7 @@ fn a_lapse_its_stop_and_what_became_of_jobs_are_in_the_log() {
     line(&served, "lapse", lease(Value::Null));
 }
 
-/// The log contains completed and denied requests, with the request and the reason. The log does not contain read-only requests.
+/// The log contains executed and refused requests; a refused request has a reason. The log does not contain read-only requests.
 #[test]
 fn what_was_denied_is_in_the_log() {
     let (served, key) = Served::numbered(1);

@@ -1,4 +1,4 @@
-//! Tests how a Stop, the end of the lease, a disconnection and other clients affect the requests of a client.
+//! Tests how a Stop, the end of a lease, a disconnection and other clients affect the requests of a client.
 use crate::common;
 
 use std::io::Write as _;
@@ -17,7 +17,7 @@ fn is(kind: &'static str) -> impl Fn(&Value) -> bool {
     move |event| event["kind"] == kind
 }
 
-/// Sends commands to a board that does not answer. Later commands must then wait for some seconds.
+/// Sends commands to a board that does not answer. Later commands must wait some seconds until the commands to this board have failed.
 fn commands_to_nobody(served: &Served, key: &str, count: usize) -> Vec<JoinHandle<()>> {
     let ask = || {
         let (http, key) = (Http::clone(served), key.to_owned());
@@ -29,7 +29,7 @@ fn commands_to_nobody(served: &Served, key: &str, count: usize) -> Vec<JoinHandl
     all
 }
 
-/// Runs the control loop of board 1 with outputs off, for a client with this policy. Returns the key of the client.
+/// Runs the control loop of board 1 with outputs off, for a client with this policy. Returns the lease key of the client.
 fn idle(served: &Served, lasts_s: f64, policy: &str, key: &str) -> String {
     let job = served.job("POST /api/run", key, Some(json!({ "boards": [1] })));
     assert_eq!(job["stage"], "finished", "{job}");
@@ -37,8 +37,7 @@ fn idle(served: &Served, lasts_s: f64, policy: &str, key: &str) -> String {
     served.lease("bob", lasts_s, policy)
 }
 
-/// Another client reads the leases during the job; this has no effect. The lapse of the lease ends the job, and all
-/// boards are stopped.
+/// During the job, another client reads the leases; this has no effect. When the lease lapses, the job ends and all boards are stopped.
 #[test]
 fn a_run_whose_client_dies_meanwhile_is_stopped() {
     let (served, key) = Served::numbered(6);
@@ -60,7 +59,7 @@ fn a_run_whose_client_dies_meanwhile_is_stopped() {
     }
 }
 
-/// If a run was cancelled and one of its boards could not be stopped, the agent stops that board when the agent ends.
+/// If a run was cancelled but one of its boards could not be stopped, the agent stops this board when the agent ends.
 #[test]
 fn a_run_that_cannot_be_taken_back_counts_as_started() {
     let (served, key) = Served::numbered(3);
@@ -75,7 +74,7 @@ fn a_run_that_cannot_be_taken_back_counts_as_started() {
     assert_eq!(over["stage"], "cancelled", "{over}");
     let mut peer = served.chain.peer();
     let mut served = served;
-    // The board is still listed as started, so the agent must send a Stop for the board before the agent ends.
+    // The board is still listed as started, so the agent must send a Stop to this board before the agent ends.
     let ending = std::thread::spawn(move || {
         served.end();
         served
@@ -84,7 +83,7 @@ fn a_run_that_cannot_be_taken_back_counts_as_started() {
     drop(ending.join());
 }
 
-/// A long update does not prevent the lapse of a lease; the update continues.
+/// A lease can lapse during a long update; the update continues.
 #[test]
 fn a_lease_lapses_in_the_middle_of_an_update() {
     use base64::Engine as _;
@@ -104,7 +103,7 @@ fn a_lease_lapses_in_the_middle_of_an_update() {
     assert_eq!(stopped["not_stopped"], json!([]), "{stopped}");
 }
 
-/// If a client has lost the lease, its waiting request is not executed under the lease of another client.
+/// If a client has lost the lease, its queued request is not executed under the lease of another client.
 #[test]
 fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -117,7 +116,7 @@ fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let on = json!({ "active": true });
     let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), Some(on));
     assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
-    // The board keeps its number as well.
+    // The board also keeps its number.
     let (status, error) = reset.join().expect("it is answered");
     assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
     let board = served.board(1);
@@ -125,7 +124,7 @@ fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
 }
 
-/// A waiting request of a disconnected client does not move a board. A request that ends motion is executed.
+/// A queued request of a disconnected client does not move a board. A queued request that ends a motion is executed.
 #[test]
 fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     let (served, key) = Served::numbered(2);
@@ -148,12 +147,12 @@ fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     hang_up(2, false);
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
     served.board_when(2, "off", |board| board["active"] == false);
-    // This later request has been executed, so all earlier requests have been processed.
+    // The agent has executed this later request, so it has processed all earlier requests.
     assert_eq!(served.api("PUT /api/boards/2/outputs", Some(&key), Some(json!({ "active": false }))).0, 204);
     assert_eq!(served.board(1)["active"], false);
 }
 
-/// A later Stop of the client itself does not shorten the hold-off after a Stop of another client.
+/// A client's own Stop does not shorten the hold-off after an earlier Stop of another client.
 #[test]
 fn the_calm_of_a_stop_lasts_behind_another_one() {
     let (served, key) = Served::numbered(1);
@@ -163,13 +162,13 @@ fn the_calm_of_a_stop_lasts_behind_another_one() {
     }
     let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
-    // During this hold-off, an update is also refused.
+    // During the hold-off, the agent also refuses an update.
     let body = json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true });
     let (status, error) = served.api("POST /api/updates", Some(&key), Some(body));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
 }
 
-/// A job that waits in the queue can be cancelled like a running job.
+/// A client can cancel a queued job like a running job.
 #[test]
 fn a_job_that_waits_is_cancelled_and_one_that_is_refused_never_was() {
     let (served, key) = Served::numbered(1);
@@ -211,7 +210,7 @@ fn a_board_that_is_silent_at_a_stop_is_named_and_still_counts() {
     assert_eq!((&stopped["boards"], &stopped["not_stopped"]), (&json!([1, 2]), &json!([])), "{stopped}");
 }
 
-/// Read-only requests do not delay commands, even if these requests repeatedly query a silent board.
+/// Read-only requests do not delay commands, even if these requests query a silent board again and again.
 #[test]
 fn questions_keep_no_command_waiting() {
     let (served, key) = Served::numbered(2);
@@ -234,7 +233,7 @@ fn questions_keep_no_command_waiting() {
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
 
-/// When the agent ends, it stops running boards before a job undoes its own steps on other boards.
+/// When the agent ends, it stops the running boards before a job undoes its own steps on other boards.
 #[test]
 fn the_end_stops_what_runs_before_a_job_is_undone() {
     let (mut served, key) = Served::numbered(5);
@@ -253,7 +252,8 @@ fn the_end_stops_what_runs_before_a_job_is_undone() {
     drop(ending.join());
 }
 
-/// A command is refused if it would be executed shortly before its HTTP request times out, because the client would not see the effect.
+/// If a command can be executed only shortly before its HTTP request times out, the agent refuses it. Otherwise, the client would not
+/// see the effect of the command.
 #[test]
 fn what_waits_too_long_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -266,12 +266,12 @@ fn what_waits_too_long_does_not_move_anything() {
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
 }
 
-/// D-24: a board that does not receive the reset of an init continues to run. The board is stopped, and the init does not succeed.
+/// D-24: a board that does not receive the reset of an init continues to run. The agent stops this board, and the init fails.
 #[test]
 fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
     let (served, key) = Served::numbered(2);
     served.run(&key, &[1, 2]);
-    // The board can receive frames again during the last part of the 1 s in which reports are collected after the reset.
+    // The board receives frames again before the end of the 1 s in which the agent collects reports after the reset.
     served.chain.fault("deaf board=2 for_s=0.9");
     let job = served.job("POST /api/init", &key, Some(json!({})));
     assert_eq!((&job["stage"], &job["error"]["code"]), (&json!("failed"), &json!("init")), "{job}");
@@ -283,8 +283,8 @@ fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
     assert_eq!(again["stage"], "finished", "{again}");
 }
 
-/// D-34: inputs of a running board are sent repeatedly, so the agent does not wait for an answer to a single input. An
-/// input of a board without power is refused.
+/// D-34: the agent sends the inputs of a running board repeatedly, so it does not wait for an answer to a single input. If a board has
+/// no power, the agent refuses to set its inputs.
 #[test]
 fn d34_an_input_of_a_board_without_power_is_no_success() {
     let (served, key) = Served::numbered(1);
@@ -295,14 +295,14 @@ fn d34_an_input_of_a_board_without_power_is_no_success() {
     let (status, error) = set();
     assert_eq!(status, 200, "{error}");
     served.chain.fault("power-loss board=1 for_s=60");
-    // For half a second, the age of the last outputs is like that of a running board.
+    // In the first half second without power, the last outputs are not older than the outputs of a running board.
     std::thread::sleep(Duration::from_millis(600));
     let (status, error) = set();
     assert_eq!(status, 409, "{error}");
 }
 
-/// A client cannot release its lease while its run is being started. Otherwise the agent would enable outputs
-/// later, when no client holds the lease.
+/// A client cannot release its lease while its run starts. If the client could release its lease, the agent would enable outputs later,
+/// when no client holds the lease.
 #[test]
 fn the_lease_is_not_let_go_while_a_run_begins() {
     let (served, key) = Served::numbered(1);
@@ -314,13 +314,13 @@ fn the_lease_is_not_let_go_while_a_run_begins() {
     assert_eq!(served.board(1)["active"], true);
 }
 
-/// Waits until the agent has ended its role as master: no client holds the lease and no board runs.
+/// Waits until the agent is no longer the master, because no client holds the lease and no board runs.
 fn heartbeats_end(served: &Served) {
     until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }
 
-/// D-50: read-only requests do not keep the heartbeats active, even if the requests are frequent. Without a lease
-/// holder, boards become safe.
+/// D-50: read-only requests do not make the agent continue its heartbeats, even if the requests are frequent. If no client holds the
+/// lease, the boards become safe.
 #[test]
 fn d50_questions_do_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -329,7 +329,7 @@ fn d50_questions_do_not_keep_the_heartbeats_going() {
         let (http, enough) = (Http::clone(&served), asked_enough.clone());
         std::thread::spawn(move || {
             while !enough.load(Ordering::Relaxed) {
-                // The application is not started, so the names of its values are unknown.
+                // The application of the board is not started, so the names of its values are unknown.
                 assert_eq!(http.api_as(None, "GET /api/boards/1/values", None, None).0, 409);
             }
         })
@@ -342,7 +342,7 @@ fn d50_questions_do_not_keep_the_heartbeats_going() {
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
 
-/// After a run was started and undone, its boards are not listed as started.
+/// If a run was started and then undone, its boards are not listed as started.
 #[test]
 fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     let (served, key) = Served::numbered(2);
@@ -354,7 +354,8 @@ fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     heartbeats_end(&served);
 }
 
-/// D-50: another PC has started the loop of a board. If this agent stops that loop, it does not treat the board as a board of its own.
+/// D-50: another PC has started the control loop of a board. If this agent stops the control loop of another PC's board, it does not
+/// treat the board as one that it has started.
 #[test]
 fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -362,7 +363,7 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     for (id, awaited) in [(0x301, 0x501), (0x541, 0x601)] {
         let id = can_link::Id::standard(id).expect("11 bits");
         peer.send(&can_link::CanFrame::classic(id, &[]).expect("no data")).expect("the bus is there");
-        // The test does not compare the data of the frame.
+        // The test does not check the data of the frame.
         frame_when(&mut *peer, &format!("{awaited:03X}"), |frame| frame.id().value() == awaited);
     }
     let (status, error) = served.api("POST /api/boards/1/stop?level=loop", Some(&key), None);
@@ -370,8 +371,8 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     served.board_when(1, "started", |board| board["state"] == "started");
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     heartbeats_end(&served);
-    // The agent still sends heartbeats for a board that it has started itself. Before that, the other PC must
-    // have been silent for some time (D-08).
+    // For a board that it has started itself, the agent still sends heartbeats. Before this agent can start the board, the other PC
+    // must be silent for some time (D-08).
     std::thread::sleep(Duration::from_millis(1_500));
     let key = served.lease("anna", 60.0, "continue");
     served.run(&key, &[1]);

@@ -1,4 +1,4 @@
-//! Tests of firmware updates by HTTP: upload, write, read back.
+//! Tests of firmware updates by HTTP: upload of an image, write to a board, and read back.
 use crate::common;
 
 use std::time::Duration;
@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use common::Served;
 use serde_json::{Value, json};
 
-/// Returns the image of the golden update in the protocol document, in base64. Its Program ID is 0x4B3F.
+/// Returns the example image in the protocol document, in base64. The Program ID of the example image is 0x4B3F.
 fn golden(bytes: usize) -> String {
     STANDARD.encode((0..bytes).map(|i| (37 * i + 11) as u8).collect::<Vec<u8>>())
 }
@@ -17,7 +17,7 @@ fn request(boards: Value, bytes: usize) -> Value {
     json!({ "boards": boards, "image": golden(bytes), "format": "bin", "date": "2009-06-01" })
 }
 
-/// D-44, D-45: after an update the board reports the checksum of the image and its date.
+/// D-44, D-45: after an update, the board reports the checksum and the date of the image.
 #[test]
 fn d44_an_image_is_uploaded_written_and_read_back() {
     let (served, key) = Served::numbered(2);
@@ -25,7 +25,7 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     let flash = before["flash_number"].as_u64().expect("a number");
     let body = request(json!([{ "board": 2, "flash_number": flash }]), 1000);
     let number = served.begin("POST /api/updates", &key, Some(body.clone()));
-    // While an update runs, no other update and no other command is accepted.
+    // While an update runs, the agent accepts no other update and no other command.
     let (status, busy) = served.api("POST /api/updates", Some(&key), Some(body.clone()));
     assert_eq!((status, busy["code"].as_str()), (409, Some("busy")), "{busy}");
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 409);
@@ -43,14 +43,14 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
         (after["program_id"].as_u64(), after["flash_date"].as_str()),
         (Some(0x4B3F), Some("2009-06-01"))
     );
-    // Events report the progress until the end of both cycles.
+    // Events report the progress of the update until the end of both cycles.
     let (_, all) = served.api(&format!("GET /api/events?job={number}"), None, None);
     let entries = all["events"].as_array().expect("events");
     let all: Vec<&Value> = entries.iter().map(|e| &e["event"]).collect();
     let progress: Vec<&&Value> = all.iter().filter(|event| event["kind"] == "progress").collect();
     let bytes: Vec<u64> = progress.iter().filter_map(|event| event["bytes"].as_u64()).collect();
     assert!(bytes.len() > 2 && bytes.is_sorted() && bytes.last() == Some(&2176), "{bytes:?}");
-    // Progress events do not displace other events: within a cycle there are at most five progress events per second.
+    // Within a cycle there are at most five progress events per second, so that they do not remove other events from the journal.
     let times: Vec<(f64, &Value)> = entries
         .iter()
         .filter(|entry| entry["event"]["kind"] == "progress" && entry["event"]["bytes"] != 2176)
@@ -58,13 +58,13 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
         .collect();
     assert!(times.windows(2).all(|w| w[0].1 != w[1].1 || w[1].0 - w[0].0 > 0.1), "{times:?}");
     assert_eq!(all.last().map(|event| &event["outcome"]), Some(&json!("finished")));
-    // A board is up to date after a second update with the same image.
+    // After a second update with the same image, the agent reports the board as up to date.
     let job = served.job("POST /api/updates", &key, Some(body));
     assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
 }
 
-/// D-62: if the image has another address, its bytes are written again. If the agent has no record for a program,
-/// the program is not reported as verified. U-3: without a date, the board keeps its date.
+/// D-62: if the same image has another address, the agent writes its bytes again. If the agent has no record of a program, it
+/// does not report the program as verified. U-3: if an update has no date, the board keeps the date of its program.
 #[test]
 fn d62_what_the_agent_wrote_is_what_it_knows() {
     let (served, key) = Served::numbered(1);
@@ -91,7 +91,8 @@ fn d62_what_the_agent_wrote_is_what_it_knows() {
     assert_eq!(update(again), is("verified", true, "finished"));
 }
 
-/// D-46: the request says that the file is raw binary, but the file contains records. The agent does not start a job.
+/// D-46: the request declares the file as raw binary, but the file contains records. The agent starts no job for a raw binary
+/// file that contains records.
 #[test]
 fn d46_records_are_no_raw_bytes() {
     let (served, key) = Served::numbered(1);
@@ -105,7 +106,7 @@ fn d46_records_are_no_raw_bytes() {
     }
 }
 
-/// D-46: the agent does not send an image that is for another board than the board with this number.
+/// D-46: the agent does not send an image to a board if the image is for another board.
 #[test]
 fn d46_the_wrong_board_and_what_is_no_image_are_refused() {
     let (served, key) = Served::numbered(1);
@@ -138,7 +139,8 @@ fn d46_the_wrong_board_and_what_is_no_image_are_refused() {
     );
 }
 
-/// Boards continue to run if their update is refused or is only a dry run. When the lease lapses, these boards are still stopped.
+/// Boards continue to run if the agent refuses their update, or if the update is only a dry run. When the lease lapses, the agent
+/// still stops the boards whose update was refused.
 #[test]
 fn boards_whose_update_is_refused_are_still_stopped_at_the_lapse() {
     let (served, key) = Served::numbered(2);
@@ -154,7 +156,7 @@ fn boards_whose_update_is_refused_are_still_stopped_at_the_lapse() {
     served.event(last, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1, 2]));
 }
 
-/// D-46: a Stop during an update does not end the update. The lease holder can cancel the update.
+/// D-46: a Stop does not end an update that is in progress. The lease holder can cancel an update.
 #[test]
 fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     let (served, key) = Served::numbered(1);
@@ -174,7 +176,7 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
         "{job}"
     );
     served.event(last, "stopped", |event| event["kind"] == "stopped");
-    // An update with another image is cancelled.
+    // The test cancels an update with another image.
     let last = served.last_event();
     let number = served.begin("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 60_000)));
     served.event(last, "progress", progress);
@@ -187,8 +189,8 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     );
     std::thread::sleep(Duration::from_millis(100));
     assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 409);
-    // The flash was not erased, so the board has its old program. After an update that was started, the agent no
-    // longer knows the flash content (D-62).
+    // The flash was not erased, so the board still has its old program. After the start of an update, the agent no longer knows
+    // the contents of the flash (D-62).
     let job = served.job("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
     assert_eq!(job["update"]["boards"][0]["outcome"], "program-up-to-date", "{job}");
 }

@@ -6,16 +6,16 @@ use axum::extract::State;
 use super::objects::{BoardObject, ValuesObject};
 use super::{Agent, Denials};
 
-/// Returns the problem response for an unknown board.
+/// Returns the error response for an unknown board.
 pub(super) fn unknown(number: u8) -> Problem {
     Problem::nothing("board", number, "/api/boards")
 }
 
-/// Checks board numbers.
+/// Checks that board numbers are valid.
 ///
 /// # Errors
 ///
-/// A number is out of range (0–31).
+/// A board number is out of range (0–31).
 pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Problem> {
     match boards.into_iter().find(|board| *board > 31) {
         Some(board) => {
@@ -87,7 +87,8 @@ pub(super) async fn values(
         return Ok(Json(ValuesObject::of(&snapshot, values)));
     }
     if snapshot.competing_us.is_some() {
-        // Queries of the agent could also mix with the queries of the other PC.
+        // If the agent sent queries now, they could mix with the queries of the other PC on the
+        // bus.
         let message = format!(
             "the names of board {number} are not known, and the agent cannot request them while another PC \
              is master of this bus"

@@ -96,7 +96,7 @@ pub(super) struct ResetObject {
 }
 
 impl Agent {
-    /// Runs a command of the lease holder in the thread of the owner, and logs the command.
+    /// Runs a command of the lease holder in the owner's thread, and logs the command.
     async fn command<T: Send + 'static>(
         &self,
         asker: &Asker,
@@ -106,7 +106,7 @@ impl Agent {
         self.command_with(asker, what, json!({}), act).await
     }
 
-    /// Like [`command`](Self::command), but with additional facts in the log.
+    /// Like [`command`](Self::command), but adds facts to the log line.
     async fn command_with<T: Send + 'static>(
         &self,
         asker: &Asker,
@@ -122,7 +122,7 @@ impl Agent {
         let own = line.clone();
         let act = move |worker: &mut Worker| {
             let done = act(worker).map_err(|error| worker.problem(&error));
-            // The result is logged here, because the client may have disconnected.
+            // The result is logged in this thread, because the client may have disconnected.
             own.end(&done);
             done
         };
@@ -148,8 +148,8 @@ fn set(
     note_rounded(&worker.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = worker.driver.now_us();
     let boards = worker.driver.master.boards();
-    // Inputs of a running board are sent repeatedly, so other frames follow a lost frame. If a board has no power,
-    // its control loop does not run.
+    // The agent sends the inputs of a running board repeatedly, so a later frame replaces a lost frame. If a board has no
+    // power, its control loop does not run.
     let runs = worker.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -289,7 +289,8 @@ pub(super) async fn start_board(
         let all = worker.starting(&[board], |worker| {
             worker.driver.change_each(&[board], |board| Request::Start { board, force: false })
         })?;
-        // The names of the values are loaded here; if this fails, the application is started anyway.
+        // The names of the values are loaded now. If the names cannot be loaded, this does not affect the application,
+        // which has already started.
         let _ = worker.known(board);
         all.first()
             .map(|one| AnswerObject::of(one, &worker.driver.master.profile()))

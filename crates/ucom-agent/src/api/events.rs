@@ -1,4 +1,4 @@
-//! Events of the chain: numbered lists, and a live stream with the values of running boards.
+//! Events of the chain: numbered lists, and a live stream of events with the values of running boards.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};
@@ -18,7 +18,7 @@ use super::objects::{BoardObject, StatusObject, ValuesObject};
 use crate::event::ChainEvent;
 use crate::snapshot::Values;
 
-/// Interval at which a stream sends the bus status and the list of boards.
+/// Interval at which the stream sends the bus status and the list of boards.
 const SLOWLY: Duration = Duration::from_secs(1);
 
 /// Event with its number and time.
@@ -42,19 +42,20 @@ pub(super) async fn events(
     agent.events.ask(&agent.shared.journal, request).await
 }
 
-/// Message of the stream that is not an event.
+/// Message of the event stream that is not an event.
 #[derive(serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage {
     /// Status of the bus, once a second.
     Status(Box<StatusObject>),
-    /// Boards, once a second.
+    /// List of boards, once a second.
     Boards { boards: Vec<BoardObject> },
-    /// New outputs; older ones are left out for a slow reader.
+    /// New outputs of boards; if the client reads slowly, older outputs are omitted.
     Values { values: Vec<ValuesObject> },
 }
 
-/// Serves `GET /api/stream`: events, values of running boards at most 25 times a second, bus and boards once a second.
+/// Serves `GET /api/stream`: events, values of running boards at most 25 times a second, and bus status and boards
+/// once a second.
 pub(super) async fn stream(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -87,7 +88,7 @@ pub(super) async fn stream(
     )
 }
 
-/// Returns the values that arrived after this time, and the time of the newest value, in µs.
+/// Returns the values that arrived after the time `shown_us`, and the time of the newest value, in µs.
 fn new_values(agent: &Agent, shown_us: u64) -> Option<(Vec<ValuesObject>, u64)> {
     let snapshot = agent.shared.snapshot();
     let time_us = |values: &Values| values.outputs.as_ref().map_or(0, |outputs| outputs.time_us);

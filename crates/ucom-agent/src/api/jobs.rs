@@ -1,4 +1,4 @@
-//! Jobs: requests whose execution takes longer than the HTTP answer.
+//! Jobs: requests that take longer than their HTTP answer.
 use std::time::Duration;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
@@ -21,11 +21,11 @@ use super::{Agent, Denials};
 use crate::jobs::Done;
 use crate::owner::{Kind, Worker};
 
-/// Time for which a doctor listens before it sends queries.
+/// Time for which the doctor job listens to the bus before it sends queries.
 const LISTEN: Duration = Duration::from_millis(1500);
 
 impl Agent {
-    /// Starts a job of the lease holder. A job that may move a board is started only if no Stop came after `after`.
+    /// Starts a job of the lease holder. If the job may move a board, it starts only if no Stop came after `after`.
     pub(super) fn begin(
         &self,
         (asker, after): (&Asker, Option<AskedAfter>),
@@ -188,7 +188,7 @@ pub(super) async fn run(
     after: AskedAfter,
     Body(mut request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Each board is used once, even if the request lists it several times.
+    // Each board is used only once, even if the request lists the board several times.
     request.boards.sort_unstable();
     request.boards.dedup();
     numbers(request.boards.iter().copied())?;
@@ -204,7 +204,7 @@ pub(super) async fn run(
         let begin = |session: &mut Session, cache: &Cache| {
             let mut prepared = Prepared::default();
             let started = start(session, cache, &numbers, (&ci, &par), request.active, &mut prepared);
-            // The procedure itself has already undone its steps.
+            // The failed procedure has already undone its own steps.
             let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
             Ok((report, prepared))
         };
@@ -217,7 +217,7 @@ pub(super) async fn run(
     })
 }
 
-/// Reads the signal names, plans the inputs, and starts all boards.
+/// Reads the signal names, prepares the inputs, and starts all boards.
 fn start(
     session: &mut Session,
     cache: &Cache,

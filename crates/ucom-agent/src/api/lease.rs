@@ -1,4 +1,4 @@
-//! Lease: each request of the holder proves that the holder still responds.
+//! Lease: each request of the lease holder shows that the holder still runs.
 use agent_kit::access::random;
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::{Asker, Caller};
@@ -57,7 +57,8 @@ impl Agent {
         Ok(leases.client(asker.key(), now)?)
     }
 
-    /// Returns the client that has this lease key, and renews its lease. Returns an error if the client does not hold the lease.
+    /// Returns the client that has this lease key. Renews its lease, or takes the lease for this client if it is free.
+    /// Returns an error if another client holds the lease.
     pub(super) fn commander(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
         asker.caller.operator()?;
         let (mut leases, now) = self.shared.leases();
@@ -134,7 +135,7 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let client = agent.client(&asker)?;
     {
         let (mut leases, now) = agent.shared.leases();
-        // Otherwise the agent could enable outputs later, when no client holds the lease.
+        // If the client released the lease now, the agent could enable outputs later, when no client holds the lease.
         if leases.holds(client.id, now) && agent.shared.moves_for(client.id) {
             return Err(Problem::new(
                 "busy",

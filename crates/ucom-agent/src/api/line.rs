@@ -1,4 +1,4 @@
-//! Line in the command log, which is written even if the client disconnects.
+//! Line about a command in the command log. The line is written even if the client disconnects.
 use std::sync::{Mutex, PoisonError};
 
 use agent_kit::api::Problem;
@@ -13,12 +13,12 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Returns the log line for a command that is requested now.
+    /// Creates the log line for a command that a client requests now.
     pub(super) fn new(gate: &Gate, facts: Value) -> Self {
         Self { gate: gate.clone(), facts: Mutex::new(Some(facts)) }
     }
 
-    /// Logs the result: success, or the reason for the failure.
+    /// Logs the result of the command: success, or the reason for its failure.
     pub(super) fn end<T>(&self, done: &Result<T, Problem>) {
         self.write(done.as_ref().err().map(|error| &*error.message));
     }

@@ -1,4 +1,5 @@
-//! Objects that the API sends. The API description is generated from these types.
+//! Objects that the API sends. The agent generates the API description from the types of these
+//! objects.
 mod board;
 mod bus;
 mod job;

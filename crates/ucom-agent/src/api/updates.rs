@@ -1,4 +1,4 @@
-//! Updates: the client uploads images; the agent checks the images, writes them and reads them back.
+//! Firmware updates: the client uploads images; the agent checks the images, writes them and reads them back.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -123,7 +123,8 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
     Ok(image.into())
 }
 
-/// Returns the next step for a file that is not a valid image. The proposed step never skips a check of the contents.
+/// Returns the next step for a file that is not a valid image. The next step never suggests skipping a check of the
+/// file contents.
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
@@ -140,7 +141,8 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash date: the requested date, else the current date (UTC); 0 if the headers contain no date.
+/// Returns the flash date: the requested date, or else the current date (UTC). Returns 0 if the headers contain no
+/// date.
 fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Problem> {
     let wrong = |text: &str| {
         usage(
@@ -193,7 +195,8 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
     })
 }
 
-/// Reads a request. Long images are parsed in a thread that does not serve other requests.
+/// Reads the body of an update request. A separate thread parses long images, so that other requests are served at the
+/// same time.
 async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Problem> {
     let (parts, body) = request.into_parts();
     let body = Bytes::from_request(Request::from_parts(parts.clone(), body), &()).await;
@@ -207,7 +210,7 @@ async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Probl
     parsed.await.unwrap_or_else(|_| Err(fault()))
 }
 
-/// Returns the problem response for an update that failed.
+/// Returns the error response for an update that failed.
 fn failed(report: &UpdateReport) -> Option<Problem> {
     let kind = report.failure()?;
     let failures: Vec<_> =
@@ -247,7 +250,7 @@ pub(super) async fn update(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // This is checked before the images are read.
+    // The permission of the client is checked before the images are read.
     agent.commander(&asker)?;
     let Ok(room) = agent.images.clone().acquire_owned().await else { return Err(fault()) };
     let profile = agent.shared.snapshot().profile;

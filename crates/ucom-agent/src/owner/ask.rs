@@ -1,4 +1,4 @@
-//! Requests to the owner of a bus: short requests, and jobs.
+//! Requests to the owner of a bus: short requests and jobs.
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,33 +13,34 @@ use super::shared::{CANCELLED, STOPPED, Shared};
 use crate::event::ChainEvent;
 use crate::jobs::{Done, Job, Stage};
 
-/// Maximum time for which a request waits in the queue. After this time the request is refused, because its HTTP
-/// request times out after ten seconds.
+/// Maximum time for which a request is queued. The owner refuses a request after 5 s in the queue, because the HTTP request times out
+/// after ten seconds. A request that can only end a motion has no time limit in the queue.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Maximum numbers of waiting commands, and of waiting queries without the lease. These numbers are separate, so
-/// that queries do not block commands.
+/// Maximum number of queued commands. `QUESTIONS_MAX` is the limit for queued queries without the lease. The limits for commands and
+/// queries are separate, so that queries do not block commands.
 const WAITING_MAX: usize = 32;
 const QUESTIONS_MAX: usize = 8;
 
-/// Queue of the owner.
+/// Queue of requests to the owner of the bus.
 pub(super) type Queue = host_kit::owner::Queue<Worker, Tag>;
 type Place<'a> = host_kit::owner::Place<'a, Worker, Tag>;
 
-/// Request that the lease holder made. Before the request is executed, a Stop may come, or another client may take the lease.
+/// Request of the lease holder. Before the owner executes the request, a client may send a Stop, or another client may take the
+/// lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Asked {
     pub client: ClientId,
-    /// Number of the last Stop that came before the request.
+    /// Number of the last Stop before the request.
     pub halt: u64,
-    /// `true` if the request may move boards. Requests that can only end a motion are executed even if their client has disconnected.
+    /// `true` if the request may move boards. A request that can only end a motion is executed even if its client has disconnected.
     pub moves: bool,
 }
 
-/// Data that the agent stores about a request in the queue.
+/// Data about a request in the queue.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tag {
-    /// Number of the job, if the request is a job.
+    /// Number of the job; `None` if the request is not a job.
     pub job: Option<u64>,
     /// Request of the lease holder; `None` for a query without the lease and for the check after a Stop.
     pub asked: Option<Asked>,
@@ -53,7 +54,7 @@ impl Tag {
 }
 
 impl Shared {
-    /// Reserves a place in the queue for a request. While a job runs or waits, other requests are refused.
+    /// Reserves an entry in the queue for a request. While a job runs or is queued, other requests are refused.
     fn place(&self, is_question: bool) -> Result<Place<'_>, Problem> {
         let place = self.queue.place().ok_or_else(gone)?;
         if let Some(job) = place.tags().find_map(|tag| tag.job) {
@@ -75,22 +76,22 @@ impl Shared {
         Ok(place)
     }
 
-    /// Returns the worker for a request that may be executed now. Otherwise returns the reason for the refusal:
-    /// a Stop came after the request, or its client has lost the lease.
+    /// Returns the worker if it may execute the request now. If the request is refused, returns the reason: a Stop came after the
+    /// request, or the client has lost the lease.
     fn turn<'a>(
         &self,
         worker: Result<&'a mut Worker, Refused>,
         asked: Option<Asked>,
     ) -> Result<&'a mut Worker, Problem> {
-        // A refusal may be made in a thread that holds the lock of the leases. The code takes this lock only below, in
-        // the thread of the owner.
+        // A thread that holds the lock of the leases may also call this closure to refuse the request. `turn` therefore takes the
+        // lock of the leases only below, where it runs in the owner's thread.
         let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),
             Refused::Closed => gone(),
         })?;
         let late = asked.and_then(|asked| {
-            // A Stop may come while the leases are checked.
+            // A Stop may arrive while the leases are checked.
             self.too_late(asked).or_else(|| (asked.halt < self.queue.stops()).then(|| self.stopped()))
         });
         if late.is_some() {
@@ -100,7 +101,8 @@ impl Shared {
         late.map_or(Ok(worker), Err)
     }
 
-    /// Runs a short function in the thread of the owner and waits for its result: a command, or a query that needs no lease.
+    /// Runs a short function in the owner's thread and waits for its result. The function is a command, or a query that needs no
+    /// lease.
     pub(crate) async fn call<T: Send + 'static>(
         self: &Arc<Self>,
         asked: Option<Asked>,
@@ -113,11 +115,11 @@ impl Shared {
         let own = self.clone();
         let act = move |worker: Result<&mut Worker, Refused>| {
             let worker = own.turn(worker, asked);
-            // If the client no longer waits for the answer, the request must not move boards later.
+            // If the client has stopped waiting for the answer, its request must not move boards later.
             if answer.is_closed() && !only_ends {
                 return;
             }
-            // The answer would be too late even if the request were executed now.
+            // If the request was queued for too long, its answer would be too late.
             let worker = worker.and_then(|worker| match begun.elapsed() > PATIENCE && !only_ends {
                 true => {
                     // The request is marked as done before its client receives the refusal.
@@ -130,7 +132,7 @@ impl Shared {
                 }
                 false => Ok(worker),
             });
-            // If a client has disconnected, it needs no answer.
+            // A client that has disconnected receives no answer.
             let _ = answer.send(worker.and_then(|worker| {
                 let done = act(worker);
                 worker.settle();
@@ -142,7 +144,7 @@ impl Shared {
         answered.await.unwrap_or_else(|_| Err(fault()))
     }
 
-    /// Begins a job.
+    /// Begins a job of the lease holder.
     pub(crate) fn begin(
         self: &Arc<Self>,
         (kind, asked): (Kind, Asked),
@@ -166,7 +168,7 @@ impl Shared {
                 Ok((done, error)) => (Some(done), error),
                 Err(error) => (None, Some(error)),
             };
-            // If the job was cancelled, its earlier results are kept.
+            // A cancelled job keeps the results that it has already produced.
             let stage = match &error {
                 None => Stage::Finished,
                 Some(error) if error.code == CANCELLED || error.code == STOPPED => Stage::Cancelled,
@@ -179,13 +181,14 @@ impl Shared {
         Ok(job)
     }
 
-    /// Cancels a job. After that, the job still undoes its steps on the boards. Returns `false` if the job has ended.
+    /// Cancels a job that runs or is queued. The cancelled job still undoes its steps on the boards. Returns `false` if the job has
+    /// already ended.
     pub(crate) fn cancel_job(&self, number: u64) -> bool {
         self.queue.cancel(|tag| tag.job == Some(number))
     }
 }
 
-/// Returns the problem for a fault of the agent itself.
+/// Returns the problem for an internal error of the agent.
 pub(crate) fn fault() -> Problem {
     Problem::new("fault", "the agent has an internal error", "read the output of the agent")
         .kind(ErrorKind::Fault)
@@ -205,7 +208,7 @@ fn gone() -> Problem {
     .kind(ErrorKind::NoLink)
 }
 
-/// Job that has not ended. If a fault of the agent drops this value, the job ends as failed.
+/// Guard of a job that has not ended. If an internal error of the agent drops this guard, the job ends as failed.
 struct Unfinished {
     shared: Arc<Shared>,
     number: u64,

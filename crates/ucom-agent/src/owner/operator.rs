@@ -1,4 +1,4 @@
-//! Operator of the session: publishes snapshots and events of the bus, even during a procedure.
+//! Operator of the bus session: publishes snapshots and events of the bus, even during a procedure.
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -14,43 +14,45 @@ use super::shared::Shared;
 use crate::event::ChainEvent;
 use crate::snapshot::{BusSnapshot, Values};
 
-/// Interval between snapshots.
+/// Interval between two snapshots of the bus.
 const PICTURE: Duration = Duration::from_millis(40);
-/// Time without a frame after which another PC counts as disconnected, in µs.
+/// Time without a frame from another PC after which the other PC counts as disconnected, in µs.
 const COMPETING_US: u64 = 3_000_000;
 
-/// Time for which a Stop is repeated, in µs.
+/// Time for which the frames of a Stop are repeated, in µs.
 const SERIES_US: u64 = 60_000;
-/// Interval between progress events within a cycle, in µs.
+/// Interval between progress events within one cycle of an update, in µs.
 const PROGRESS_US: u64 = 200_000;
 
-/// Job, boards, attempt and cycle of an update.
+/// Job, boards, attempt and cycle of a firmware update.
 type Step = (u64, Vec<u8>, u32, u32);
 
-/// State of the owner thread that can be accessed during a procedure.
+/// State of the owner's thread that is also accessible during a procedure.
 #[derive(Default)]
 pub(super) struct Local {
-    /// Boards that returned no names to a request without the lease, with the time and the reason.
+    /// Boards that returned no names to a request without the lease. Each entry for such a board has the time and the
+    /// reason.
     pub nameless: BTreeMap<u8, (Instant, Problem)>,
     pub states: BTreeMap<u8, &'static str>,
-    /// Number of Stops whose frames were sent. The next field is the time of the last such Stop.
+    /// Number of Stops whose frames were sent. `halted_us` is the time of the last Stop whose frames were sent.
     pub halts_sent: u64,
     pub halted_us: Option<u64>,
-    /// Job, boards, attempt and cycle of the last progress event, and its time in µs.
+    /// Update step of the last progress event, and the time of this event in µs.
     pub progress: Option<(Step, u64)>,
-    /// `true` if the Stop at the end of the agent was sent.
+    /// `true` if the agent has sent the Stop that it sends when it ends.
     pub end_sent: bool,
     pub job: Option<u64>,
     /// Time of the last event about another PC, in µs.
     pub competing_us: Option<u64>,
     pub now_us: u64,
-    /// Time of the last snapshot; if `None`, a new snapshot is due at once.
+    /// Time of the last snapshot; if `None`, the next turn publishes a new snapshot.
     pub published: Option<Instant>,
-    /// Events that are written after the next snapshot, so that readers of an event find the new state in the snapshot.
+    /// Events that are written after the next snapshot. A client that reads an event therefore finds the new state in
+    /// the snapshot.
     pub happened: Vec<ChainEvent>,
 }
 
-/// Operator of the session.
+/// Operator of the bus session.
 pub(super) struct Hand {
     pub shared: Arc<Shared>,
     pub held: Rc<RefCell<Held>>,
@@ -74,12 +76,12 @@ impl Operator for Hand {
     fn happened(&self, event: &Event, text: Option<String>) {
         let mut local = self.local.borrow_mut();
         let now_us = local.now_us;
-        // Supervision changes are reported in each turn.
+        // The agent reports supervision changes in each turn.
         let _ = self.held.borrow_mut().see(event, now_us);
         let job = local.job;
         let mut write = Vec::new();
         match event {
-            // The published snapshot already contains these outputs.
+            // The published snapshot already contains the outputs of this event.
             Event::Snapshot { .. } => {}
             Event::Supervision { board, change } => {
                 let (board, change) = match change {
@@ -131,21 +133,23 @@ impl Operator for Hand {
     }
 
     fn turned(&self, master: &mut Master, link: &mut Link) {
-        // This check is made in each turn, so that a running or waiting request cannot prevent the lapse of a lease.
+        // The leases are checked in each turn. A running or queued request can therefore not prevent the lapse of a
+        // lease.
         drop(self.shared.leases());
         let mut local = self.local.borrow_mut();
         local.now_us = link.now_us();
         self.shared.show_halts();
         let halts = self.shared.halts();
-        // If a Stop arrives while an earlier Stop is being repeated, its frames are sent after the repetitions. Many
-        // Stops therefore do not fill the bus.
+        // If a Stop arrives while the frames of an earlier Stop are repeated, the new frames are sent after these
+        // repetitions. Many Stops therefore do not fill the bus.
         let repeated = local.halted_us.is_some_and(|at| local.now_us.saturating_sub(at) < SERIES_US);
         if local.halts_sent < halts && !repeated {
             (local.halts_sent, local.halted_us) = (halts, Some(local.now_us));
             master.stop_at_once(local.now_us, None);
         }
         if self.shared.has_ended() && !local.end_sent {
-            // The boards are stopped first, because a running request may still undo steps on boards that do not answer.
+            // The started boards are stopped first, because a running request may still undo steps on boards that do not
+            // answer.
             local.end_sent = true;
             let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
             master.stop_at_once(local.now_us, Some(&started));
@@ -170,7 +174,7 @@ impl Hand {
         }
         local.states = states;
         let held = self.held.borrow();
-        // If a board now has another application, the stored names are invalid.
+        // If a board now has another application, its stored names are invalid.
         let is_its = |(number, known): &(&u8, &Arc<Known>)| {
             let info = boards.get(**number).and_then(|board| board.info);
             info.is_none_or(|info| DescriptionKey::of(&info) == DescriptionKey::of(&known.info))

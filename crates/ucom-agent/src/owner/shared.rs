@@ -1,4 +1,4 @@
-//! State that the owner of a bus shares with its callers: last known state of the boards, lease and Stops.
+//! State that the owner of a bus shares with its callers: the last known state of the boards, the lease and the Stops.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,17 +16,17 @@ use crate::event::{ChainEvent, Journal, Policy};
 use crate::jobs::Jobs;
 use crate::snapshot::BusSnapshot;
 
-/// Hold-off time after a Stop of another client.
+/// Hold-off after a Stop of another client.
 const CALM: Duration = Duration::from_secs(3);
 
 /// Time within which several Stops are reported as one event.
 const TOGETHER: Duration = Duration::from_millis(100);
 
-/// Error codes of a cancelled request, and of a request that was ended by a Stop.
+/// Error code of a cancelled request. `STOPPED` is the error code of a request that a Stop ended.
 pub(super) const CANCELLED: &str = "cancelled";
 pub(super) const STOPPED: &str = "stopped";
 
-/// Stop: the name of its requester, the client if the requester has a lease key, and the time.
+/// Data of a Stop: the name of its requester, the time, and the client if the requester has a lease key.
 #[derive(Clone)]
 struct Halt {
     by: String,
@@ -34,14 +34,14 @@ struct Halt {
     at: Instant,
 }
 
-/// Requesters of the latest Stops. The queue counts the Stops.
+/// Requesters of the last Stops. The queue of the owner counts the Stops.
 #[derive(Default)]
 struct Halts {
-    /// Time of the last event about Stops. The next field is the number of Stops since that event.
+    /// Time of the last event about Stops. `more` is the number of Stops since the last event about Stops.
     shown: Option<Instant>,
     more: u64,
     last: Option<Halt>,
-    /// Latest Stop by a client other than the requester of `last`.
+    /// Last Stop by a client other than the requester of `last`.
     last_by_another: Option<Halt>,
 }
 
@@ -54,19 +54,19 @@ impl Halts {
         }
     }
 
-    /// Returns the requester of the last Stop.
+    /// Returns the name of the requester of the last Stop.
     fn last_by(&self) -> &str {
         self.last.as_ref().map_or("", |halt| halt.by.as_str())
     }
 
-    /// Returns a Stop of another client within the hold-off.
+    /// Returns a Stop of another client if its hold-off is still active.
     fn keeps_calm(&self, client: ClientId) -> Option<&Halt> {
         let others = |halt: &&Halt| halt.client != Some(client) && halt.at.elapsed() < CALM;
         self.last.iter().chain(&self.last_by_another).find(others)
     }
 }
 
-/// State that the owner shares with its callers.
+/// State that the owner of the bus shares with its callers.
 pub(crate) struct Shared {
     start: Instant,
     snapshot: Mutex<Arc<BusSnapshot>>,
@@ -80,17 +80,17 @@ pub(crate) struct Shared {
     leases: Mutex<Leases<Policy>>,
     /// Lease holder at the time of the last check.
     holder: Mutex<Option<String>>,
-    /// `true` from the time before the first frame to a started board until all started boards have been stopped.
+    /// `true` from the time before the first frame to a started board until all started boards were stopped.
     pub(super) runs: Arc<AtomicBool>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // If another thread panicked, the state may be incomplete, but a Stop is more important.
+    // After a panic of another thread, the state may be incomplete, but a Stop is more important.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
-    /// Returns the state for a bus whose boards are not known yet, with this protocol profile.
+    /// Returns the state for a bus with this protocol profile, before any board is known.
     pub(super) fn new(profile: Profile) -> Self {
         Self {
             start: Instant::now(),
@@ -113,7 +113,7 @@ impl Shared {
         self.start.elapsed()
     }
 
-    /// Returns the snapshot of the boards.
+    /// Returns the last snapshot of the boards.
     pub(crate) fn snapshot(&self) -> Arc<BusSnapshot> {
         lock(&self.snapshot).clone()
     }
@@ -128,7 +128,7 @@ impl Shared {
         lock(&self.lost).clone()
     }
 
-    /// Stops all boards before any other request, and checks that the boards have stopped. Returns the number of the Stop.
+    /// Stops all boards before any other request is executed, and checks that the boards have stopped. Returns the number of this Stop.
     pub(crate) fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
         let act = |worker: Result<&mut Worker, Refused>| {
             if let Ok(worker) = worker {
@@ -136,33 +136,35 @@ impl Shared {
             }
         };
         let number = {
-            // The counter and the requester change under one lock, so that a thread that reads the number of a Stop
-            // also reads its requester.
+            // The Stop counter and the requester of the Stop change under one lock. A thread that reads the number of a Stop therefore
+            // also reads the requester of this Stop.
             let mut halts = lock(&self.halts);
             halts.add(by, client);
             self.queue.stop_alike(Tag::default(), Box::new(act))
         };
         self.show_halts();
-        // This call is made without the lock, because the refusals contain the name of the requester.
+        // The lock is released before `refuse_late` is called, because the refusals contain the name of the requester.
         self.queue.refuse_late();
         number
     }
 
-    /// Returns the number of requested Stops, which is also the number of the last Stop.
+    /// Returns the number of requested Stops. The number of requested Stops is also the number of the last Stop.
     pub(crate) fn halts(&self) -> u64 {
         self.queue.stops()
     }
 
-    /// Returns `true` while a request of this client that may move boards runs or waits.
+    /// Returns `true` while a request of this client that may move boards runs or is queued.
     pub(crate) fn moves_for(&self, client: ClientId) -> bool {
         self.queue.has(|tag| tag.moves_for(client))
     }
 
-    /// Creates a request of this client. For a request that may move boards, `after` is the number of the last Stop known to the client.
+    /// Creates a request of this client. For a request that may move boards, `after` is the number of the last Stop that the client
+    /// knows.
     ///
     /// # Errors
     ///
-    /// The request may move boards, and a newer Stop exists, or another client stopped the boards within the last 3 s.
+    /// The request may move boards, and a Stop later than `after` exists, or another client stopped the boards within the
+    /// last 3 s.
     pub(crate) fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
         let halts = lock(&self.halts);
         let count = self.queue.stops();
@@ -177,8 +179,7 @@ impl Shared {
         Ok(Asked { client, halt: count, moves: after.is_some() })
     }
 
-    /// Returns the leases and the current time. If the lease has lapsed, it is ended and its policy is applied before
-    /// another client can take the lease.
+    /// Returns the leases and the current time. Ends a lapsed lease and applies its policy before another client can take the lease.
     pub(crate) fn leases(&self) -> (MutexGuard<'_, Leases<Policy>>, Duration) {
         let (mut leases, now) = (lock(&self.leases), self.now());
         let lapsed = leases.lapse(now);
@@ -196,9 +197,9 @@ impl Shared {
     }
 }
 
-/// Functions that the owner uses.
+/// Functions for the owner of the bus.
 impl Shared {
-    /// Requests the end of the owner.
+    /// Requests that the owner ends.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
@@ -213,7 +214,7 @@ impl Shared {
         self.has_ended() || self.queue.is_cancelled()
     }
 
-    /// Writes events for new Stops: the first Stop at once, the following Stops together.
+    /// Writes events for new Stops: the first Stop at once, and the Stops after it in one event.
     pub(super) fn show_halts(&self) {
         let mut halts = lock(&self.halts);
         if halts.more > 0 && halts.shown.is_none_or(|at| at.elapsed() >= TOGETHER) {
@@ -238,7 +239,7 @@ impl Shared {
         stopped(lock(&self.halts).last_by())
     }
 
-    /// Returns the reason of a cancellation.
+    /// Returns the reason why a request was cancelled.
     pub(super) fn why_cancelled(&self) -> Problem {
         match &lock(&self.halts).last {
             Some(halt) if halt.at.elapsed() < CALM => stopped(&halt.by),
@@ -251,14 +252,14 @@ impl Shared {
         lock(&self.leases).lease().is_some()
     }
 
-    /// Publishes a snapshot and then the events, so that readers of an event find the new state in the snapshot.
+    /// Publishes a snapshot and then the events. A client that reads an event therefore finds the new state in the snapshot.
     pub(super) fn publish(&self, snapshot: BusSnapshot, happened: Vec<ChainEvent>) {
         *lock(&self.snapshot) = Arc::new(snapshot);
         happened.into_iter().for_each(|event| self.journal.write(event));
         self.changed.send_replace(());
     }
 
-    /// Marks the bus as lost for this reason; waiting requests are refused.
+    /// Marks the bus as lost for the reason `why`; queued requests are refused.
     pub(super) fn close(&self, why: String) {
         *lock(&self.lost) = Some(why.clone());
         self.queue.close();

@@ -1,4 +1,4 @@
-//! Check after a Stop: after the stop frames, the agent queries each board.
+//! Check after a Stop: when the stop frames were sent, the agent queries each board.
 use std::collections::BTreeSet;
 
 use ucom::Status;
@@ -9,15 +9,15 @@ use super::Worker;
 use crate::event::ChainEvent;
 
 impl Worker {
-    /// After a Stop, queries each board and stops its application. The check includes boards that answer, and
-    /// boards that do not answer but may run.
+    /// After a Stop, queries each board and stops its application. The check includes all boards that answer,
+    /// and also boards that do not answer but may run.
     pub(super) fn see_to_stop(&mut self) {
         let was_master = self.driver.master.is_master();
         let mut wanted = self.may_run();
         let mut not_stopped = Vec::new();
         match self.driver.numbers_to_stop(&Boards::All) {
             Ok(found) => wanted.extend(found),
-            // A board without a number does not run.
+            // A board without a number cannot run.
             Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) => {}
             Err(error) => not_stopped.push(error.to_string()),
         }
@@ -37,11 +37,11 @@ impl Worker {
             }
             Err(error) => not_stopped.push(error.to_string()),
         }
-        // The other boards are still listed as started until they have been stopped.
+        // A board that did not confirm the Stop is still listed as started until it has been stopped.
         confirmed.iter().for_each(|board| self.runs_no_more(Some(*board)));
         if !was_master {
-            // A Stop does not make the agent the master. If a board has not confirmed the Stop, it becomes safe
-            // because it receives no heartbeats, unless another master sends them.
+            // A Stop does not make the agent the master of the bus. A board that has not confirmed the Stop becomes
+            // safe because it receives no heartbeats, unless another master sends them.
             self.driver.master.end_session();
         }
         let boards = confirmed.into_iter().collect();
@@ -49,8 +49,8 @@ impl Worker {
         self.settle();
     }
 
-    /// Returns the boards that may run: boards that this agent has started, and boards that were started or
-    /// running in their last known state. After a reboot, a board does not run.
+    /// Returns the boards that may run: boards that this agent has started, and boards whose last known state
+    /// was started or running. A board does not run after a reboot.
     fn may_run(&mut self) -> BTreeSet<u8> {
         let (boards, now_us) = (self.driver.master.boards(), self.driver.now_us());
         for (number, _) in boards.iter().filter(|(_, board)| board.rebooted) {

@@ -1,4 +1,4 @@
-//! Work on the bus in turns, and the resulting knowledge about the boards.
+//! Worker, which executes requests on the bus in turns and stores the results about the boards.
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
@@ -17,17 +17,17 @@ use super::shared::Shared;
 use crate::event::ChainEvent;
 use crate::snapshot::Values;
 
-/// Maximum wait in one turn.
+/// Maximum waiting time in one turn.
 const TURN: Duration = Duration::from_millis(5);
-/// Time for which the agent listens before its first query, because another PC may be the master of the bus (D-08).
+/// Time for which the agent only listens before its first query. Another PC may be the master of the bus (D-08).
 const LISTEN: Duration = Duration::from_millis(600);
-/// Time for which requests without the lease do not query a board again after it returned no names.
+/// Time for which requests without the lease do not query a board again after the board returned no names.
 const LEFT_ALONE: Duration = Duration::from_secs(3);
 
-/// Session of the bus and its data.
+/// Session on the bus, and the data of this session.
 pub(crate) struct Worker {
     pub session: Session,
-    /// Records of the images that updates wrote to boards.
+    /// Records of the images that firmware updates wrote to boards.
     pub records: FlashRecords,
     shared: Arc<Shared>,
     pub(super) local: Rc<RefCell<Local>>,
@@ -48,7 +48,7 @@ impl DerefMut for Worker {
 }
 
 impl Worker {
-    /// Creates a session on this link.
+    /// Creates a worker with a session on `link`.
     pub(super) fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
         let Config { profile, signals, cache, cleanup, inventory } = config;
         let local = Rc::default();
@@ -68,7 +68,7 @@ impl Worker {
             if !looked && start.elapsed() >= LISTEN {
                 looked = true;
                 if self.driver.master.competing_master().is_none() {
-                    // A client can request another scan; the next turn detects a lost bus.
+                    // If the scan fails, a client can request another scan. If the bus is lost, the next turn detects the loss.
                     let _ = self.driver.run(Request::Scan);
                 }
             }
@@ -77,16 +77,16 @@ impl Worker {
             {
                 self.serve_one(turn);
                 self.turn()?;
-                // This is called here as well, because queries may arrive without a pause.
+                // `rest` must also be called between requests, because queries may arrive without a pause.
                 self.rest();
             }
             self.rest();
         }
-        // If a Stop was requested just before the end, its frames are sent here.
+        // If a client requested a Stop just before the end, this turn sends its frames.
         self.turn()
     }
 
-    /// Runs one turn of the bus. Also checks the leases: see [`Hand`].
+    /// Runs one turn of the bus. Also checks the leases; see [`Hand`].
     fn turn(&mut self) -> Result<(), SessionError> {
         self.session.turn(TURN)?;
         let events = self.session.look().into_iter().map(|notice| {
@@ -97,37 +97,38 @@ impl Worker {
         Ok(())
     }
 
-    /// Continues the heartbeats while a client holds the lease.
+    /// Ends the heartbeats if no client holds the lease and this agent has started no board.
     fn rest(&mut self) {
         let commands = self.shared.is_commanded();
         self.session.rest(commands);
     }
 
-    /// Publishes the snapshot and the events of a request, and marks the request as ended, before its client receives the answer.
+    /// Publishes the snapshot and the events of a request and marks the request as ended. The snapshot is published and the
+    /// request ends before the client receives the answer.
     pub(super) fn settle(&mut self) {
         self.local.borrow_mut().published = None;
-        // If the bus is lost, the next turn detects this.
+        // If the bus is lost, the next turn detects the loss.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }
 
-    /// Does one request.
+    /// Executes one request.
     fn serve_one(&mut self, turn: owner::Turn<Self, Tag>) {
-        // Background queries must not keep a board busy.
+        // The queries that the session sends in the background must not keep a board busy.
         self.quiet();
         self.local.borrow_mut().job = turn.tag.job;
         turn.run(self);
         self.local.borrow_mut().job = None;
-        // Requests that were abandoned or did not begin have not called `settle`.
+        // A request that was abandoned or did not begin has not called `settle`.
         self.shared.queue.done();
     }
 
-    /// Returns the problem for an error of the session. If a Stop or the end of the agent caused the error, returns
-    /// the problem for this cause instead.
+    /// Returns the problem for an error of the bus session. If a Stop or the end of the agent caused the error, returns the
+    /// problem for that cause instead.
     pub(crate) fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
             let kind = match (error.kind(), error) {
-                // The agent and the bus are available; only the board is not.
+                // The agent and the bus are available; only the board is not available.
                 (
                     ErrorKind::NoLink,
                     SessionError::Procedure(_) | SessionError::NoBoards | SessionError::NoNumbers { .. },
@@ -139,8 +140,8 @@ impl Worker {
         self.shared.why_cancelled()
     }
 
-    /// Returns the names and meanings of the values of a board, for requests without the lease. If a board returned
-    /// no names, the agent does not query it again for 3 s, because commands wait during a query.
+    /// Returns the names and meanings of the values of a board, for requests without the lease. If a board returned no names, the
+    /// agent does not query this board again for 3 s, because commands wait during a query.
     pub(crate) fn known_to_viewers(&mut self, board: u8) -> Result<Arc<Known>, Problem> {
         if let Some((at, problem)) = self.local.borrow().nameless.get(&board)
             && at.elapsed() < LEFT_ALONE
@@ -158,7 +159,7 @@ impl Worker {
         })
     }
 
-    /// Returns the known values of a board.
+    /// Returns the last known values of a board.
     pub(crate) fn values_of(&self, known: &Arc<Known>) -> Values {
         let (master, board) = (&self.driver.master, known.board);
         let outputs = self.held.borrow().snapshots.get(&board).cloned();

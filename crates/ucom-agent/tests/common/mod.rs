@@ -1,4 +1,4 @@
-//! Agent with a simulated chain in this process, and HTTP requests to the agent.
+//! Starts an agent with a simulated chain in this process, and sends HTTP requests to the agent.
 
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -45,22 +45,24 @@ impl Chain {
                 let given: Vec<_> = lines.try_iter().collect();
                 given.iter().for_each(|(line, _)| server.fault(line));
                 server.turn(Duration::from_millis(20));
-                // The fault has begun during this turn. Dropping the sender resumes the waiting test.
+                // The fault has begun in this turn of the simulation. Dropping the sender resumes the
+                // test that waits for the fault.
                 drop(given);
             }
         });
         Self { url: url.recv().expect("it listens"), faults, ended, thread: Some(thread) }
     }
 
-    /// Starts a fault, and returns when the fault has started.
+    /// Starts a fault of the simulated chain, and returns when the fault has started.
     pub(crate) fn fault(&self, line: &str) {
         let (begun, begins) = channel();
         self.faults.send((line.into(), begun)).expect("it goes on");
-        // The channel carries no message. This wait ends when the thread of the chain drops the sender.
+        // The channel transmits no messages. The wait ends when the thread of the chain drops the
+        // sender.
         begins.recv().unwrap_or_default();
     }
 
-    /// Joins the bus as a device that only sends and receives frames.
+    /// Joins the bus as a device that only sends and receives plain frames.
     pub(crate) fn peer(&self) -> Box<dyn CanBus + Send> {
         can_link::open(&self.url).expect("the bus opens")
     }
@@ -79,7 +81,7 @@ impl Drop for Chain {
     }
 }
 
-/// Waits for a frame with this identifier and this data on a bus; returns the waiting time.
+/// Waits on a bus for a frame with this identifier and this data; returns the waiting time.
 pub(crate) fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     let begun = Instant::now();
     let what = format!("{id:03X}#{data:02X?}");
@@ -87,7 +89,7 @@ pub(crate) fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     begun.elapsed()
 }
 
-/// Waits for a frame on a bus for which `is` returns `true`.
+/// Waits on a bus for a frame for which `is` returns `true`.
 pub(crate) fn frame_when(peer: &mut dyn CanBus, what: &str, is: impl Fn(&CanFrame) -> bool) {
     let mut patience = Patience::begin();
     let mut next = || patience.wait(what, |time| peer.receive(time)).expect("the bus is there");
@@ -119,7 +121,7 @@ impl Served {
         Self::start_as(boards, Config::default())
     }
 
-    /// Like `start`, but with this configuration of the agent.
+    /// Like `start`, but with the agent configuration `config`.
     pub(crate) fn start_as(boards: usize, config: Config) -> Self {
         let chain = Chain::start(boards);
         let dir = tempfile::tempdir().expect("a directory");
@@ -142,12 +144,13 @@ impl Served {
         Self { chain, tokens, log: log_path, http, ended, thread: Some(thread), _dir: dir }
     }
 
-    /// Starts an agent with a numbered chain, and takes the lease. Also returns the lease key.
+    /// Starts an agent with a chain of numbered boards, and takes the lease. Also returns the key of
+    /// the lease.
     pub(crate) fn numbered(boards: usize) -> (Self, String) {
         Self::numbered_as(boards, Config::default())
     }
 
-    /// Like `numbered`, but with this configuration of the agent.
+    /// Like `numbered`, but with the agent configuration `config`.
     pub(crate) fn numbered_as(boards: usize, config: Config) -> (Self, String) {
         let served = Self::start_as(boards, config);
         let key = served.lease("anna", 60.0, "continue");
@@ -156,7 +159,7 @@ impl Served {
         (served, key)
     }
 
-    /// Takes the lease and returns its key.
+    /// Takes the lease and returns the key of the lease.
     pub(crate) fn lease(&self, name: &str, lasts_s: f64, policy: &str) -> String {
         let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
         let (status, grant) = self.api("POST /api/lease", None, Some(body));
@@ -184,7 +187,7 @@ impl Served {
         }
     }
 
-    /// Starts a job, waits for its end and returns the job.
+    /// Starts a job, waits for its end, and returns the job.
     pub(crate) fn job(&self, request: &str, key: &str, body: Option<Value>) -> Value {
         self.over(self.begin(request, key, body))
     }
@@ -200,7 +203,7 @@ impl Served {
         self.api(&format!("GET /api/boards/{number}"), None, None).1
     }
 
-    /// Waits until `is` returns `true` for the board, and returns the board.
+    /// Waits until `is` returns `true` for the board, then returns the board.
     pub(crate) fn board_when(&self, number: u8, what: &str, is: impl Fn(&Value) -> bool) -> Value {
         let mut patience = Patience::begin();
         loop {

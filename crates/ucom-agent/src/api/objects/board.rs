@@ -1,4 +1,4 @@
-//! Boards in their last known state, boards that a scan found, and boards that answered a command.
+//! Boards in their last known state, boards that a scan has found, and boards that have answered a command.
 use ucom::{Profile, Status};
 use ucom_host::date_text;
 use ucom_host::master::{Board, BoardSeen, Life};

@@ -1,4 +1,4 @@
-//! Status of the bus, and the lease.
+//! Status of the bus, and the lease of the agent.
 use agent_kit::access::Role;
 use utoipa::ToSchema;
 
@@ -84,7 +84,7 @@ pub(crate) struct ControllerObject {
 }
 
 impl StatusObject {
-    /// Returns the status for a snapshot; values that are not in the snapshot are empty.
+    /// Returns the bus status for a snapshot; values that are not in the snapshot are empty.
     pub(crate) fn of(snapshot: &BusSnapshot) -> Self {
         let (statistics, now_us) = (&snapshot.statistics, snapshot.now_us);
         Self {

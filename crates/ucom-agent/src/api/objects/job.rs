@@ -1,4 +1,4 @@
-//! Jobs and their results.
+//! Jobs of the agent and their results.
 use agent_kit::api::Problem;
 use host_kit::{Diagnose as _, Facts, Finding, FrontEnd, Severity};
 use ucom_host::master::update::{UpdateReport, UpdateResult};

@@ -1,4 +1,4 @@
-//! Values of boards by name, with units if the signal table contains them.
+//! Values of boards by name. Values have units if the signal table contains the units.
 use serde_json::Value;
 use ucom_host::files::Signal;
 use ucom_host::master::Life;
@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use crate::snapshot::{BusSnapshot, Values};
 
-/// Age after which outputs are outdated, in µs.
+/// Age from which the outputs of a board are outdated, in µs.
 const OLD_US: u64 = 500_000;
 
 /// Values of a board.
@@ -58,7 +58,7 @@ pub(crate) struct ValueObject {
 }
 
 impl ValueObject {
-    /// Returns the value of a signal for its word.
+    /// Returns the value of a signal for the word that a board has sent.
     pub(crate) fn of(name: &str, index: usize, signal: Option<&Signal>, word: Option<u16>) -> Self {
         let value = |word: u16| signal.map_or_else(|| Value::from(word as i16), |signal| signal.json(word));
         let unit = signal.filter(|signal| signal.known && !signal.unit.is_empty());

@@ -1,4 +1,4 @@
-//! The command line: commands, options, their environment variables and examples.
+//! Command line of `ucom`: commands, options, their environment variables and examples.
 
 mod boards;
 mod firmware;
@@ -382,8 +382,8 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// Returns `true` if the command changes boards: if its result cannot be printed, this is then a fault of
-    /// the run, not of the command line.
+    /// Returns `true` if the command changes boards. If the result of a command that changes boards cannot be printed,
+    /// the error is a fault of the run, not of the command line.
     pub(crate) fn acts(&self) -> bool {
         match self {
             Self::Init(_)
@@ -427,7 +427,7 @@ mod tests {
     use super::*;
     use clap::CommandFactory;
 
-    /// Compares docs/commands-ucom.md with the command line; `UPDATE_DOCS=1` writes the file.
+    /// Compares docs/commands-ucom.md with the command line; with `UPDATE_DOCS=1`, writes docs/commands-ucom.md.
     #[test]
     fn the_page_of_the_commands_is_made_from_them() {
         let opening = "This page is generated from the definition of the command line, like `ucom COMMAND --help` and the manual pages. The \

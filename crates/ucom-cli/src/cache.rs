@@ -9,11 +9,12 @@ use ucom_host::session::Cache;
 
 use crate::args::{CacheArgs, LinkArgs};
 
-/// Default signal table.
+/// Path of the default signal table.
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 impl LinkArgs {
-    /// Loads the signal table. If the file does not exist, the table is empty.
+    /// Loads the signal table. If the user specifies no file and the default file does not exist, the
+    /// signal table is empty.
     pub(crate) fn signal_table(&self) -> Result<SignalTable, Failure> {
         let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
@@ -31,7 +32,7 @@ impl CacheArgs {
         Cache::new(self.directory(), self.fresh)
     }
 
-    /// Returns the folder of the cache; `None` if no folder can be determined.
+    /// Returns the folder of the cache; `None` if the folder cannot be determined.
     fn directory(&self) -> Option<PathBuf> {
         self.cache.clone().or_else(|| Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom")))
     }

@@ -1,4 +1,4 @@
-//! The commands. Each file in this folder contains one command or one group of commands.
+//! Commands of `ucom`. Each file in this folder contains one command or one group of commands.
 
 mod boards;
 mod chain;
@@ -29,7 +29,7 @@ use cli_kit::{Failure, Output, pages};
 
 use crate::args::{Command, LinkArgs};
 
-/// Runs the command.
+/// Runs a command of `ucom`.
 pub(crate) fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Sim(args) => sim::sim(&args, link, out),

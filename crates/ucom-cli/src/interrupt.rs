@@ -1,5 +1,6 @@
-//! Ctrl-C: the first Ctrl-C cancels the command, which completes the steps that it has started. The second Ctrl-C
-//! ends the process at once, and prints the remaining steps and the command for them.
+//! Processing of Ctrl-C. The first Ctrl-C cancels the command, which still completes the steps that it has
+//! started. The second Ctrl-C ends the process at once. The second Ctrl-C also prints the remaining steps and
+//! the command for them.
 
 use std::io::Write;
 use std::time::Duration;
@@ -8,15 +9,15 @@ use cli_kit::exit::FAULT;
 use cli_kit::{Stop, print_within};
 use ucom_host::session::CleanupList;
 
-/// Maximum wait for a blocked reader.
+/// Maximum wait for a blocked reader of stderr.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(300);
 
-/// Starts the handling of Ctrl-C.
+/// Starts the processing of Ctrl-C.
 pub(crate) fn listen(cleanup: &CleanupList) -> std::io::Result<Stop> {
     let cleanup = cleanup.clone();
     Stop::listen_with(move || {
         let words = cleanup.words();
-        // Files that were created but not written are removed.
+        // Output files that the command has created but not written are removed.
         cli_kit::output_file::abandon();
         print_within(PRINT_TIMEOUT, move || {
             let _ = std::io::stderr().write_all(words.as_bytes());

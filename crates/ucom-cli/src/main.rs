@@ -1,5 +1,5 @@
-//! The `ucom` command: parses the command line, calls the libraries, and prints. Results are written to stdout,
-//! progress and logs to stderr.
+//! The program `ucom`: parses the command line, calls the libraries, and prints. The program writes results to
+//! stdout, and progress and logs to stderr.
 #![forbid(unsafe_code)]
 
 mod args;
@@ -16,7 +16,7 @@ use cli_kit::{Output, exit, print_within};
 
 use args::Cli;
 
-/// Maximum wait for a blocked reader at the end.
+/// Maximum wait for a blocked reader when the program ends.
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             let exit = exit::of(failure.kind);
             if !failure.is_shown() {
-                // If earlier output blocks stdout, the failure is printed on stderr without JSON.
+                // If earlier output blocks stdout, the program prints the failure on stderr, without JSON.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }

@@ -1,4 +1,4 @@
-//! Session of the command line: bus and profile, Ctrl-C, and notes on stderr.
+//! Bus session of a command: bus and profile, Ctrl-C, and notes on stderr.
 
 use cli_kit::{Diagnose, Failure, Lines, Stop};
 use serde_json::{Value, json};
@@ -26,7 +26,7 @@ impl Operator for Console {
 }
 
 impl LinkArgs {
-    /// Returns the profile, or the default profile if no file is selected.
+    /// Returns the protocol profile, or the default profile if the user selects no file.
     pub(crate) fn profile(&self) -> Result<Profile, Failure> {
         let Some(path) = &self.profile else { return Ok(Profile::default()) };
         let text =
@@ -45,17 +45,17 @@ impl LinkArgs {
         })
     }
 
-    /// Opens the bus.
+    /// Opens the bus that the user has selected.
     pub(crate) fn open(&self) -> Result<Link, Failure> {
         Ok(Link::open(self.url()?)?)
     }
 
-    /// Opens a session on the bus.
+    /// Opens a session on the bus that the user has selected.
     pub(crate) fn session(&self) -> Result<Driver, Failure> {
         self.session_with(self.profile()?)
     }
 
-    /// Like [`Self::session`], but with another profile than that of the command line.
+    /// Like [`Self::session`], but with another profile than the one of the command line.
     pub(crate) fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
         let cleanup = CleanupList::default();
         let console = Console { stop: listen(&cleanup)?, notes: Lines::stderr()? };
@@ -63,7 +63,7 @@ impl LinkArgs {
     }
 }
 
-/// Returns the board numbers that two boards share, in the format of `--json`.
+/// Returns the board numbers that two boards share, in the format for `--json`.
 pub(crate) fn shared_numbers(master: &Master) -> Vec<Value> {
     let value = |e: &Error| {
         let Error::Identity(IdentityError::NumberShared { board, found, .. }) = e else { return Value::Null };

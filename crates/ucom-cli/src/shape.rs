@@ -1,4 +1,4 @@
-//! Conversion of boards to text and JSON, in the same format for all commands.
+//! Conversion of boards to text and JSON. All `ucom` commands use the same format for boards.
 
 use cli_kit::table;
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ pub(crate) fn bits(status: Status) -> Vec<&'static str> {
     Status::NAMES.iter().filter(|(_, bit)| status.has(*bit)).map(|(name, _)| *name).collect()
 }
 
-/// Returns the values of DSP_INFO.
+/// Returns the values of DSP_INFO in the format for `--json`.
 pub(crate) fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
     let application = info.has_application();
     json!({
@@ -26,14 +26,14 @@ pub(crate) fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Val
     })
 }
 
-/// Returns a board and its description.
+/// Returns a board and its description in the format for `--json`.
 pub(crate) fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
     let mut value = info_value(board.number, &board.info, profile);
     value["description"] = json!(board.description);
     value
 }
 
-/// Returns boards as a table.
+/// Returns boards as a table of text.
 pub(crate) fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
     let row = |b: &BoardSeen| {
         let (program, day) = match b.info.has_application() {

@@ -1,4 +1,5 @@
-//! Tests of CAN controllers that go bus-off and recover: the controllers of simulated boards and of clients of `ucom sim`.
+//! Tests of CAN controllers that go bus-off and recover. The controllers belong to simulated boards and to clients of
+//! `ucom sim`.
 #![cfg(unix)]
 
 use crate::common;
@@ -11,7 +12,7 @@ fn bus_off_is_not_for_ever() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
     let mut peer = sim.peer();
     sim.fault("disturbed share=1 for_s=2");
-    // Each frame of the client and of the boards is repeated until the sender is bus-off.
+    // Each frame of the client and of the boards is repeated until the controller of the sender is bus-off.
     let during = sim.ucom(&["scan"]);
     assert_ne!(during.code, 0, "{}", during.out);
     std::thread::sleep(std::time::Duration::from_millis(2_000));

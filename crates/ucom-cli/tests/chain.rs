@@ -1,4 +1,4 @@
-//! Tests of commands with `ucom sim`: the chain, process data and recordings.
+//! Tests of `ucom` commands with `ucom sim`: the chain, process data and recordings.
 #![cfg(unix)]
 
 use crate::common;
@@ -36,7 +36,8 @@ fn p1_scan_only_asks() {
     assert!(of_pc.is_empty(), "{of_pc:?}");
 }
 
-/// P-2: tests chains of 0, 1 and 31 boards. The inventory is written and compared; if it differs from the chain, the file is not changed.
+/// P-2: the test uses chains of 0, 1 and 31 boards. The command writes the inventory and compares it with the chain. If the inventory
+/// differs from the chain, the file is not changed.
 #[test]
 fn p2_init_of_chains_and_their_inventory() {
     let sim = Sim::start(&["--boards", "0"]);
@@ -68,7 +69,7 @@ fn p2_init_of_chains_and_their_inventory() {
     sim.ucom(&["init", "--renew"]).ends(0);
 }
 
-/// D-24, 5.4: the report of a broken wire contains the position of the fault.
+/// D-24, 5.4: the report about a broken init wire contains the position of the fault.
 #[test]
 fn a_broken_init_wire_is_reported_with_its_place() {
     let mut sim = Sim::start(&["--boards", "4"]);
@@ -79,7 +80,7 @@ fn a_broken_init_wire_is_reported_with_its_place() {
     assert!(text.contains("after position 2") && text.contains("0x23") && text.contains("0x31"), "{text}");
 }
 
-/// D-T21: two boards with the same flash number send a single report, but are detected as two boards.
+/// D-T21: two boards with the same flash number send only one report on the bus, but the command detects them as two boards.
 #[test]
 fn d07_equal_flash_ids_are_found_out() {
     let sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x22,0x22"]);
@@ -95,7 +96,7 @@ fn status_bits_are_set_and_cleared_by_name() {
     assert_eq!(status["boards"][0]["status_byte"], 0x5B);
     let status = sim.json(&["status", "2", "--clear", "astart"], 0);
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
-    // D-T8: the status byte is correct in all states.
+    // D-T8: the status byte of the board is correct in all states.
     let byte = |words: &[&str]| sim.ucom(words).ends(0).json()["boards"][0]["status_byte"].clone();
     assert_eq!(byte(&["--json", "xreset", "1"]), 0x1F);
     assert_eq!(byte(&["--json", "start", "1"]), 0x8B);
@@ -114,13 +115,13 @@ fn names_inputs_and_motion() {
     let io = sim.json(&["io", "1"], 0);
     assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
     assert_eq!(io["boards"][0]["initial_ci"], json!([0, 1000, 900]));
-    // Under supervision, inputs move the outputs.
+    // While a board is supervised, its inputs move its outputs.
     let so = sim.json(&["ci", "1", "set_position=1500", "--for", "1.5"], 0);
     let position = so["so"]["position"].as_i64().unwrap();
     assert!((1450..1550).contains(&position), "{so}");
     let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
-    // D-35: the values after a write are only assumed, because boards do not report parameters.
+    // D-35: a parameter value after a write is only assumed, because boards do not report parameters.
     let par = sim.json(&["par", "1", "kp=150"], 0);
     assert_eq!(
         (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
@@ -136,17 +137,19 @@ fn names_inputs_and_motion() {
     );
 }
 
-/// P-17, D-08, D-50: while one PC runs the boards, a second PC is refused. If the first PC is lost, the boards become safe.
+/// P-17, D-08, D-50: while one PC runs the boards, the commands of a second PC are refused. If the first PC is lost, the boards become
+/// safe.
 #[test]
 fn p17_one_master_at_a_time_and_none_is_safe() {
     let sim = Sim::numbered(&["--boards", "2"]);
     let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
     let mut peer = sim.peer();
     peer.wait("601#01010000");
-    // Listening is allowed: the names were requested before the loop started, or are already known.
+    // The second PC may listen to the outputs of the boards. The names were requested before the control loop started, or are already
+    // known.
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["position"].is_i64(), "{so}");
-    // Identity requests are allowed as well, because the PC that runs the boards interprets the answers correctly.
+    // The second PC may also request identities, because the first PC interprets the answers correctly.
     let scan = sim.json(&["scan"], 0);
     assert_eq!(
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
@@ -157,7 +160,7 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
-    // After kill -9 no stop is sent, so the board itself must stop.
+    // After kill -9, the PC sends no stop, so the board itself must stop.
     ended_by(run, "-KILL");
     peer.wait("601#00000000");
     let status = sim.json(&["status", "1"], 0);
@@ -179,7 +182,7 @@ fn run_stops_in_order() {
     assert_eq!(status["boards"][1]["status_byte"], 0x1B);
 }
 
-/// P-19: if the bus load would be too high, the run is refused before the loops start.
+/// P-19: if the bus load would be too high, the run is refused before any control loop starts.
 #[test]
 fn p19_load_is_refused() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -225,7 +228,7 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
     }
 }
 
-/// P-20: the probe measures the profile of a board with another byte order.
+/// P-20: the command `probe` measures the profile of boards with another byte order.
 #[test]
 fn p20_probe_finds_big_endian_boards() {
     let chain = tempfile::tempdir().unwrap();
@@ -240,8 +243,8 @@ fn p20_probe_finds_big_endian_boards() {
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
-/// If Ctrl-C is pressed while a board moves, the board is stopped at once. The supervision of the board itself,
-/// which detects a lost PC, would stop the board later.
+/// If the user presses Ctrl-C while a board moves, the command stops the board at once. The board's own supervision, which detects the
+/// loss of the PC, would stop the board later.
 #[test]
 fn an_interrupted_motion_is_stopped() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -250,7 +253,7 @@ fn an_interrupted_motion_is_stopped() {
     peer.wait("601#01010000");
     peer.wait("381#");
     signal(&moving, "-INT");
-    // The PC sends run = 0 before the board timeout of 1.5 s.
+    // The PC sends run = 0 before the board's timeout of 1.5 s.
     let since = std::time::Instant::now();
     peer.wait("601#00000000");
     assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
@@ -258,7 +261,7 @@ fn an_interrupted_motion_is_stopped() {
     assert_eq!(output.code, 0, "{}", output.err);
 }
 
-/// D-15, D-34: if this PC does not run the control loop, the command sends only the requested input and does not write other inputs.
+/// D-15, D-34: if this PC does not run the control loop, the command sends only the requested input and no other inputs.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -268,7 +271,7 @@ fn d34_an_input_leaves_its_neighbours_alone() {
     assert_eq!(peer.wait("341#"), "341#0000DC05");
 }
 
-/// D-36: two boards have the same image, Program ID and date. The names of one board are not used to move the other board.
+/// D-36: two boards have the same image, Program ID and date. The command never uses the names of one board to move the other board.
 #[test]
 fn d36_one_image_on_boards_that_differ() {
     let sim = Sim::numbered(&[]);
@@ -280,7 +283,7 @@ fn d36_one_image_on_boards_that_differ() {
     let other = io(&["--json", "io", "7"]);
     assert_ne!(first["ci"], other["ci"], "the simulator's boards differ");
     assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
-    // Copies the names of another board to the cache file of a board with the same program and date.
+    // The test copies the names of another board to the cache file of a board with the same program and date.
     let kept = |board: &str| {
         let info = sim.json(&["info", board], 0)["boards"][0].clone();
         let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
@@ -296,7 +299,7 @@ fn d36_one_image_on_boards_that_differ() {
     sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
 }
 
-/// If one of several boards is missing, the command ends before any change. Completed changes are reported.
+/// If one of several boards does not answer, the command ends before any change. The command reports changes that were completed.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -311,7 +314,7 @@ fn several_boards_are_changed_only_when_all_answer() {
     }
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{received:?}");
-    // The board has lost its number, and a status that was not received is not shown.
+    // The board has lost its number. The command `status` does not show a status that it has not received.
     let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
     assert!(output.out.contains("lost its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
@@ -322,13 +325,13 @@ fn several_boards_are_changed_only_when_all_answer() {
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
 
-/// D-T21: two boards with the same flash number send their reports at the same time with the same bits. On the bus,
-/// these two reports are a single frame.
+/// D-T21: two boards with the same flash number send their reports at the same time with the same bits. On the bus, the two reports are a
+/// single frame.
 #[test]
 fn d_t21_reports_that_are_alike_are_one_frame() {
     let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x21"]);
     let mut peer = sim.peer();
-    // The boards need this time to boot.
+    // The test waits 0.6 s, because the boards must first boot.
     peer.all(600);
     peer.send("240#");
     let reports: Vec<String> = peer.all(600).into_iter().filter(|f| f.starts_with("441#")).collect();
@@ -338,7 +341,8 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     assert!(output.out.contains("more boards than reports"), "{}", output.out);
 }
 
-/// Single frames are sent unchanged. Frames that change boards need a confirmation. Either all frames are sent, or none.
+/// The command `send` sends single frames unchanged. Frames that change boards need the confirmation `--intrusive`. Either all frames of
+/// the command line are sent, or none of them.
 #[test]
 fn single_frames_can_be_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -356,7 +360,7 @@ fn single_frames_can_be_sent() {
     sim.ucom(&["send", "xyz"]).ends(2);
 }
 
-/// If the user specifies a name twice, this is an error, because the value is ambiguous.
+/// If the user specifies the same name twice, the command reports an error, because the value is ambiguous.
 #[test]
 fn a_name_given_twice_is_refused() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -369,7 +373,8 @@ fn a_name_given_twice_is_refused() {
     assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
 }
 
-/// Boards without a number reveal only the format of their reports, and the command reports this.
+/// Boards without a number show only the format of their reports. The command `probe` reports that it could measure only the format of
+/// the reports.
 #[test]
 fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     let sim = Sim::start(&["--boards", "2"]);

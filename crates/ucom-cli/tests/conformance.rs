@@ -6,7 +6,7 @@ use crate::common;
 use common::{Sim, ended_by};
 use serde_json::json;
 
-/// D-T2, D-T5, D-T10, D-T11: the tests that only send requests pass on simulated boards, in both byte orders.
+/// D-T2, D-T5, D-T10, D-T11: simulated boards pass the tests that only send requests, in both byte orders.
 #[test]
 fn simulated_boards_conform() {
     for endian in ["little", "big"] {
@@ -30,7 +30,7 @@ fn simulated_boards_conform() {
         assert_eq!(output["passed"], 2, "{output}");
         ucom(&["conformance", "--only", "D-T99"]).ends(2);
         ucom(&["conformance", "1", "--init"]).ends(2);
-        // The user must select exactly one board, and this board must be the intended board.
+        // The user must select exactly one board, and this board must have the expected identity.
         let image = dir.path().join("image.bin");
         std::fs::write(&image, [0xA5; 256]).unwrap();
         let image = image.to_str().unwrap();
@@ -56,7 +56,8 @@ fn running_loops_are_stopped_first() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// D-22: the formula is applied literally, and the command shows the result that the rules require and the actual result.
+/// D-22: the command applies the formula literally. The command `status --raw` shows the status that the rules
+/// require and the actual status.
 #[test]
 fn d22_raw_status_sets_bits_outside_the_mask() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -67,11 +68,11 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
-    // This command sends a single broadcast frame.
+    // With `status all --raw`, the command sends a single broadcast frame.
     sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);
-    // Without INIT, the board loses its number, as expected.
+    // Without the bit INIT, the board loses its number, as expected.
     let output = sim.json(&["status", "2", "--raw", "0x08:0x00"], 0);
     assert_eq!(
         (&output["boards"][0]["after"], &output["boards"][0]["as_expected"]),

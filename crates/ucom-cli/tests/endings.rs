@@ -1,4 +1,4 @@
-//! Tests of how commands end: blocked readers, a second Ctrl-C, lost boards, and the state after a failed start.
+//! Tests of how commands end: with blocked readers, after a second Ctrl-C, with lost boards, and after a failed start.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,13 +12,13 @@ use common::{Sim, ended_by};
 use serde_json::json;
 use test_kit::patience::until;
 
-/// D-50: stdout has no reader, and its pipe is full from the start. Heartbeats are still sent, the boards continue
-/// to run and are stopped at the end, and the lost output is reported.
+/// D-50: stdout has no reader, and its pipe is full from the start. The PC still sends heartbeats, the boards run until
+/// they are stopped at the end, and the command reports the lost output.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let sim = Sim::numbered(&["--boards", "1"]);
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // Capacity of a pipe.
+    // 65,536 bytes are the capacity of a pipe.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut peer = sim.peer();
     let mut command = sim.command();
@@ -44,7 +44,8 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// If the reader of `so` is blocked, Ctrl-C still works. If the reader has disconnected, `so` ends.
+/// If the reader of the `so` command's output is blocked, Ctrl-C still works. If the reader of the `so` command's output
+/// has disconnected, the command ends.
 #[test]
 fn outputs_that_nobody_reads() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -68,7 +69,8 @@ fn outputs_that_nobody_reads() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// The first Ctrl-C cancels. The second Ctrl-C ends the process at once with exit code 5 and shows the remaining steps.
+/// The first Ctrl-C cancels the command. The second Ctrl-C ends the process at once with exit code 5, and prints the
+/// remaining steps.
 #[test]
 fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -81,7 +83,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
         let child = sim.spawn(words);
         peer.wait(wait_for);
         std::thread::sleep(Duration::from_millis(100));
-        // The boards no longer answer, so the clean-up takes a long time.
+        // The boards no longer answer, so the clean-up of the command takes a long time.
         sim.signal("-STOP");
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
@@ -96,7 +98,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     }
 }
 
-/// Signals that arrive almost at the same time count as one signal, which cancels the command in the normal order.
+/// Signals that arrive almost at the same time count as one signal, so the command is cancelled in the normal order.
 #[test]
 fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -107,18 +109,18 @@ fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// D-51: if a board is lost while other boards are being started, it is reported as lost.
+/// D-51: if a board is lost while other boards are being started, the command reports it as lost.
 #[test]
 fn d51_losses_during_the_start_count() {
     let sim = Sim::numbered(&["--boards", "3"]);
-    // Boards send one heartbeat per second; the timeout of this PC is shorter.
+    // Boards send one heartbeat per second; the timeout of the PC in this test is shorter.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
     let output = sim.ucom(&words).ends(5);
     assert!(output.out.contains("\"stopped\"") && output.err.contains("a board was lost"), "{}", output.err);
 }
 
-/// D-37: the outputs of each board are made safe, even if another board fails.
+/// D-37: the command makes the outputs of each board safe, even if another board fails.
 #[test]
 fn d37_outputs_are_made_safe_although_a_board_is_silent() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -135,7 +137,7 @@ fn d37_outputs_are_made_safe_although_a_board_is_silent() {
     assert!(output.err.contains("board 1: "), "{}", output.err);
 }
 
-/// P-19: after a refusal or a failure, each application has its earlier state again.
+/// P-19: after a refused or failed run, each application is in its earlier state again.
 #[test]
 fn p19_a_refused_run_leaves_nothing_started() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -156,7 +158,7 @@ fn p19_a_refused_run_leaves_nothing_started() {
     assert_eq!(bytes(), before);
 }
 
-/// Before the reset of a single board, the command checks that the board answers.
+/// Before the command resets a single board, it checks that the board answers.
 #[test]
 fn a_reset_of_nobody_is_refused() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -169,14 +171,14 @@ fn a_reset_of_nobody_is_refused() {
     sim.ucom(&["info", "1"]).ends(0);
 }
 
-/// D-26, D-51: a board that rebooted during the run is reported as lost, not as stopped. The exit code is 5, and
-/// the message contains the board number.
+/// D-26, D-51: the command reports a board that rebooted during the run as lost, not as stopped. The exit code is 5, and
+/// the message contains the number of the board that has rebooted.
 #[test]
 fn d26_a_board_that_reboots_under_way_fails_the_run() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["--json", "run", "1,2", "--active", "--on-lost", "report"]);
     sim.peer().wait("602#01010000");
-    // The start needs this time to complete.
+    // The start of the boards needs this time to complete.
     std::thread::sleep(Duration::from_millis(700));
     sim.fault("crash board=2");
     std::thread::sleep(Duration::from_millis(500));
@@ -189,7 +191,8 @@ fn d26_a_board_that_reboots_under_way_fails_the_run() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// Like the test above, but every board answers at the end. A report without a request is still a failure.
+/// In this test, unlike in the test of a board that reboots, every board answers at the end. A report that no PC has
+/// requested still makes the run fail.
 #[test]
 fn d26_a_reboot_counts_even_if_the_board_answers() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -203,7 +206,7 @@ fn d26_a_reboot_counts_even_if_the_board_answers() {
     assert!(output.err.contains("a board has rebooted"), "{}", output.err);
 }
 
-/// A silent board does not delay the stop of other boards, because the stop is broadcast before any request.
+/// A silent board does not delay the stop of other boards, because the stop frames are sent before any request.
 #[test]
 fn a_stop_of_all_does_not_hang_on_one_board() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
@@ -232,7 +235,8 @@ fn a_stop_of_all_does_not_hang_on_one_board() {
     ended_by(run, "-INT").ends(5);
 }
 
-/// Ctrl-C is pressed while a board is started only to read its names. Afterwards, the board is not started.
+/// The test presses Ctrl-C while the command starts a board only to read its names. After the command has ended, the
+/// application of the board is not started.
 #[test]
 fn a_start_for_names_that_is_cancelled_is_undone() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -248,7 +252,8 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
     }
 }
 
-/// If stderr has no reader and its pipe is full, the second Ctrl-C still ends the process. A failure also ends the process.
+/// If stderr has no reader and its pipe is full, the second Ctrl-C still ends the process. If stderr is blocked, a failure
+/// of the command also ends the process.
 #[test]
 fn a_blocked_stderr_does_not_keep_the_process() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -274,8 +279,8 @@ fn a_blocked_stderr_does_not_keep_the_process() {
     }
 }
 
-/// If the result of a command that acts on boards is lost, the command completes and ends with exit code 5. A
-/// command that only prints ends at once.
+/// If a command that changes boards cannot print its result, it completes and ends with exit code 5. If a command that only
+/// prints cannot print its result, it ends at once.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_lost_result_of_what_acts_is_a_fault() {
@@ -293,14 +298,14 @@ fn a_lost_result_of_what_acts_is_a_fault() {
         let mut command = sim.command();
         let child = command.args(words).stdin(Stdio::piped()).stdout(full()).stderr(Stdio::piped()).spawn();
         let child = child.unwrap();
-        // At this time, a frame that the command prints is on the bus.
+        // After the wait, the test sends a frame that the command prints.
         std::thread::sleep(Duration::from_millis(300));
         peer.send("641#0000");
         let output = ended(child).ends(code);
         assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }
     assert_eq!(sim.status_byte("1"), 0x1B, "stopped all the same");
-    // A reader that has disconnected does not cause an error.
+    // If the reader of stdout has disconnected, this is not an error.
     for words in [&["decode", "--live"][..], &["record", "-"], &["--json", "monitor"]] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
@@ -314,7 +319,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
     }
 }
 
-/// The second Ctrl-C ends every command in this way: exit code 5, and the list of remaining steps.
+/// The second Ctrl-C ends every command with exit code 5 and a list of the remaining steps.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -327,7 +332,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // The output has no reader and its pipe is full, so the first signal has no visible effect.
+        // The output of the command has no reader and its pipe is full, so the first signal has no visible effect.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();
@@ -340,7 +345,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
         let output = ended_by(child, "-INT");
-        // If a process could react to the first signal, it has already ended.
+        // A process that could react to the first signal has already ended.
         let alike = output.code == 5 && output.err.contains("ended at once; nothing was changed");
         assert!(
             alike || (words[0] == "replay" && output.code == 0),
@@ -351,7 +356,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
     }
 }
 
-/// A decoder that waits for stdin still reacts to Ctrl-C, and decodes the input that arrived before.
+/// If the command `decode` waits for stdin, it still reacts to Ctrl-C, and decodes the input that arrived before.
 #[test]
 fn a_decoder_of_stdin_hears_ctrl_c() {
     let sim = Sim::start(&["--boards", "0"]);

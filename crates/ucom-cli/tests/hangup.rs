@@ -8,7 +8,7 @@ use std::time::Duration;
 use cli_kit::testing::{ended, signal};
 use common::{Sim, ended_by};
 
-/// Like Ctrl-C, a closed terminal ends running control loops and programming.
+/// Like Ctrl-C, a closed terminal ends running control loops and the programming of boards.
 #[test]
 fn a_hangup_stops_in_order() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -25,7 +25,7 @@ fn a_hangup_stops_in_order() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
 }
 
-/// After such a signal, `ci --for` stops the board, `monitor` ends, and a recording is complete.
+/// After SIGHUP or SIGTERM, `ci --for` stops the board, `monitor` ends, and a recording is complete.
 #[test]
 fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -33,7 +33,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        // This wait is long enough for a complete snapshot on a loaded computer. Without a snapshot the command has no values to show.
+        // The wait for 50 output frames is long enough for a complete snapshot of the outputs on a loaded computer. Without a
+        // snapshot, the command has no outputs to show.
         peer.wait_for(50, "381#");
         signal(&child, name);
         peer.wait("601#00000000");
@@ -63,8 +64,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     }
 }
 
-/// If a recorder is killed, it loses at most one second of frames in each format. If the file format shows that
-/// the end of the file is missing, the command reports this.
+/// If a recorder is killed, it loses at most the frames of one second, in each file format. If the file format shows that the end of a
+/// recording is missing, the command reports the missing end.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -76,7 +77,7 @@ fn a_killed_recorder_leaves_what_was_recorded() {
         std::thread::sleep(Duration::from_millis(3_300));
         ended_by(child, "-KILL");
         let output = sim.ucom(&["decode", &file]).ends(0);
-        // The output contains at least two packages every 10 ms, for more than a second.
+        // The output contains at least two frames every 10 ms, for more than a second.
         let frames = output.out.lines().count();
         assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
         assert!(ending != "mcap" || output.err.contains("the file ends after"), "{ending}: {}", output.err);

@@ -1,11 +1,12 @@
-//! Tests of accepted firmware files: records, raw binary in a `.bin` file, and other files only on request.
+//! Tests of firmware files: record files, raw binary in a `.bin` file, and other files only on request.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, image};
 
-/// A text file is refused before any frame is sent; the error contains the position. The images and targets are shown.
+/// The command refuses a text file before it sends any frame; the error contains the position in the file. The command shows the images
+/// and the targets of the update.
 #[test]
 fn d40_a_text_is_never_flashed() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -39,7 +40,8 @@ fn d40_a_text_is_never_flashed() {
     assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
 }
 
-/// The hint about a damaged record file never suggests to write its characters to the board. `--raw` does not write them either.
+/// The hint about a damaged record file never suggests to write the characters of the file to the board. The option `--raw` does not write
+/// the characters of a record file either.
 #[test]
 fn d46_raw_does_not_flash_records() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -77,7 +79,8 @@ fn d46_raw_does_not_flash_records() {
     assert!(peer.all(50).is_empty(), "nothing was sent");
 }
 
-/// A count record with the correct number ends a file of S-records. Gaps are filled on request, and the hint contains the option for this.
+/// A count record with the correct number may end a file of S-records. The command fills gaps in an image on request, and its hint names
+/// the option `--fill-gaps`.
 #[test]
 fn count_records_and_gaps() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -99,8 +102,8 @@ fn count_records_and_gaps() {
     assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
 }
 
-/// The tool chain of the boards counts S-record addresses in words; other tools count bytes. The unit is
-/// determined from the records, or from `--addresses`.
+/// The tool chain of the boards counts S-record addresses in words; other tools count addresses in bytes. The command determines the unit
+/// of the addresses from the records, or from `--addresses`.
 #[test]
 fn s_records_count_words_or_bytes() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);

@@ -1,5 +1,6 @@
-//! Tests of boards that leave their control loop while `ucom run` supervises them (D-37). The command reports this
-//! at once: by an event of `--json`, by outdated values, and by exit code 5.
+//! Tests of boards that leave their control loop while `ucom run` supervises them (D-37). The command `run` reports
+//! at once that a board has left its loop, by an event of `--json` and by outdated values. The command `run` then
+//! ends with exit code 5.
 
 use crate::common;
 
@@ -13,7 +14,7 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::patience::Patience;
 
-/// Running `ucom --json run` command and its events.
+/// `ucom --json run` command that is running, and its events.
 struct Running {
     child: Child,
     events: Receiver<Value>,
@@ -50,7 +51,7 @@ impl Running {
         self.ended()
     }
 
-    /// Waits until the command ends without a signal.
+    /// Waits until the command ends by itself, without a signal.
     fn ended(mut self) -> (i32, String) {
         let mut err = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
@@ -62,7 +63,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
     move |event| event["event"] == name && event["board"] == board
 }
 
-/// A board receives no heartbeats of the PC (D-50) and leaves its loop, while the other board continues.
+/// One board receives no heartbeats of the PC (D-50) and leaves its control loop, while the other board continues.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -74,7 +75,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!(so["stale"], true, "{so}");
     let so = run.until(of(2, "so"));
     assert_eq!(so["stale"], false, "{so}");
-    // The age of outdated values increases, and their time does not change.
+    // The age of outdated values increases, and the time of these values does not change.
     let (first, second) = (run.until(of(1, "so")), run.until(of(1, "so")));
     assert_eq!((first["time_s"].clone(), &second["stale"]), (second["time_s"].clone(), &Value::Bool(true)));
     assert!(second["age_s"].as_f64() > first["age_s"].as_f64(), "{first} {second}");
@@ -86,7 +87,8 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2], "stopped");
 }
 
-/// Another PC stops all boards. Each stop of a board is reported; without `--json`, as text.
+/// Another PC stops all boards. The command reports each stop of a board; without `--json`, it prints the report as
+/// text.
 #[test]
 fn d37_boards_that_another_pc_stops_are_named() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -105,14 +107,15 @@ fn d37_boards_that_another_pc_stops_are_named() {
     sim.peer().wait("382#");
     std::thread::sleep(Duration::from_millis(300));
     sim.peer().send("600#00000000");
-    // The report comes at once, while the run continues.
+    // The command reports the board at once, while the run continues.
     assert!(lines.any(|line| line.contains("board 2 has left its control loop by itself")));
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-INT");
     assert_eq!(child.wait().unwrap().code(), Some(5));
 }
 
-/// If boards remain silent, they are stopped by policy. After that, the command supervises no board, and the run ends.
+/// D-51: the command stops boards that remain silent, as its policy requires. The command then supervises no board,
+/// and the run ends.
 #[test]
 fn d51_a_run_without_boards_ends_by_itself() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

@@ -1,4 +1,4 @@
-//! Tests of `ucom monitor` on a terminal from its start to its end, and of its lines for other outputs.
+//! Tests of `ucom monitor`: its view on a terminal from start to end, and its lines on other outputs.
 #![cfg(unix)]
 
 use crate::common;
@@ -15,8 +15,8 @@ fn monitor(sim: &Sim) -> std::process::Command {
     command
 }
 
-/// At 80 columns, the view shows flash number, program and status bits; at 40 columns, it shows state, bits and keys. The key `s`
-/// stops all control loops.
+/// At 80 columns, the view shows flash number, program and status bits; at 40 columns, it shows state, status bits and keys. In
+/// the view, the key `s` stops all control loops.
 #[test]
 fn the_view_shows_boards_and_its_stop_key_stops() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -48,7 +48,7 @@ fn the_view_shows_boards_and_its_stop_key_stops() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// A board that stops sending while it runs is listed first.
+/// The view lists a board first if the board stops sending while it runs.
 #[test]
 fn d51_a_board_that_falls_silent_leads_the_view() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -56,7 +56,7 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
     let mut terminal = Terminal::new(60, 20);
     let mut child = terminal.start(&monitor(&sim));
     terminal.until("heartbeats", |p| p.text().matches(" started ").count() == 2);
-    // A board that has not sent a first heartbeat is never lost (D-51).
+    // A board that has not yet sent its first heartbeat never counts as lost (D-51).
     terminal.until("heartbeats of both", |p| p.text().matches("s ago").count() == 2);
     sim.fault("silent board=2");
     terminal.until_it_shows(" lost ");
@@ -67,7 +67,7 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// The view ends when its terminal is closed, and line output ends when its reader disconnects.
+/// The view ends when its terminal is closed, and the line output ends when its reader disconnects.
 #[test]
 fn it_ends_when_nobody_looks_any_more() {
     let sim = Sim::numbered(&["--boards", "1"]);

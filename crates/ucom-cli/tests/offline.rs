@@ -1,4 +1,4 @@
-//! Tests of commands without a bus: exit codes, JSON, help pages.
+//! Tests of commands without a bus: exit codes, JSON output and help pages.
 
 use crate::common;
 
@@ -54,7 +54,7 @@ fn decode_prints_names_of_frames() {
     let output = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
     let value = output.json();
     assert_eq!((value["function"].as_str(), value["mask"].as_u64()), (Some("PC_SETSTATUS"), Some(2)));
-    // A string that spans several packages is decoded.
+    // The command decodes a string that spans several frames.
     let text = "141#2100011934126E38\n141#0200\n141#55436F4D32206865\n141#61642070616E\n";
     let output = ucom_with(&["decode"], text).ends(0);
     assert!(output.out.lines().last().unwrap().contains("\"UCoM2 head pan\""), "{}", output.out);
@@ -83,7 +83,7 @@ fn a_dbc_without_boards_needs_no_bus() {
     assert!(output.out.starts_with("VERSION") && output.out.contains("BO_ "), "{}", output.out);
 }
 
-/// A result that cannot be printed is a failure, but a reader that has disconnected is not.
+/// If a result cannot be printed, this is a failure; a reader that has disconnected is not a failure.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -102,7 +102,8 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// Existing files are not overwritten unless the user requests it, and no profile is written without measurements.
+/// The command does not overwrite an existing file unless the user requests it, and writes no profile without
+/// measurements.
 #[test]
 fn files_are_kept_and_nothing_is_made_up() {
     let dir = tempfile::tempdir().unwrap();
@@ -117,7 +118,7 @@ fn files_are_kept_and_nothing_is_made_up() {
         &["--json", "dbc", "none", "--out", &dbc],
         &["--json", "record", &log, "--for", "0.1"],
         &["--json", "record", &mcap, "--for", "0.1"],
-        // A recording would contain its own profile.
+        // The command `record` also writes its profile to a file, and the profile file already exists.
         &["--json", "record", &new, "--for", "0.1"],
     ] {
         let output = ucom(&[words, &bus].concat()).ends(4);
@@ -136,7 +137,7 @@ fn files_are_kept_and_nothing_is_made_up() {
     assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
 }
 
-/// If a program requests JSON, wrong usage is also reported as JSON.
+/// If a program requests JSON, the command also reports wrong usage as JSON.
 #[test]
 fn wrong_usage_is_json_where_that_is_asked_for() {
     for words in [&["--json", "scann"][..], &["ci", "2,3", "x=1", "--json"], &["info", "--json", "99"]] {
@@ -153,7 +154,7 @@ fn wrong_usage_is_json_where_that_is_asked_for() {
     assert!(output.err.contains(".asc") && !file.exists(), "{}", output.err);
 }
 
-/// The process that wrote the recording was killed. The complete part of the recording is decoded, and the command
+/// The process that wrote this recording was killed. The command decodes the complete part of the recording, and
 /// reports that the recording is incomplete.
 #[test]
 fn a_recording_that_is_cut_off_is_decoded_up_to_there() {

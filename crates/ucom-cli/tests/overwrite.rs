@@ -1,11 +1,12 @@
-//! Tests that `--overwrite` overwrites a file but skips no check of the bus. `--force` skips a check of the bus but overwrites no file.
+//! Tests that `--overwrite` overwrites a file but does not skip a check of the bus. `--force` skips a check of the bus but does not
+//! overwrite a file.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, ended_by, ucom};
 
-/// If a user follows the hint of the file check while boards run, no board is reset.
+/// If a user follows the hint of the file check while boards run, the command resets no board.
 #[test]
 fn writing_over_a_file_never_resets_a_running_chain() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -33,7 +34,7 @@ fn writing_over_a_file_never_resets_a_running_chain() {
     assert!(!output.err.contains("rebooted"), "{}", output.err);
 }
 
-/// Tests each command that writes a file: `--force` alone overwrites no file, and `--overwrite` does.
+/// The test runs each command that writes a file: `--force` alone overwrites no file, and `--overwrite` does.
 #[test]
 fn force_writes_over_no_file() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -61,8 +62,8 @@ fn force_writes_over_no_file() {
     }
 }
 
-/// The command `record` does not check the bus. In older scripts, its option `--force` means `--overwrite`; the
-/// help does not list `--force`.
+/// The command `record` does not check the bus. For older scripts, the option `--force` of `record` means `--overwrite`; the help does
+/// not list the option `--force` of `record`.
 #[test]
 fn record_takes_force_for_overwrite() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -1,4 +1,4 @@
-//! The commands of README.md and of the pages of docs/ are run unchanged with `ucom sim`, and
+//! Runs the commands in README.md and in the pages of docs/ unchanged with `ucom sim`. The commands
 //! must print the output that the pages show.
 #![cfg(target_os = "linux")]
 

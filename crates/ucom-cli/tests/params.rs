@@ -10,7 +10,7 @@ const TABLE: &str = "[program.ci]\nset_position = { scale = 0.01, unit = \"deg\"
                      [program.so]\nposition = { scale = 0.01, unit = \"deg\" }\nnobody = {}\n\
                      [program.par]\nkd = { scale = 0.1, unit = \"mA s/deg\" }\nmin_position = { scale = 0.5 }\n";
 
-/// Returns a numbered chain with a signal table of the first board; all applications are started.
+/// Returns a chain of numbered boards with a signal table for the first board; all applications are started.
 fn started() -> (Sim, String) {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "all"]).ends(0);
@@ -20,7 +20,7 @@ fn started() -> (Sim, String) {
     (sim, table)
 }
 
-/// D-11: values are read and shown in the units of the signal table; a raw word is always accepted.
+/// D-11: values are read and shown in the units of the signal table; a raw word is always a valid value.
 #[test]
 fn d11_values_have_the_units_of_the_signal_table() {
     let (sim, table) = started();
@@ -34,7 +34,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
         refused["error"]["message"],
         "board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg"
     );
-    // Without the table, this value would be the word 61, which means 0.61 degrees.
+    // Without the signal table, the value 61 would be a raw word, which means 0.61 degrees.
     let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     let message = bare["error"]["message"].as_str().unwrap();
     assert!(message.contains("the unit is missing: give `61deg`"), "{bare}");
@@ -54,22 +54,24 @@ fn d11_values_have_the_units_of_the_signal_table() {
     for words in [["par", "1", "kd=2mA s/deg"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
-    // This signal has a scale but no unit. A bare number is refused, because without the table it would be the raw word.
+    // The signal `min_position` has a scale but no unit in the table. The command refuses a bare number for a signal
+    // without a unit, because without the table the number would be the raw word.
     let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
     assert!(output["error"]["message"].as_str().unwrap().contains("but no unit for this signal"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
-    // A number that would wrap around is refused like any other invalid value.
+    // The command refuses a number that would wrap around, like any other invalid value.
     assert!(sim.ucom(&["ci", "1", "set_position=40000"]).ends(4).err.contains("outside -32768..32767"));
     let dbc = sim.ucom(&["--edges", &table, "dbc", "1"]).ends(0);
     assert!(dbc.err.contains("has no SO `nobody`"), "{}", dbc.err);
     let dbc = dbc.out;
     assert!(dbc.contains("set_position m0 : 16|16@1- (0.01,0) [-60|60] \"deg\""), "{dbc}");
-    // If a table is invalid, the error contains the position.
+    // If a signal table is invalid, the error contains the position in the file.
     let wrong = sim.file("wrong.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scales = 1 }\n");
     assert!(sim.ucom(&["--edges", &wrong, "io", "1"]).ends(2).err.contains("line 3"));
 }
 
-/// D-11: with a table, values need units. If the program is not in the table, only raw words are accepted.
+/// D-11: if a signal table exists, values need units. If the program of the board is not in the signal table, the
+/// command accepts only raw words.
 #[test]
 fn d11_a_table_without_the_program_refuses_bare_numbers() {
     let (sim, _) = started();
@@ -93,7 +95,7 @@ fn d11_a_table_without_the_program_refuses_bare_numbers() {
     assert_eq!(peer.wait("3C1#"), "3C1#00000C00");
 }
 
-/// An existing file is overwritten only if the user requests it.
+/// The command overwrites an existing file only if the user requests it.
 #[test]
 fn files_are_not_written_over() {
     let (sim, _) = started();
@@ -110,8 +112,8 @@ fn files_are_not_written_over() {
     }
 }
 
-/// If a file cannot be written, the command detects this before it sends any frame. Without a
-/// result, the command removes the file that it has created.
+/// If the output file cannot be written, the command detects this before it sends any frame. If the command has no
+/// result, it removes the file that it has created.
 #[test]
 fn outputs_are_opened_before_anything_is_sent() {
     let (sim, _) = started();
@@ -128,19 +130,19 @@ fn outputs_are_opened_before_anything_is_sent() {
         let output = sim.ucom(words).ends(2);
         assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
-    // The started boards send a heartbeat every second (D-50). No command has sent a frame.
+    // The boards that are started send a heartbeat every second (D-50). No command in this test has sent a frame.
     let sent: Vec<_> =
         peer.all(100).into_iter().filter(|frame| !["681#", "682#"].contains(&frame.as_str())).collect();
     assert_eq!(sent, [""; 0]);
-    // Board 9 does not exist, so the files that were opened for the result are removed.
+    // Board 9 does not exist, so the command removes the file that it has opened for the result.
     let file = sim.path("new");
     sim.ucom(&["par", "9", "--save", &file]).ends(3);
     sim.ucom(&["dbc", "9", "--out", &file]).ends(3);
     assert!(!std::path::Path::new(&file).exists());
 }
 
-/// D-35: the board does not answer parameter frames, so the command then checks that the application still answers.
-/// Otherwise the value is unknown.
+/// D-35: a board does not answer parameter frames, so the command then checks that the application still answers. If the
+/// application does not answer, the value is unknown.
 #[test]
 fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let (mut sim, _) = started();
@@ -151,7 +153,7 @@ fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     assert!(message.contains("already written: board 1"), "{output}");
 }
 
-/// D-35: values that were written earlier are stored, and are never shown as current values.
+/// D-35: the command stores the values that it has written, but never shows them later as current values.
 #[test]
 fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     let (sim, _) = started();
@@ -164,7 +166,7 @@ fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     assert!(text.contains("\n      kp: 0x0078   # 120;") && text.contains("\n      # kd:"), "{text}");
 }
 
-/// The complete file is checked before any parameter is written; every error is reported with its line.
+/// The command checks the complete file before it writes any parameter; every error contains its line.
 #[test]
 fn a_file_is_applied_whole_or_not_at_all() {
     let (sim, _) = started();
@@ -176,7 +178,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     let checked = sim.json(&["par", "--apply", &file, "--dry-run"], 0);
     assert_eq!(checked["written"], false);
     let apply = |text: &str| sim.ucom(&["par", "--apply", &sim.file("bad.yaml", text.as_bytes())]);
-    // The error is in the part of the second board, so the first board receives no parameters either.
+    // The error is in the part for the second board, but the first board receives no parameters either.
     let end = good.rfind("kp: 0x0078").unwrap();
     let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 10..]);
     let output = apply(&of_second("kq: 1")).ends(4);
@@ -203,7 +205,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     );
     assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
     assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
-    // Without quotation marks, a line that selects a signal by its number is a comment.
+    // Without quotation marks, a line that selects a signal by its number (`#0`) is a comment.
     let empty = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      #0: 5\n";
     assert!(apply(empty).ends(2).err.contains("the file contains no value"));
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);
@@ -218,12 +220,13 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert_eq!(written, ["3C1#00007800", "3C2#00007800"]);
 }
 
-/// Section 7: the board first receives the initial inputs, then the inputs and parameters of the file. Only then is
-/// the loop started. Values on the command line override the file.
+/// Section 7: the board first receives its initial inputs, then the inputs and parameters of the file. The control loop
+/// starts only after the board has received all inputs and parameters. Values on the command line replace values of the
+/// file.
 #[test]
 fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     let (sim, _) = started();
-    // After this command, the names are known.
+    // After the command `io`, the signal names of the board are known.
     sim.ucom(&["io", "1"]).ends(0);
     sim.ucom(&["stop", "all"]).ends(0);
     let file = |value: &str| {
@@ -237,7 +240,7 @@ fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     assert_eq!(output.json()["error"]["code"], "params");
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["301", "341", "3C1", "541"].contains(&&f[..3])), "{received:?}");
-    // If the names are unknown, the application is started to read them, and then stopped.
+    // If the signal names are unknown, the command starts the application to read them, and then stops it.
     let words = ["--json", "run", "1", "--fresh", "--params", &file("70000"), "--for", "1"];
     assert_eq!(sim.ucom(&words).ends(4).json()["error"]["code"], "params");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
@@ -264,7 +267,7 @@ fn pages_and_templates() {
     assert_eq!(io["boards"][0]["edges"]["so"][0]["scale"], 0.01);
 }
 
-/// If a board of the file does not answer, a run of all boards is refused.
+/// If a board in the parameter file does not answer, the command refuses to run all boards.
 #[test]
 fn a_run_of_all_boards_misses_those_of_the_file() {
     let (sim, _) = started();
@@ -276,6 +279,6 @@ fn a_run_of_all_boards_misses_those_of_the_file() {
     let output = sim.json(&["run", "all", "--params", &file, "--for", "0.2"], 4);
     assert!(output["error"]["message"].as_str().unwrap().contains("31"), "{output}");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
-    // If the command line lists boards, only the listed boards are run.
+    // If the command line lists boards, only the listed boards run.
     sim.ucom(&["run", "1", "--params", &file, "--for", "0.2"]).ends(0);
 }

@@ -1,4 +1,5 @@
-//! Tests of `ucom repair` with `ucom sim`: one board gets its number back, and the other boards keep their numbers.
+//! Tests of `ucom repair` with `ucom sim`: one board gets its lost number again, and the other boards keep their
+//! numbers.
 #![cfg(unix)]
 
 use crate::common;
@@ -22,8 +23,9 @@ fn rebooted() -> Sim {
     }
 }
 
-/// 5.4: the pin is switched off three times; then the board gets its number, and its identity is read. The pin is
-/// switched on and read back. The flash number comes from the inventory.
+/// 5.4: the pin is switched off three times. The board then gets its number, and its identity is read. After the
+/// repair, the pin is switched on and read back. The command reads the flash number of the board from the
+/// inventory.
 #[test]
 fn d21_a_board_gets_its_number_back() {
     let sim = rebooted();
@@ -35,19 +37,19 @@ fn d21_a_board_gets_its_number_back() {
     assert_eq!(sent, ["1C2#0200", "1C2#0200", "1C2#0200", "282#", "1C2#0202"]);
     let all = sim.json(&["scan"], 0);
     assert_eq!(all["boards"].as_array().unwrap().len(), 3, "{all}");
-    // If a board has its number, neither the board nor its neighbours are changed.
+    // If the board still has its number, the command changes neither the board nor its neighbours.
     let output = sim.ucom(&["repair", "2"]).ends(0);
     assert!(output.out.contains("board 2 has its number"), "{}", output.out);
     assert_eq!(sim.json(&["scan"], 0)["boards"], all["boards"]);
 }
 
-/// Exit codes: 4 if another board answers, 3 if no board answers, 2 if the board is ambiguous.
+/// The exit code is 4 if another board answers, 3 if no board answers, and 2 if the board is ambiguous.
 #[test]
 fn repairs_that_are_refused() {
     let sim = rebooted();
     let output = sim.json(&["repair", "1", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
-    // The board that accepts the number is not the intended board, so it does not keep the number.
+    // The board that accepts the number has the wrong identity, so it does not keep the number.
     let output = sim.json(&["repair", "2", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     assert_eq!(sim.json(&["scan"], 0)["boards"].as_array().unwrap().len(), 2);
@@ -55,7 +57,7 @@ fn repairs_that_are_refused() {
     assert!(output.err.contains("--flash-id"), "{}", output.err);
     sim.ucom(&["repair", "2", "--inventory", "/nowhere.toml"]).ends(2);
     sim.ucom(&["repair", "2"]).ends(0);
-    // All boards have their numbers, so no board accepts this number.
+    // All boards have numbers, so no board accepts the number 9.
     let output = sim.json(&["repair", "9", "--flash-id", "0x77"], 3);
     assert_eq!(output["error"]["code"], "no-answer", "{output}");
 }

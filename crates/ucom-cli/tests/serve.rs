@@ -12,7 +12,7 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::http::Http;
 
-/// Starts an agent with these arguments, and returns its first output line.
+/// Starts an agent with the arguments `words`, and returns its first output line.
 fn serve(dir: &Path, words: &[&str]) -> (Child, Value) {
     let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
     command.args(["--json", "serve", "--listen", "127.0.0.1:0"]).args(words);
@@ -60,13 +60,14 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     assert_eq!(code, Some(0), "{err}");
     assert!(err.contains("new operator's token in") && err.contains("`cat "), "{err}");
     assert!(!err.contains(&http(&ready).operator) && !err.contains("#token="), "{err}");
-    // The tokens do not change at the next start.
+    // The tokens are the same at the next start of the agent.
     let (child, again) = serve(dir.path(), &["--sim"]);
     assert_eq!(http(&again).operator, http(&ready).operator);
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
-    // In this test the user requests the link. The link is still not printed, because the program that reads the output may store it.
+    // In this test, the user requests the dashboard link. The agent still does not print the link, because the program that reads the
+    // output may store it.
     let (child, again) = serve(dir.path(), &["--sim", "--link"]);
     signal(&child, "-INT");
     let (code, err) = over(child);
@@ -89,7 +90,7 @@ fn the_link_with_the_token_is_printed_on_a_terminal() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// When the agent ends, it stops the boards that it has started. If the bus is lost, the agent ends.
+/// At its end, the agent stops the boards that it has started. If the bus is lost, the agent ends.
 #[test]
 fn what_an_agent_has_started_is_stopped_with_it() {
     let sim = Sim::numbered(&["--boards", "2"]);

@@ -1,19 +1,20 @@
-//! Tests with two boards that have the same number: every command reports this and changes no board, and `stop` stops both boards.
+//! Tests with two boards that have the same number. Every command reports the shared number and changes no board, and `stop` stops
+//! both boards.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, image};
 
-/// Starts a chain of three boards in which board 2 has number 1 as well.
+/// Starts a chain of three boards in which the first and the second board both have the number 1.
 fn sharing() -> Sim {
     let mut sim = Sim::numbered(&["--boards", "3", "--flash-ids", "0x21,0x42,0x63"]);
     sim.fault("same-number board=2");
     sim
 }
 
-/// D-24: the exit code is 4, and the message contains both flash numbers and the next command. The command sends
-/// only requests and heartbeats.
+/// D-24: the exit code is 4, and the message contains the flash numbers of both boards and the next command. While two boards
+/// share a number, the command sends only requests and heartbeats.
 #[test]
 fn d24_every_command_names_it_and_changes_nothing() {
     let sim = sharing();
@@ -56,12 +57,12 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire after"),
         "{doctor}"
     );
-    // After `init` has assigned new numbers, the commands succeed.
+    // After `init` has assigned new numbers, the same commands succeed.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }
 
-/// D-24: a stop is not refused; at its end, the command reports that it stopped two boards.
+/// D-24: a stop is never refused. At its end, the command `stop` reports that it has stopped two boards.
 #[test]
 fn d24_stop_stops_both_and_says_so() {
     let sim = sharing();

@@ -1,11 +1,13 @@
-//! Tests with silent boards and buses. The report always contains the request, the affected boards, the reason and the next command.
+//! Tests with silent boards and buses. The report about silence always contains the request, the affected boards, the reason and the
+//! next command.
 
 use crate::common;
 
 use cli_kit::testing::ended;
 use common::Sim;
 
-/// If the bus is silent, a recorder reports this once, and only to users. If frames arrive, the recorder does not report silence.
+/// If the bus is silent, the command `record` reports the silence once, and only to users. If frames arrive, the command `record`
+/// does not report silence.
 #[test]
 fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);
@@ -22,7 +24,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let its = recorded.clone();
     let ask = std::thread::spawn(move || {
-        // Sends frames until the recorder has received one, because a slow computer starts the recorder late.
+        // The test sends frames until the recorder has received one, because a slow computer starts the recorder late.
         while !its.load(std::sync::atomic::Ordering::Relaxed) {
             peer.send("240#");
             std::thread::sleep(std::time::Duration::from_millis(25));
@@ -34,7 +36,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     assert!(!output.err.contains("no frame was received"), "{}", output.err);
 }
 
-/// Each board without names is reported with the cause and the next command.
+/// The command reports each board without names, with the cause and the next command.
 #[test]
 fn every_board_without_names_is_reported() {
     let sim = Sim::start(&["--boards", "3"]);

@@ -1,4 +1,5 @@
-//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of that program.
+//! All tests of the crate are in one program, so that only one program is linked. Each file in this folder is a module of the
+//! test program.
 mod bus_off;
 mod chain;
 mod common;

@@ -1,5 +1,5 @@
-//! Generates and checks the part of docs/troubles.md about `ucom`. The real program runs each case against
-//! `ucom sim`. `UPDATE_DOCS=1` rewrites that part.
+//! Generates and checks the part of docs/troubles.md about `ucom`. The real `ucom` program runs each case with `ucom sim`. With
+//! `UPDATE_DOCS=1`, the test rewrites the part of docs/troubles.md about `ucom`.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -13,7 +13,7 @@ use cli_kit::testing::signal;
 use common::Sim;
 use test_kit::page::{Page, Printed, blurred};
 
-/// Name of the bus on the page.
+/// Name of the bus in docs/troubles.md.
 const BUS: &str = "socketcand:localhost:29536/can0";
 
 #[test]
@@ -27,7 +27,7 @@ fn the_page_of_troubles_has_what_ucom_prints() {
     page.finish();
 }
 
-/// Commands that a user runs for this chain; stdout and stderr are merged, as on a terminal.
+/// Commands that a user runs with this chain; stdout and stderr are merged, as on a terminal.
 trait Desk {
     fn shell(&self, shown: &str) -> Command;
     fn seen(&self, code: Option<i32>, text: &str) -> Printed;
@@ -49,7 +49,7 @@ impl Desk for Sim {
         }
         let address = self.url.split(['/']).next().unwrap().trim_start_matches("socketcand:").to_owned();
         let real = shown.replace("localhost:29536", &address);
-        // The command replaces the shell, so that it receives signals directly.
+        // The command replaces the shell process, so that it receives signals directly.
         shell
             .args(["-c", &format!("exec 2>&1\nexec {real}")])
             .current_dir(self.dir.path())
@@ -85,7 +85,7 @@ impl Desk for Sim {
     }
 }
 
-/// Removes values that differ from run to run: numbers, and heartbeats that a busy computer receives late.
+/// Removes the values that differ from run to run: numbers, and heartbeats that a busy computer receives late.
 fn of_a_moment(printed: Printed) -> Printed {
     let text: String = printed
         .text
@@ -161,7 +161,8 @@ fn firmware(page: &mut Page) {
     });
 }
 
-/// Two threads write to one pipe here, so the result may come before or after the last note. The error comes after the result and the note.
+/// Two threads write to the same pipe, so the result may come before or after the last note. The error always comes after the result and
+/// the note.
 fn result_last(mut printed: Printed) -> Printed {
     let result = "not stopped for certain: 1\n";
     if let Some(before) = printed.text.find(&format!("\n{result}")) {
@@ -179,7 +180,7 @@ fn running(page: &mut Page) {
         let mut sim = numbered(&["--boards", "2"]);
         let child = sim.start(run);
         sim.peer().wait("382#");
-        // The start needs this time to complete.
+        // The start of the boards needs this time to complete.
         std::thread::sleep(Duration::from_millis(1_000));
         sim.fault("power-loss board=1");
         result_last(of_a_moment(sim.all_of(child)))

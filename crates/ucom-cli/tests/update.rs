@@ -1,4 +1,4 @@
-//! Tests of `ucom update` with `ucom sim`: outcomes, exit codes, and the files that remain.
+//! Tests of `ucom update` with `ucom sim`: outcomes, exit codes, and the files after the update.
 #![cfg(unix)]
 
 use crate::common;
@@ -14,8 +14,8 @@ fn program_id(sim: &Sim, board: &str) -> serde_json::Value {
     sim.json(&["info", board], 0)["boards"][0]["program_id"].clone()
 }
 
-/// U-1 to U-10 with 60 KiB: the first update verifies the board, and the second reports it as up to date. The Program
-/// ID is the golden value of section 13.3.
+/// U-1 to U-10 with 60 KiB: the first update is verified, and the second update reports the board as up to date. The Program ID of the
+/// image is the example value in section 13.3.
 #[test]
 fn d46_update_is_verified_and_then_up_to_date() {
     let sim = chain("2");
@@ -36,7 +36,7 @@ fn d46_update_is_verified_and_then_up_to_date() {
     assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
 }
 
-/// D-41: with `--name-target`, the header is valid only for this board, otherwise for any board.
+/// D-41: with `--name-target`, the header of the image is valid only for this board; without it, for any board.
 #[test]
 fn d41_the_header_names_the_board_if_wanted() {
     let sim = Sim::numbered(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
@@ -46,38 +46,38 @@ fn d41_the_header_names_the_board_if_wanted() {
         let update = sim.spawn(&["update", "2", &file, "--force", option]);
         peer.wait("2C2#4355");
         peer.wait("2C2#");
-        // Words 8 to 11 are Program ID, date, target and reserve.
+        // Words 8 to 11 of the header are Program ID, date, target and reserve.
         let third = peer.wait("2C2#");
         ended(update).ends(0);
         assert_eq!(&third[12..16], expected, "{third}");
     }
 }
 
-/// If the exit code is 2 or 4, no board was changed.
+/// D-46: if the exit code is 2 or 4, the command has changed no board.
 #[test]
 fn d46_refusals_change_nothing() {
     let sim = chain("3");
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
-    // Here, the board is not the intended board.
+    // The board has another flash number than the user expects.
     let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
     sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
-    // To update several boards, the identity of each board is required.
+    // To update several boards, the command requires the identity of each board.
     let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
-    // The update is refused while a board runs.
+    // The command refuses to update a board that runs.
     let run = sim.spawn(&["--json", "run", "3"]);
     sim.peer().wait("603#01000000");
     sim.ucom(&["update", "1", &file]).ends(4);
     ended_by(run, "-INT").ends(0);
     assert_eq!(program_id(&sim, "1"), before);
-    // Here, the board does not exist.
+    // No board has the number 9.
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
 }
 
@@ -97,7 +97,8 @@ fn d46_errors_before_and_after_the_erase() {
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
-/// Updates all boards of the inventory: one board fails and the other boards succeed. The next run updates only the board that failed.
+/// The test updates all boards in the inventory: one board fails, and the other boards succeed. The next run of the command updates
+/// only the board that failed.
 #[test]
 fn an_update_session_goes_on_and_is_resumed() {
     let mut sim = chain("3");
@@ -106,10 +107,10 @@ fn an_update_session_goes_on_and_is_resumed() {
     sim.ucom(&["update", "1-3", &file]).ends(3);
     let infos = sim.json(&["scan"], 0);
     assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
-    // After a power cycle, board 2 has no number. The update itself or `init` assigns a number to it again.
+    // After a power cycle, board 2 has no number. The update or the command `init` assigns the number to board 2 again.
     drop(sim);
     let sim = chain("3");
-    // The date is fixed, because U-3 also compares dates, and around midnight the two runs would have different dates.
+    // The test uses a fixed date, because U-3 also compares dates. Around midnight, the two runs would have different dates.
     let file = file_in(&sim);
     let update = |boards| sim.json(&["update", boards, &file, "--date", "2009-06-01"], 0);
     assert_eq!(update("1,3")["boards"][1]["outcome"], "verified");
@@ -121,15 +122,15 @@ fn file_in(sim: &Sim) -> String {
     sim.file("session.bin", &image(4000, 6))
 }
 
-/// P-12: Ctrl-C is pressed in the middle of a block. The command sends SETSTATUS(04,00), the exit code after the
-/// erase is 5, and the board can still be used.
+/// P-12: the test presses Ctrl-C in the middle of a block. The command sends SETSTATUS(04,00) and ends with exit code 5, because the
+/// erase has begun. The board can still be used.
 #[test]
 fn p12_cancel_leaves_the_board_usable() {
     let sim = chain("1");
     let file = sim.file("app.bin", &image(60 * 1024, 7));
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &file]);
-    // This point is in the second cycle, because the first cycle has 961 blocks with one READY each.
+    // This point of the update is in the second cycle, because the first cycle has 961 blocks with one READY each.
     peer.wait_for(1200, "181#");
     signal(&update, "-INT");
     peer.wait("1C1#0400");
@@ -140,7 +141,7 @@ fn p12_cancel_leaves_the_board_usable() {
     sim.ucom(&["update", "1", &sim.file("small.bin", &image(2000, 8))]).ends(0);
 }
 
-/// P-13: after kill -9 during an update, the next run recovers.
+/// P-13: after kill -9 during an update, the next run of the command completes the update.
 #[test]
 fn p13_a_killed_update_is_recovered_by_the_next() {
     let sim = chain("1");
@@ -149,14 +150,15 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     let update = sim.spawn(&["update", "1", &file]);
     peer.wait_for(1100, "181#");
     ended_by(update, "-KILL");
-    // Frames that the killed process has passed to its adapter are still sent; on a busy computer this takes
-    // some time. Until these frames end, the next command would detect another PC on the bus.
+    // Frames that the killed process has passed to its adapter are still sent. On a busy computer, sending these frames takes some
+    // time. Until these frames end, the next command would detect another PC on the bus.
     while !peer.all(1000).is_empty() {}
     let update = sim.json(&["update", "1", &file], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
 }
 
-/// The board loses its power in the second cycle. After that it boots without an application, and `init` and an update repair it.
+/// The board loses its power in the second cycle. After the power loss, the board boots without an application. The command `init`
+/// and a new update repair the board.
 #[test]
 fn d46_power_loss_in_mid_update() {
     let mut sim = chain("2");
@@ -169,11 +171,12 @@ fn d46_power_loss_in_mid_update() {
     assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
 }
 
-/// D-46: if the bus fails after the erase, the exit code is 5 and the report is complete, including boards whose
-/// update is complete. If the bus fails before the erase, the exit code is 3.
+/// D-46: if the bus fails after the erase, the exit code is 5. The report of the update is complete, and includes boards whose update
+/// is complete. If the bus fails before the erase, the exit code is 3.
 #[test]
 fn d46_a_bus_that_fails_leaves_the_report() {
-    // Number of READY frames of board 2 before the simulator is killed; the first cycle has 961 of these frames.
+    // Each case contains the number of READY frames that board 2 sends before the simulator is killed. The first cycle of an update
+    // has 961 READY frames.
     for (blocks, code, outcome) in [(300, 3, "not-started"), (1200, 5, "incomplete")] {
         let sim = chain("2");
         let file = sim.file("app.bin", &image(60 * 1024, 11));
@@ -192,7 +195,7 @@ fn d46_a_bus_that_fails_leaves_the_report() {
     }
 }
 
-/// Like the test above, but with text output: outcome, cause and next step.
+/// D-46: if the bus fails during an update, the text output contains the outcome, the cause and the next step.
 #[test]
 fn d46_a_bus_that_fails_is_told_in_words() {
     let sim = chain("1");
@@ -208,7 +211,7 @@ fn d46_a_bus_that_fails_is_told_in_words() {
     drop(dir);
 }
 
-/// Ctrl-C is pressed before the erase: the exit code is 4, the outcome is `cancelled`, and the board keeps its program.
+/// P-12: the test presses Ctrl-C before the erase. The exit code is 4, the outcome is `cancelled`, and the board keeps its program.
 #[test]
 fn p12_cancelled_before_the_erase() {
     let sim = chain("1");
@@ -227,7 +230,7 @@ fn p12_cancelled_before_the_erase() {
     assert_eq!(program_id(&sim, "1"), before);
 }
 
-/// D-08: a dry run also checks for another PC.
+/// D-08: a dry run also checks whether another PC is on the bus.
 #[test]
 fn d08_a_dry_run_sees_another_pc() {
     let mut sim = chain("1");
@@ -254,8 +257,8 @@ fn d46_a_group_is_one_transfer() {
     assert_eq!(program_id(&sim, "3"), before);
 }
 
-/// With two images, each image is written to the target in the plan of the profile, and the report contains both.
-/// Invalid combinations are refused.
+/// With two images, each image is written to the target that the plan in the profile specifies. The report contains both images. The
+/// command refuses invalid combinations of image files and options.
 #[test]
 fn d40_two_images_by_plan() {
     let files = tempfile::tempdir().unwrap();
@@ -294,7 +297,7 @@ fn d40_two_images_by_plan() {
             images[0]["program_id"] == report["program_id"]
                 && images[1]["program_id"] != report["program_id"]
         );
-        // Either an image is missing, or an option of another plan is set.
+        // Either an image is missing, or the command line contains an option of another plan.
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
         assert!(output.err.contains(option) && output.err.contains(plan), "{}", output.err);
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
@@ -304,8 +307,8 @@ fn d40_two_images_by_plan() {
     }
 }
 
-/// U-10 with raw files: the program is written, and the report says that it is not verified. If the user
-/// specifies a Program ID, the program is verified against it.
+/// U-10 with raw files: the command writes the program, and reports that the program is not verified. If the user specifies a Program
+/// ID, the command verifies the program with it.
 #[test]
 fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -313,7 +316,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = profile.path().to_str().unwrap();
     let sim = Sim::start(&["--boards", "1", "--profile", profile]);
     sim.ucom(&["--profile", profile, "init"]).ends(0);
-    // In this test, a tool chain has written the header and data of each cycle to separate files.
+    // In this test, a tool chain has written the header and the data of each cycle to separate files.
     let golden = golden();
     let cycle = |cycle, date| {
         let header = ucom::Header {
@@ -344,7 +347,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
         (&false.into(), &serde_json::Value::Null)
     );
     assert!(report["unverifiable"]["hint"].as_str().unwrap().contains("--expect-program-id"), "{report}");
-    // The answer of the board does not cover the second file, so this file is written each time (D-62).
+    // The answer of the board does not cover the second file, so the command writes this file each time (D-62).
     let report = with(&["--expect-program-id", "0x4B3F"]).ends(0).json();
     assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"verified".into(), &true.into()));
     let report = with(&["--expect-program-id", "0x4B3F", "--force"]).ends(0).json();
@@ -353,7 +356,8 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     assert_eq!(report["boards"][0]["error"]["code"], "not-verified", "{report}");
 }
 
-/// `all` includes the boards of the inventory: if boards have lost their numbers, they are reported as missing and not skipped.
+/// `all` includes the boards of the inventory. If boards have lost their numbers, the command reports them as missing and does not
+/// skip them.
 #[test]
 fn all_is_the_inventory_too() {
     let sim = chain("4");
@@ -365,7 +369,7 @@ fn all_is_the_inventory_too() {
     assert_eq!(outcomes(&report), ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
     assert!(output.err.contains("has no number"), "{}", output.err);
-    // Commands for the connected boards list the missing boards.
+    // Other commands also list the missing boards.
     let output = sim.ucom(&["start", "all"]).ends(0);
     assert!(
         output.err.contains("0x42") || output.err.matches("has no number").count() == 2,
@@ -374,7 +378,7 @@ fn all_is_the_inventory_too() {
     );
 }
 
-/// Ctrl-C is pressed during the identification: no board was erased, the exit code is 4, and the outcome is `cancelled`.
+/// P-12: the test presses Ctrl-C during the identification. No board was erased, the exit code is 4, and the outcome is `cancelled`.
 #[test]
 fn p12_cancelled_while_it_scans() {
     let sim = chain("2");
@@ -390,7 +394,7 @@ fn p12_cancelled_while_it_scans() {
     assert_eq!(report["boards"].as_array().unwrap().len(), 2, "{report}");
 }
 
-/// If the Program ID of an image is known and differs from the requested Program ID, the update is refused before any frame is sent.
+/// If the known Program ID of an image differs from the requested one, the command refuses the update before it sends any frame.
 #[test]
 fn a_named_program_id_is_compared_with_the_image() {
     let sim = chain("1");

@@ -1,4 +1,5 @@
-//! Tests of `ucom update` with boards that already have the program: the record in the inventory decides (D-62, U-3).
+//! Tests of `ucom update` with boards that already have the program. The record in the inventory decides whether a
+//! program is written again (D-62, U-3).
 #![cfg(unix)]
 
 use crate::common;
@@ -24,7 +25,7 @@ fn of(report: &Value) -> (&str, bool) {
     (board["outcome"].as_str().unwrap(), board["verified"].as_bool().unwrap())
 }
 
-/// D-62: data memory is written each time, because the board cannot report its content.
+/// D-62: the command writes data memory each time, because the board cannot report the content of this memory.
 #[test]
 fn d62_data_memory_is_never_taken_as_proven() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -41,8 +42,8 @@ fn d62_data_memory_is_never_taken_as_proven() {
     }
 }
 
-/// D-62: if the image has another address, its bytes are written again. Without a record, no frame is
-/// sent and no board counts as verified.
+/// D-62: if the same image has another address, the command writes its bytes again. If the inventory has no record of
+/// the image, the command sends no program data, and no board counts as verified.
 #[test]
 fn d62_another_address_is_written() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -57,12 +58,12 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
     let text = sim.ucom(&["update", "1", &high]).ends(0).out;
     assert!(text.contains("same Program ID and date"), "{text}");
-    // The boards get new numbers, and each record remains with its board.
+    // The boards get new numbers, and each record stays with its board.
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept.contains("# cabinet 3") && kept.contains("address = 0x200"), "{kept}");
     sim.ucom(&["init"]).ends(0);
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
-    // Here, the record is removed.
+    // The test removes the record from the inventory.
     std::fs::write(&path, &commented).unwrap();
     let mut peer = sim.peer();
     for (more, code) in [(&[][..], 4), (&["--unverified"], 0), (&["--dry-run"], 4)] {
@@ -74,13 +75,13 @@ fn d62_another_address_is_written() {
     let text = sim.ucom(&["update", "1", &high]).ends(4).out;
     assert!(text.contains("--rewrite") && !text.contains("--force"), "{text}");
     assert_eq!(of(&sim.json(&["update", "1", &high, "--rewrite"], 0)), ("verified", true));
-    // Here, the inventory does not exist.
+    // The inventory file does not exist.
     let nowhere = sim.path("nowhere.toml");
     let words = ["update", "1", &high, "--inventory", &nowhere];
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));
 }
 
-/// D-62: a killed update leaves no record; the record of the previous program is removed as well.
+/// D-62: a killed update leaves no record in the inventory; the record of the previous program is also removed.
 #[test]
 fn d62_a_killed_update_leaves_no_record() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -90,7 +91,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert!(kept());
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &sim.file("next.bin", &image(60 * 1024, 2))]);
-    // This READY answers the first block of the first cycle. The erase begins only with the second cycle.
+    // The first READY frame answers the first block of the first cycle. The erase begins only in the second cycle.
     peer.wait("181#");
     ended_by(update, "-KILL");
     assert!(!kept());
@@ -98,7 +99,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert_eq!(of(&sim.json(&["update", "1", &first], 4)), ("program-up-to-date", false));
 }
 
-/// D-62: if the record cannot be removed, the memory is not erased.
+/// D-62: if the command cannot remove the record, it does not erase the memory.
 #[test]
 fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -107,7 +108,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &next]);
-    // At this time the inventory has been read, and the check for another PC has not started.
+    // When the test removes the inventory, the command has already read it, but has not yet checked for another PC.
     peer.wait("201#");
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);
@@ -117,7 +118,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     assert_eq!(sim.json(&["info", "1"], 0)["boards"][0]["program_id"], shown);
 }
 
-/// U-3: the same image with another date is not written again, unless its date is requested.
+/// U-3: the command does not write the same image with another date again, unless the user requests this date.
 #[test]
 fn u3_a_campaign_may_pass_midnight() {
     let sim = Sim::numbered(&["--boards", "2"]);

@@ -1,5 +1,5 @@
-//! Tests of environment variables: a variable never moves, resets, numbers or programs a board, and never overrides
-//! a check. If a variable has an effect, this is shown.
+//! Tests of environment variables. A variable never moves, resets, numbers or programs a board, and never overrides a check. If a
+//! variable has an effect on a command, the command prints the variable.
 #![cfg(unix)]
 
 use crate::common;
@@ -7,15 +7,15 @@ use crate::common;
 use cli_kit::testing::{CommandOutput, run};
 use common::{Sim, ucom};
 
-/// Runs `ucom` with one additional variable.
+/// Runs `ucom` with one additional environment variable.
 fn with(sim: &Sim, (name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     let mut command = sim.command();
     command.env(name, value);
     run(command, words, "")
 }
 
-/// Checks that none of these frames resets, numbers, programs, starts or moves a board: `ucom send` must accept them
-/// without `--intrusive`.
+/// Checks that no frame in `frames` resets, numbers, programs, starts or moves a board. For this check, `ucom send` must accept
+/// the frames without `--intrusive`.
 fn only_questions(frames: &[String]) {
     let words: Vec<&str> = frames.iter().map(String::as_str).collect();
     if !words.is_empty() {
@@ -23,12 +23,13 @@ fn only_questions(frames: &[String]) {
     }
 }
 
-/// If a shell still contains a variable of another command, no board is changed, and one line reports that the variable is ignored.
+/// If the shell still contains a variable of another command, no board is changed, and one line reports that the variable is
+/// ignored.
 #[test]
 fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "1"]).ends(0);
-    // After this command the names are known, so the following commands send the same requests.
+    // After the command `io all`, the signal names are known, so the following commands send the same requests.
     sim.ucom(&["io", "all"]);
     let file = sim.file("bus.log", b"(1.000000) can0 201#\n(1.010000) can0 000#\n");
     let parameters =
@@ -37,7 +38,7 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let before = (sim.status_byte("1"), sim.status_byte("2"));
     let mut peer = sim.peer();
     for (variable, value, words, code) in [
-        // In earlier versions, this variable, which was exported for `ucom record`, would have moved the board.
+        // In earlier versions, this variable would have moved the board, even if the user had set it only for `ucom record`.
         ("UCOM_FOR", "2", &["ci", "1", "set_position=1500"][..], 0),
         ("UCOM_FORCE", "1", &["ci", "1", "set_position=1500"], 0),
         ("UCOM_SET", "ASTART", &["status", "2"], 0),
@@ -53,8 +54,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
         let output = with(&sim, (variable, value), words).ends(code);
         let line = format!("{variable}={value} is ignored: `ucom");
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
-        // This list excludes heartbeats and the frames of `ci`, which checks whether the control loop runs and
-        // writes its input. If the loop does not run, the board does not move.
+        // `frames` does not contain heartbeats, nor the frames of `ci`, which checks whether the control loop runs and writes its
+        // input. If the control loop does not run, these frames do not move the board.
         let of_ci = |f: &String| {
             f == "601#00000000" || ["680#", "681#", "341#"].iter().any(|start| f.starts_with(start))
         };
@@ -65,8 +66,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     }
 }
 
-/// If a variable limited a command in earlier versions, or set what it sends, the command is refused: without
-/// the variable it would do something else.
+/// If a variable limited a command in earlier versions, or determined what the command sent, the command is refused. Without
+/// the variable, the command would do something else.
 #[test]
 fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -95,12 +96,12 @@ fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
         assert!(error["hint"].as_str().unwrap().starts_with("use --"), "{error}");
         assert_eq!(peer.all(50), [""; 0], "{words:?}");
     }
-    // If the user types the option, the variable has no effect. The command `stop` is never refused.
+    // If the user types an option, the variable of this option has no effect. The command `stop` is never refused.
     with(&sim, ("UCOM_COUNT", "x"), &["monitor", "--count", "1"]).ends(0);
     with(&sim, ("UCOM_CONTROL_ONLY", "1"), &["stop", "all"]).ends(0);
 }
 
-/// Eight words, in any letter case, mean on or off. Any other value does not enable anything.
+/// Eight words, in upper or lower case, mean on or off. Any other value of an on/off variable does not enable anything.
 #[test]
 fn on_off_variables_take_eight_words_and_nothing_else() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -131,7 +132,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// If a command uses a variable because the user did not type the option, one line of stderr shows the variable.
+/// If the user did not type an option and the command uses its variable, one line on stderr shows the variable.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -145,7 +146,7 @@ fn a_variable_in_effect_is_shown() {
     let programs = sim.ucom(&["--json", "scan"]).ends(0);
     assert!(programs.json()["boards"].is_array());
     assert_eq!(programs.events()[0]["text"], shown.trim_end(), "{}", programs.err);
-    // The value of a variable cannot send control codes to the terminal.
+    // The value of an environment variable cannot send control codes to the terminal.
     let odd = with(&sim, ("UCOM_EDGES", "a\u{1b}[2J\n.toml"), &["io", "1"]).err;
     assert!(odd.lines().next().unwrap().contains(r"UCOM_EDGES=a\u{1b}[2J\n.toml"), "{odd}");
 }

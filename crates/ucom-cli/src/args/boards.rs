@@ -1,8 +1,8 @@
-//! Boards, status bits and durations as they are written on the command line.
+//! Parsers for board numbers, status bits and durations on the command line.
 
 pub(crate) use ucom_host::session::{Assignment, Boards};
 
-/// Number of one board.
+/// Parses the number of one board.
 pub(super) fn one_board(text: &str) -> Result<u8, String> {
     match text.parse() {
         Ok(number @ 0..=31) => Ok(number),
@@ -13,7 +13,7 @@ pub(super) fn one_board(text: &str) -> Result<u8, String> {
     }
 }
 
-/// Flash number, decimal or hexadecimal with 0x.
+/// Parses a flash number, which is decimal, or hexadecimal with 0x.
 pub(super) fn flash_id(text: &str) -> Result<u16, String> {
     let text = text.trim();
     let number = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
@@ -23,7 +23,7 @@ pub(super) fn flash_id(text: &str) -> Result<u16, String> {
     number.map_err(|_| format!("\"{text}\" is no flash id, as 0x21 or 33"))
 }
 
-/// Mask of status bits, written as `ASTART,OPINIT`.
+/// Parses a mask of status bits, for example `ASTART,OPINIT`.
 pub(super) fn bits(text: &str) -> Result<ucom::Status, String> {
     let mut all = ucom::Status(0);
     for name in text.split(',').map(str::trim) {
@@ -36,7 +36,7 @@ pub(super) fn bits(text: &str) -> Result<ucom::Status, String> {
     Ok(all)
 }
 
-/// The two bytes of PC_SETSTATUS, written as `00:40` or `0x00:0x40`.
+/// Parses the two bytes of PC_SETSTATUS, for example `00:40` or `0x00:0x40`.
 pub(super) fn raw_status(text: &str) -> Result<(u8, u8), String> {
     let byte = |text: &str| {
         let digits = text.strip_prefix("0x").or(text.strip_prefix("0X")).unwrap_or(text);
@@ -47,7 +47,7 @@ pub(super) fn raw_status(text: &str) -> Result<(u8, u8), String> {
     pair.ok_or_else(|| format!("\"{text}\": the form is MASK:VALUE, two hexadecimal bytes, as 00:40"))
 }
 
-/// Duration in seconds.
+/// Parses a duration in seconds.
 pub(super) fn seconds(text: &str) -> Result<std::time::Duration, String> {
     let value = text.parse::<f64>().ok().and_then(|s| std::time::Duration::try_from_secs_f64(s).ok());
     value.ok_or_else(|| format!("\"{text}\" is no number of seconds"))

@@ -123,7 +123,7 @@ pub(crate) struct RepairArgs {
     pub force: ForceArgs,
 }
 
-/// Program ID, decimal or hexadecimal with 0x.
+/// Parses a Program ID, which is decimal, or hexadecimal with 0x.
 fn program_id(text: &str) -> Result<u16, String> {
     flash_id(text).map_err(|_| format!("\"{text}\" is no Program ID, as 0x4B3F"))
 }

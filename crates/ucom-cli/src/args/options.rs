@@ -1,4 +1,4 @@
-//! Options of each command.
+//! Options of each `ucom` command.
 
 use std::path::PathBuf;
 use std::time::Duration;

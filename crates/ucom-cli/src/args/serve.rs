@@ -1,4 +1,4 @@
-//! Options of `ucom serve`, the agent.
+//! Options of the agent, `ucom serve`.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ pub(crate) struct ServeArgs {
     pub cache: CacheArgs,
 }
 
-/// Parses the maximum size of the command log; the minimum of 1 MB is enough for some thousand lines.
+/// Parses the maximum size of the command log. The minimum of 1 MB is enough for some thousand lines.
 fn log_size(text: &str) -> Result<u64, String> {
     size(text, 1_000_000)
 }

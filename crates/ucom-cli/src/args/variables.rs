@@ -1,13 +1,13 @@
-//! Environment variables of `ucom`.
+//! Environment variables that `ucom` reads.
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Variables that have an effect, and variables of earlier versions.
+/// Variables that have an effect, and variables of earlier versions that no longer have an effect.
 pub(crate) const VARIABLES: Variables = Variables {
     json: "UCOM_JSON",
     retired: &[
-        // In earlier versions, these variables made a command reset, number, program, start or move boards, override a
-        // check, or overwrite a file.
+        // In earlier versions, variables of this kind made a command reset, number, program, start or move boards,
+        // override a check, or overwrite a file.
         Retired::less("UCOM_FORCE", "", "force"),
         Retired::less("UCOM_FORCE", "", "overwrite"),
         Retired::less("UCOM_ACTIVE", "run", "active"),
@@ -33,8 +33,8 @@ pub(crate) const VARIABLES: Variables = Variables {
         Retired::less("UCOM_SET", "status", "set"),
         Retired::less("UCOM_START", "update", "start"),
         Retired::less("UCOM_UNVERIFIED", "update", "unverified"),
-        // In earlier versions, these variables limited a command, or set the data that the command sent. Without the
-        // variable, the command would do something else.
+        // In earlier versions, variables of this kind limited a command, or determined the data that the command sent. Without the
+        // variable, the command would do something else than in earlier versions.
         Retired::other("UCOM_ADDRESSES", "update", "addresses"),
         Retired::other("UCOM_CI", "run", "ci"),
         Retired::other("UCOM_COUNT", "", "count"),
@@ -63,7 +63,8 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option must not get a variable that acts. This list contains every variable and the reason why the variable may exist.
+    /// A new option must not get a variable that changes boards. The list contains every variable, and the reason why the variable
+    /// is permitted.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};
@@ -100,7 +101,8 @@ mod tests {
             ("UCOM_TLS_CERT", File),
             ("UCOM_TLS_KEY", File),
         ];
-        // These options select files that are programmed, that turn a query into a command, or that contain the inputs of a board.
+        // The options in this list select files that are programmed, change a query into a command, or contain the inputs of a
+        // board.
         let without = [
             "update --exloader",
             "update --data",

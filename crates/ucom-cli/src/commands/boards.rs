@@ -1,4 +1,4 @@
-//! `ucom info`, `status`, `reset`, `xreset`, `start`, `stop`: single commands to boards.
+//! Commands that send single requests to boards: `ucom info`, `status`, `reset`, `xreset`, `start`, `stop`.
 
 use cli_kit::{Diagnose, ErrorKind, Failure, Output, error_object, exit};
 use serde_json::json;
@@ -26,7 +26,7 @@ pub(super) fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(
     Ok(())
 }
 
-/// Sets and clears status bits if this is requested, then shows the status bits.
+/// Sets and clears status bits of boards if the user requests this, then shows the status bits.
 pub(super) fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let (set, clear) = (args.set.unwrap_or_default(), args.clear.unwrap_or_default());
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
@@ -54,8 +54,8 @@ pub(super) fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result
     Ok(())
 }
 
-/// Sends one PC_SETSTATUS with these two bytes to each board, or a single broadcast to all boards. Shows the actual
-/// result and the result that the rules require.
+/// Sends one PC_SETSTATUS with the two bytes of `--raw` to each board, or a single broadcast to all boards. Shows the actual status
+/// of each board, and the status that the rules require.
 fn raw_status(
     args: &StatusArgs,
     (mask, value): (u8, u8),
@@ -152,12 +152,12 @@ pub(super) fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(
     Ok(())
 }
 
-/// Sends PC_XRESET. Afterwards, the board runs the exloader and programming is enabled.
+/// Sends PC_XRESET. After PC_XRESET, the board runs the exloader, and programming is enabled.
 pub(super) fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::XReset { board, force })
 }
 
-/// Sends PC_START, which starts the application.
+/// Sends PC_START, which starts the application of a board.
 pub(super) fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::Start { board, force })
 }
@@ -176,13 +176,15 @@ fn act(
     Ok(())
 }
 
-/// Stops the outputs, the control loop and the application, as requested. A stop is always allowed; another PC cannot prevent it.
+/// Stops the outputs, the control loop and the application of boards, as the user requests. A stop is always allowed, even if another
+/// PC is the master of the bus.
 pub(super) fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     let Stopped { boards: all, failed } = driver.stop_each(&args.boards, level)?;
-    // Shared numbers are only reported, and only at this point, because both boards with such a number have received the stop command.
+    // Board numbers that two boards share do not prevent a stop. The command only reports them after the stop, because both boards
+    // have received the stop command.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both boards received the Stop\n  {}", error.hint()));

@@ -1,4 +1,5 @@
-//! `ucom scan` and `init`: connected boards and their numbers.
+//! Commands for the chain of boards, `ucom scan` and `init`: they find the connected boards and
+//! assign their numbers.
 
 use cli_kit::{ErrorKind, Failure, Output, OutputFile, error_object};
 use serde_json::json;
@@ -43,12 +44,13 @@ pub(super) fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
         }
-        // The error at the end of the command reports these findings, so they are omitted here.
+        // The command reports missing numbers and errors elsewhere in its output, so this list
+        // omits them.
         let reported = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
         text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });
     match shared {
-        // The result on stdout already contains this failure.
+        // The result on stdout already contains the failure.
         Some(failure) => {
             out.note(format!("{}\n  {}", failure.message, failure.next));
             Err(Failure::shown(failure.kind))
@@ -77,7 +79,7 @@ fn lines(findings: &[impl ToString]) -> String {
     texts(findings).iter().map(|text| format!("! {text}\n")).collect()
 }
 
-/// Resets and numbers the whole chain, and writes an inventory.
+/// Resets the whole chain, assigns board numbers, and writes an inventory.
 pub(super) fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let known = match args.inventory.exists() {
         true => Some(Inventory::read(&args.inventory).map_err(Failure::usage)?),
@@ -86,7 +88,7 @@ pub(super) fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(),
     let compared = known.as_ref().filter(|_| !args.renew);
     let expected =
         compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
-    // Checks that the file can be written before the chain gets new numbers.
+    // The command checks that it can write the file before the chain gets new numbers.
     let file = OutputFile::open(&args.inventory, true, &[]).map_err(Failure::nothing_sent)?;
     let mut driver = link.session()?;
     let profile = driver.master.profile();

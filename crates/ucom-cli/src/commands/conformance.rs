@@ -1,4 +1,4 @@
-//! `ucom conformance`: runs the acceptance tests on the connected boards.
+//! Command `ucom conformance`: runs the acceptance tests on the connected boards.
 
 use std::path::Path;
 
@@ -15,13 +15,14 @@ use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 
-/// Returns 2026-01-01, a fixed date for test programs that differs from the dates of the boards.
+/// Returns the date of the test programs, 2026-01-01. The date of the test programs differs from
+/// the dates of the boards.
 fn date(profile: &Profile) -> u16 {
     // If the profile treats the date as a plain number, any number is valid.
     profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)
 }
 
-/// Runs the tests that the options allow, and shows their results.
+/// Runs the acceptance tests that the options allow, and shows their results.
 pub(crate) fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(wrong) = args.only.iter().find(|o| !test_names().any(|id| id.eq_ignore_ascii_case(o))) {
         let all: Vec<&str> = test_names().collect();
@@ -63,7 +64,7 @@ pub(crate) fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output)
     }
 }
 
-/// Checks that the board is the intended board, and returns the image for it.
+/// Checks that the board is the intended board, and returns the test image for this board.
 fn program(
     args: &ConformanceArgs,
     path: &Path,

@@ -1,4 +1,4 @@
-//! `ucom decode`: prints frames as text, from a recording, stdin or the live bus.
+//! Command `ucom decode`: prints frames as text, from a recording, stdin or the live bus.
 
 use std::io::BufRead;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -15,12 +15,12 @@ use super::record::{Silence, report_broken_off};
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::interrupt::listen;
 
-/// Maximum number of lines that are read in advance.
+/// Maximum number of input lines that are read in advance.
 const READ_AHEAD: usize = 64;
-/// Interval of the checks for Ctrl-C while no input arrives on stdin.
+/// Interval at which the command checks for Ctrl-C while no input arrives on stdin.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Decodes until the end of the input or until Ctrl-C. The exit code is 2 if a file contains no frame.
+/// Decodes frames until the end of the input or until Ctrl-C. The exit code is 2 if a file contains no frame.
 pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let left = args.count.unwrap_or(u64::MAX);
     if args.live {
@@ -35,7 +35,7 @@ pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result
         let recording = Recording::read(&args.file)
             .map_err(|e| Failure::usage(e).next("valid formats are candump -L, FZI-CAN 1.2 and MCAP"))?;
         report_broken_off(&recording, &args.file, out);
-        // The profile of the recording is used, unless the user selects another profile.
+        // The command uses the profile in the recording, unless the user selects another profile.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
             profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
         }
@@ -96,7 +96,8 @@ fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Outpu
     });
 }
 
-/// Returns the lines of stdin when they arrive. Ctrl-C ends the sequence of lines, even while no input arrives.
+/// Returns each line of stdin when the line arrives. Ctrl-C ends the sequence of lines, even while no input
+/// arrives.
 fn received(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>> + use<>, Failure> {
     let (sender, lines_read) = sync_channel(READ_AHEAD);
     let read = move || lines(std::io::stdin().lock()).try_for_each(|record| sender.send(record));
@@ -124,10 +125,11 @@ fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
     })
 }
 
-/// Parses a line of a log or a bare frame; returns `None` for a comment.
+/// Parses a line of a candump log or a bare frame; returns `None` for a comment.
 pub(super) fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
     let bare = !line.starts_with('(');
-    // A bare frame has no time and no bus name. With a time and a bus name, the frame becomes a line of a log.
+    // A bare frame contains no time and no bus name. With an added time and bus name, the bare frame becomes a
+    // line of a candump log.
     let full = if bare { format!("(0.0) can0 {line}\n") } else { format!("{line}\n") };
     match CandumpReader::new(full.as_bytes()).next()? {
         Ok(record) => Some(Ok(record)),

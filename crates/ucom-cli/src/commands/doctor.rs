@@ -1,4 +1,4 @@
-//! `ucom doctor` and `ucom probe`: diagnosis of the bus, and measurement of the profile of the boards.
+//! Commands `ucom doctor` and `ucom probe`: diagnosis of the bus, and measurement of the boards' profile.
 
 use std::time::Duration;
 
@@ -15,10 +15,10 @@ use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::shape::board_value;
 
-/// Time for which the command listens before its first request.
+/// Time for which the command only listens before its first request.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Checks everything. The exit code is 0 without a problem, 3 without any frame, and 1 otherwise.
+/// Checks the bus and all boards. The exit code is 0 if there is no problem, 3 if no frame was received, and 1 otherwise.
 pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));
@@ -41,7 +41,7 @@ fn line(f: &Finding) -> String {
     text
 }
 
-/// Measures the profile of the boards and writes it to a file.
+/// Measures the profile of the boards and writes the profile to a file.
 pub(super) fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let output = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
     let image = match &args.image {
@@ -58,7 +58,8 @@ pub(super) fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(
         other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports == 0 {
-        // Without measurements, the file would contain only default values, which would look like the profile of these boards.
+        // Without measurements, the file would contain only default values. Default values in the file would look like the
+        // measured profile of the boards.
         let what = "no board answers: nothing was measured, and no profile was written";
         return Err(
             Failure::new(ErrorKind::NoLink, "no-boards", what).next("find the cause with ucom doctor")

@@ -1,4 +1,5 @@
-//! `ucom explain`: prints the meaning of a displayed word, and the next step.
+//! Command `ucom explain`: prints the meaning of a word that `ucom` displays, and the next step for
+//! the user.
 
 use cli_kit::{Failure, Output, table};
 use serde_json::{Value, json};
@@ -6,7 +7,7 @@ use ucom_host::explain::{Word, find, words};
 
 use crate::args::ExplainArgs;
 
-/// Prints the meaning of the requested words, or the list of all words.
+/// Prints the meanings of the requested words, or the list of all words.
 pub(super) fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let (query, all) = (args.word.join(" "), words());
     let found = if query.is_empty() { all.iter().collect() } else { find(&all, &query) };

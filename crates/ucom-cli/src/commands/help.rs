@@ -1,4 +1,4 @@
-//! `ucom help`: help pages about the files that `ucom` reads.
+//! Command `ucom help`: prints help pages about the files that `ucom` reads.
 
 use clap::CommandFactory;
 use cli_kit::{Failure, Output};
@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::args::{Cli, Topic};
 
-/// Prints a help page, or the help of the program itself.
+/// Prints a help page, or the help of `ucom` itself.
 pub(super) fn help(topic: Option<Topic>, out: &Output) -> Result<(), Failure> {
     let text = match topic {
         Some(Topic::Profile) => ucom_host::profile_help(),

@@ -1,4 +1,4 @@
-//! `ucom io`, `ucom ci` and `ucom dbc`: inputs, outputs and parameters by name.
+//! Commands `ucom io`, `ucom ci` and `ucom dbc`: inputs, outputs and parameters by name.
 
 use std::time::{Duration, Instant};
 
@@ -16,13 +16,14 @@ use ucom_host::session::{
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
-/// Shows all signal names and the meaning of their words. If the application runs, also shows the initial inputs.
+/// Shows all signal names of boards, and the meanings of their words. If the application of a board is started, also shows its
+/// initial inputs.
 pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file =
         args.template.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
-    // An existing file is probably a signal table that a user has edited.
+    // If the file exists, it is probably a signal table that a user has edited.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
         true => Failure::nothing_sent(e).next(
             "--template - prints the table, so that you can add it by hand; --overwrite writes over it",
@@ -39,7 +40,7 @@ pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
         };
-        // If a board has sent its inputs, it has also sent its signal names.
+        // A board that has sent its inputs has also sent its signal names.
         let known = match driver.master.description(board) {
             Some(names) if initial.is_some() => known.renamed(names, &signals, driver.master.profile()),
             _ => known,
@@ -140,7 +141,7 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
     }
 }
 
-/// Shows the initial inputs, or sets some inputs. With `--for`, the board moves under supervision.
+/// Shows the initial inputs of a board, or sets some of its inputs. With `--for`, the command moves the board and supervises it.
 pub(super) fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let mut driver = link.session()?;
@@ -180,7 +181,7 @@ pub(super) fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
     Ok(())
 }
 
-/// Runs the board for a while and shows its final position.
+/// Runs the board for a limited time and shows its final position.
 fn move_for(
     driver: &mut Driver,
     args: &CiArgs,
@@ -199,7 +200,7 @@ fn move_for(
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
         driver.master.watch(board, None, true);
-        // If the run fails, it has already undone its own changes.
+        // If the run fails, the procedure has already undone its own changes.
         driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
         Ok(prepared)
     })?;
@@ -222,7 +223,8 @@ fn move_for(
         }
     }
     followed.ask_no_more(&mut driver.master);
-    // This is not a procedure, because Ctrl-C cancels a procedure. Here, Ctrl-C requests the stop.
+    // The following stop is not part of a procedure, because Ctrl-C would cancel a procedure. In the command `ci --for`, Ctrl-C
+    // requests the stop.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
@@ -284,7 +286,7 @@ pub(super) fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     Ok(())
 }
 
-/// Prints a note that `--force` skips no check in this command. Older scripts use this option to overwrite a file.
+/// Prints a note that `--force` skips no check in this command. Older scripts use the option `--force` to overwrite a file.
 fn note_force(force: bool, out: &Output) {
     if force {
         out.note(
@@ -293,7 +295,8 @@ fn note_force(force: bool, out: &Output) {
     }
 }
 
-/// Encodes text as Windows-1252, which readers of DBC files expect. Letters in units, such as ° and µ, have the codes of Latin-1.
+/// Encodes a text as Windows-1252, because readers of DBC files expect this encoding. The letters in units, such as ° and µ, have
+/// the same codes in Windows-1252 and Latin-1.
 fn windows(text: &str) -> Vec<u8> {
     let byte = |c: char| u8::try_from(u32::from(c)).ok().filter(|b| !(0x80..0xA0).contains(b));
     text.chars().map(|c| byte(c).unwrap_or(b'?')).collect()

@@ -1,5 +1,5 @@
-//! `ucom monitor`: live view of boards, bus load and foreign frames. On a terminal, the command shows a full view;
-//! other outputs receive one object per second.
+//! Command `ucom monitor`: live view of boards, bus load and foreign frames. On a terminal, the command shows a
+//! full-screen view; on other outputs, it prints one object per second.
 
 use std::time::{Duration, Instant};
 
@@ -29,7 +29,7 @@ pub(super) fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Resu
 
 fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) -> Result<(), Failure> {
     let mut shown = Instant::now();
-    // The first view is shown after the scan.
+    // The command shows the first view after the scan.
     let first = Instant::now();
     let stdout = Lines::stdout()?;
     while left > 0 && !driver.stop_asked() && !stdout.gone() {
@@ -97,7 +97,7 @@ fn text(driver: &Driver) -> String {
     text
 }
 
-/// Minimum time between two views.
+/// Minimum time between two updates of the view.
 const PICTURE: Duration = Duration::from_millis(100);
 
 fn live(driver: &mut Driver, watch: &mut Watch, mut left: u64, mut screen: Screen) -> Result<(), Failure> {

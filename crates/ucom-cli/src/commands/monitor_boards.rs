@@ -1,4 +1,5 @@
-//! Boards as rows of the live view. The view shows as many columns as possible, and always the state, status bits and heartbeat of a board.
+//! Table of boards in the live view of `ucom monitor`. The table shows as many columns as possible, and always the state, status bits and
+//! heartbeat of a board.
 
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -7,7 +8,8 @@ use ratatui::widgets::{Cell, Row, Table};
 use ucom::Status;
 use ucom_host::master::{Board, Boards, Life, Statistics};
 
-/// Status bits, beginning with the most significant bit. A narrow column shows one letter for each bit, a wide column shows a word.
+/// Status bits of a board, beginning with the most significant bit. A narrow column shows one letter for each status bit; a wide column
+/// shows a word.
 pub(super) const BITS: [(Status, char, &str); 8] = [
     (Status::MSTART, 'M', ""),
     (Status::ASTART, 'A', "autostart"),
@@ -19,13 +21,13 @@ pub(super) const BITS: [(Status, char, &str); 8] = [
     (Status::IPINIT, 'i', "in-pin"),
 ];
 
-/// Minimum width at which status bits are shown as words, and flash numbers and programs are shown.
+/// Minimum width of the view for status bits as words, and for the columns with flash numbers and programs.
 pub(super) const WIDE: u16 = 130;
 const MEDIUM: u16 = 72;
 /// Age, in seconds, above which the view marks the last answer of a board as old.
 const OLD_S: f64 = 5.0;
 
-/// Column of the view: its head, its width and its content.
+/// Column of the board table: its head, its width and its content.
 struct Column {
     head: &'static str,
     width: Constraint,
@@ -42,7 +44,7 @@ impl Column {
     }
 }
 
-/// Returns the columns that fit into the width, the most important columns first.
+/// Returns the table columns that fit into the width, the most important columns first.
 fn columns(width: u16) -> Vec<Column> {
     let number =
         Column::new("#", Constraint::Length(2), |number, _, _, _| Cell::from(format!("{number:>2}")));
@@ -76,7 +78,7 @@ fn columns(width: u16) -> Vec<Column> {
     vec![number, state, letters, heartbeat]
 }
 
-/// Returns the rows from row `first` on, with as many columns as the width of the view permits.
+/// Returns the rows of the table from row `first`, with as many columns as the width of the view permits.
 pub(super) fn table(
     boards: &Boards,
     statistics: &Statistics,
@@ -112,7 +114,7 @@ fn state(board: &Board, now: u64) -> Cell<'static> {
     Cell::from(Span::styled(format!(" {} ", board.state_name(now)), style))
 }
 
-/// Returns a text that contains a letter for each set bit, at the position of the bit.
+/// Returns a text with a letter for each status bit that is set, at the position of the bit.
 fn letters(board: &Board) -> Cell<'static> {
     let Some(status) = board.status().filter(|_| board.is_known()) else {
         return Cell::from("?").dark_gray();
@@ -132,7 +134,7 @@ fn words(board: &Board) -> Cell<'static> {
 fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
     match (board.life, board.alive_age_s(now)) {
         (Life::Unarmed, _) | (_, None) => match board.last {
-            // The board sends no frames unless a PC requests them, so the displayed values are as old as its last answer.
+            // The board sends frames only when a PC requests them. The displayed values are therefore as old as the board's last answer.
             Some((at, _)) if now.saturating_sub(at) as f64 * 1e-6 >= OLD_S => {
                 Cell::from(format!("{:.0} s old", now.saturating_sub(at) as f64 * 1e-6)).dark_gray()
             }
@@ -156,7 +158,7 @@ mod tests {
 
     use super::*;
 
-    /// `ucom explain` knows the letters and words of the view, and explains each as the name of its bit.
+    /// The command `ucom explain` knows the letters and words of the view, and explains each of them as the name of its bit.
     #[test]
     fn every_letter_and_word_of_a_bit_is_explained() {
         let all = words();

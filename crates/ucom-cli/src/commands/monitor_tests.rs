@@ -6,7 +6,7 @@ use ucom_host::master::{Event, Master, Request};
 
 use super::*;
 
-/// Terminal sizes, smallest first.
+/// Terminal sizes for the tests, smallest first.
 const SIZES: [(u16, u16); 6] = [(40, 12), (50, 15), (60, 20), (80, 24), (120, 40), (200, 60)];
 
 /// Returns a chain of ten boards that have answered an identity request.
@@ -47,7 +47,7 @@ fn chain(started: Option<u8>) -> (Master, u64) {
     (master, now)
 }
 
-/// Returns a chain in which board 3 sent heartbeats and then stopped sending.
+/// Returns a chain in which board 3 sent heartbeats and then stopped sending them.
 fn one_lost() -> (Master, u64) {
     let (mut master, now) = chain(Some(3));
     master.watch(3, Some(3), true);
@@ -79,7 +79,7 @@ fn watch() -> Watch {
     Watch::new("socketcand:127.0.0.1:29536/can0".into(), false, Profile::default())
 }
 
-/// Returns all rows that the view shows while the test scrolls to the end.
+/// Returns all rows that the view shows while the test scrolls to the end of the list.
 fn scrolled((master, now): &(Master, u64), watch: &Watch, size: (u16, u16)) -> Vec<String> {
     let mut scroll = Scroll::default();
     let mut all = picture_of(master, *now, watch, &mut scroll, size);
@@ -113,7 +113,7 @@ fn eighty_columns_have_flash_number_program_and_status_bits() {
     assert!(line_of(&wide, "0x0021").contains("init out-pin in-pin"), "{}", wide.join("\n"));
 }
 
-/// Every board can be displayed on every terminal, and the line of keys shows how to scroll.
+/// Every board can be displayed on every terminal, and the line of keys shows how to scroll to it.
 #[test]
 fn no_board_vanishes() {
     let chain = ten();
@@ -128,14 +128,14 @@ fn no_board_vanishes() {
             };
             assert!(all.iter().any(row), "{size:?}: board {number}\n{place}");
         }
-        // Facts and column heads are never cut off.
+        // The view never cuts off facts or column heads.
         assert!(size.0 >= 60 || !place.contains("socketcand"), "{place}");
         assert!(!place.contains("descriptio ") && !place.contains("descriptio│"), "{place}");
         assert!(size.1 > 12 || keys.contains("↑↓ 1-"), "{size:?}: {keys}");
     }
 }
 
-/// A lost board is listed first, with the next command and without old values.
+/// The view lists a lost board first, with the next command and without old values.
 #[test]
 fn d51_a_lost_board_looks_dead() {
     let chain = one_lost();
@@ -167,7 +167,7 @@ fn a_terminal_that_is_too_small_shows_the_size_that_is_needed() {
     }
 }
 
-/// If no board answers, the view shows the next command.
+/// If no board answers, the view shows the next command for the user.
 #[test]
 fn an_empty_bus_is_reported() {
     let master = Master::new(Profile::default());
@@ -177,7 +177,7 @@ fn an_empty_bus_is_reported() {
     }
 }
 
-/// Long event texts are not cut off.
+/// The view does not cut off long event texts.
 #[test]
 fn events_go_on_in_the_next_line() {
     let (master, now) = ten();

@@ -1,5 +1,5 @@
-//! View of `ucom monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command are at the top,
-//! rows that do not fit can be scrolled, and the keys are always visible.
+//! Layout of the `ucom monitor` view, for terminals down to 40 columns and 12 rows. Errors and the next command are
+//! at the top of the view. Rows that do not fit can be scrolled, and the keys are always visible.
 
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small, wrapped};
 use ratatui::Frame;
@@ -11,14 +11,14 @@ use ucom_host::session::{Picture, Problems, Watch};
 
 use super::monitor_boards::{self as rows, WIDE};
 
-/// Keys. If the terminal is too small, only the first key is shown.
+/// Keys of the view. If the terminal is too small for the view, only the first key is shown.
 const KEYS: &str = "s stops  q ends";
-/// Minimum number of board rows, including their head, for any number of errors.
+/// Minimum number of rows in the board table, including the table head, for any number of errors.
 const LEAST_ROWS: u16 = 4;
-/// Number of rows above which the last event gets its own row.
+/// Smallest terminal height, in rows, at which the last event gets its own row.
 const EVENT: u16 = 16;
 
-/// Draws the view, and sets the visible rows in `scroll`.
+/// Draws the view, and stores the visible rows in `scroll`.
 pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     if too_small(frame, KEYS) {
         return;
@@ -30,7 +30,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Sc
     let most = area.height.saturating_sub(1 + LEAST_ROWS + 2 * edge + log);
     let (trouble, rest) = trouble(picture).lines(inner, most.into());
     let first = if trouble.is_empty() { 0 } else { trouble.len() as u16 + edge };
-    // A frame with the load curve is shown only if all other parts have enough space.
+    // The box with the load curve is shown only if all other parts of the view have enough space.
     let wanted = rest.len() as u16 + boards.max(1) + 1 + edge;
     let head = if framed && area.height >= first + wanted + log + 5 { 5 } else { 1 };
     let left = area.height.saturating_sub(first + head);
@@ -64,7 +64,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Sc
     let [causes, table] =
         Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(place);
     frame.render_widget(Paragraph::new(above), causes);
-    // The head of the table is drawn only if there is space for at least one row below it.
+    // The head of the board table is drawn only if there is space for at least one row below it.
     if boards > 0 && table.height > 1 {
         frame.render_widget(rows::table(picture.boards, picture.statistics, picture.now, inner, skip), table);
     }
@@ -79,7 +79,7 @@ fn trouble(picture: &Picture<'_>) -> Trouble {
     Trouble { causes, warnings, next, message: picture.watch.message.clone() }
 }
 
-/// Returns the state of the bus in one line; the line contains the bus name if the complete name fits.
+/// Returns the state of the bus as one line. The line contains the bus name if the complete name fits.
 fn facts(picture: &Picture<'_>, boards: u16, width: u16) -> Line<'static> {
     let load = picture.statistics.load_percent(picture.now);
     let foreign = picture.statistics.foreign_count();
@@ -125,7 +125,8 @@ fn load(picture: &Picture<'_>, room: usize) -> Sparkline<'static> {
         .block(panel(&format!("bus load {percent:.1} %")))
 }
 
-/// Draws the newest events; the last event is at the bottom. A long event continues on the next line.
+/// Draws the newest events of the bus; the last event is at the bottom. A long event text continues on the next
+/// line.
 fn events(frame: &mut Frame<'_>, watch: &Watch, area: Rect, framed: bool) {
     let (width, height) = if framed {
         (area.width.saturating_sub(4), area.height.saturating_sub(2))

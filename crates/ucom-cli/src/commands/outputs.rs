@@ -1,4 +1,4 @@
-//! `ucom so`: shows the outputs of running boards by name and in their units.
+//! Command `ucom so`: shows the outputs of running boards by name and in their units.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -12,7 +12,8 @@ use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
 
-/// Waits until the reader of stdout has read all output. Stops waiting if the reader no longer reads.
+/// Waits until the reader of stdout has read all lines. Stops waiting if the reader of stdout no longer
+/// reads.
 pub(super) fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
@@ -20,7 +21,8 @@ pub(super) fn finish(stdout: &mut Lines, driver: &Driver) {
     }
 }
 
-/// Shows the outputs of boards when they arrive. When the names are known, the command sends no more frames.
+/// Shows the outputs of boards when the outputs arrive. After the signal names are known, the command sends
+/// no more frames.
 pub(super) fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
@@ -41,7 +43,7 @@ pub(super) fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
             match event {
-                // Another PC normally runs the boards; otherwise there would be no outputs.
+                // Another PC normally runs the boards, because this command starts no control loop.
                 Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;
@@ -94,7 +96,7 @@ fn quoted(text: &str) -> String {
     if plain { text.into() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
-/// Returns a snapshot as a line of text.
+/// Returns the outputs of a board as a line of text.
 fn row(
     args: &SoArgs,
     all: &BTreeMap<u8, Known>,

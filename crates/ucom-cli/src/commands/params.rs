@@ -1,4 +1,4 @@
-//! `ucom par`: reads and writes parameters by name, and handles parameter files.
+//! Command `ucom par`: reads and writes parameters by name, and processes parameter files.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use ucom_host::session::{
 
 use crate::args::{Boards, LinkArgs, ParArgs};
 
-/// Shows parameters, writes some parameters, or saves or applies a parameter file.
+/// Shows the parameters of boards, writes some parameters, or saves or applies a parameter file.
 pub(super) fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(file) = &args.apply {
         return apply(args, file, link, out);
@@ -46,7 +46,7 @@ pub(super) fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     Ok(())
 }
 
-/// Opens the output file before any frame is sent. An existing file is overwritten only if the user requests it.
+/// Opens the output file before any frame is sent. Overwrites an existing file only if the user requests it.
 pub(super) fn open_output(file: &Path, overwrite: bool) -> Result<OutputFile, Failure> {
     OutputFile::open(file, overwrite, &[]).map_err(Failure::nothing_sent)
 }
@@ -96,7 +96,7 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
     });
 }
 
-/// Returns the index, the name and the value last written by this process of each parameter.
+/// Returns the index and the name of each parameter, and the value that this process wrote last.
 fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, &'a String, Option<u16>)> {
     let assumed = driver.master.parameters(p.known.board);
     p.known.names.par.iter().enumerate().map(move |(i, name)| match assumed.get(i) {
@@ -105,7 +105,8 @@ fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, 
     })
 }
 
-/// Writes a parameter file: the values that were written last, and the other names as comments.
+/// Writes a parameter file. The file contains the last written values, and the names of the other parameters as
+/// comments.
 fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Output) -> Result<(), Failure> {
     let names = inventory(&args.inventory).map_err(Failure::usage)?;
     let board = |p: &Parameters| {
@@ -141,7 +142,7 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
     })
 }
 
-/// Writes the requested text to a file, or to stdout for `-`.
+/// Writes a text to the file that the user has selected, or to stdout for `-`.
 pub(super) fn deliver(
     file: Option<OutputFile>,
     text: &str,
@@ -154,7 +155,7 @@ pub(super) fn deliver(
         out.result(&result, || text.into());
         return Ok(());
     };
-    // The file is written atomically, because a user may have edited the old content.
+    // The file is replaced atomically, because a user may have edited its old content.
     ucom_host::files::write_text(file.path(), text).map_err(Failure::usage)?;
     let name = file.name();
     file.is_written();
@@ -163,7 +164,7 @@ pub(super) fn deliver(
     Ok(())
 }
 
-/// Checks the complete file, and then writes its parameters to the boards.
+/// Checks the complete parameter file, and then writes its parameters to the boards.
 fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let meant = |n: u8| match &args.boards {
@@ -179,7 +180,8 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
-    // Writing requires a started application. For a check, the cache is sufficient.
+    // Writing parameters requires a started application. For a check of the file, the cache of signal names is
+    // sufficient.
     let cache = args.cache.cache();
     let known = cache.all(&mut driver, &signals, &file.numbers(), |_| !args.dry_run)?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;

@@ -1,4 +1,4 @@
-//! `ucom record` and `ucom replay`: write frames of a bus to a file, and send them again.
+//! Commands `ucom record` and `ucom replay`: write the frames of a bus to a file, and send recorded frames again.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -14,14 +14,15 @@ use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::interrupt::listen;
 use crate::session::shared_numbers;
 
-/// Interval at which frames are written to the file. If the recorder is killed, at most the frames of this interval are lost.
+/// Interval at which received frames are written to the file. If the recorder is killed, it loses at most the frames of one
+/// second.
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
     Failure::new(ErrorKind::Fault, "recording", e).next("check if the disk is full")
 }
 
-/// Reports an incomplete recording.
+/// Reports that a recording is incomplete.
 pub(super) fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     if let Some(why) = &recording.broken_off {
         let (file, whole) = (file.display(), recording.records.len());
@@ -33,19 +34,21 @@ pub(super) fn report_broken_off(recording: &Recording, file: &Path, out: &Output
 /// Time without a frame after which the command reports that the bus is silent.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Reports once that the bus has sent no frames yet, and what the user can check. This note is only for users.
+/// Reports once that no frame has arrived on the bus yet, and what the user can check. Only users need the note about
+/// silence, not programs.
 pub(super) struct Silence {
     since: Instant,
     over: bool,
 }
 
 impl Silence {
-    /// Starts the observation. Programs do not get the note, because they detect silence themselves.
+    /// Starts to observe the bus. Programs do not get the note about silence, because they detect silence themselves.
     pub(super) fn begins(out: &Output) -> Self {
         Self { since: Instant::now(), over: out.is_json() }
     }
 
-    /// Checks for silence. The command calls this function at each poll of the bus. `came` is `true` if a frame has arrived.
+    /// Checks whether the bus is silent. A command calls this function each time it polls the bus. `came` is `true` if
+    /// a frame has arrived.
     pub(super) fn look(&mut self, came: bool, out: &Output) {
         if !came && self.since.elapsed() < SILENCE {
             return;
@@ -59,7 +62,7 @@ impl Silence {
     }
 }
 
-/// Records until Ctrl-C, for the requested time, or until the requested number of frames.
+/// Records frames until Ctrl-C, for the requested time, or until the requested number of frames.
 pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
@@ -89,11 +92,11 @@ pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result
         bus.news().iter().for_each(|news| out.note(news));
         silence.look(received.is_some(), out);
         let Some(frame) = received else { continue };
-        // The times in a file never decrease, even if the clock is changed during the recording.
+        // The times in a recording never decrease, even if the clock is changed during the recording.
         let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
-            // The reader has read enough, as in `ucom record - | head`.
+            // The program that reads stdout has read enough, as in `ucom record - | head`.
             Err(RecordingError::Io { source: e, .. }) if stdout => {
                 Output::lose(&e);
                 break;
@@ -122,7 +125,7 @@ pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result
     Ok(())
 }
 
-/// Opens the files of a recording before the recording starts. The file extension selects the format.
+/// Opens the output files before the recording starts. The extension of the file name selects the format of the recording.
 fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>, Failure> {
     let ending = args.file.extension().map(|e| e.to_string_lossy().into_owned());
     let known = ["log", "candump", "fzi", "fzican", "mcap"];

@@ -1,4 +1,4 @@
-//! `ucom repair`: restores the number of one board; the other boards keep their numbers.
+//! Command `ucom repair`: assigns the lost number to one board again; the other boards keep their numbers.
 
 use serde_json::json;
 use ucom_host::files::inventory::flash_number_of;
@@ -10,12 +10,13 @@ use ucom_host::session::SessionError;
 use crate::args::{LinkArgs, RepairArgs};
 use crate::shape::{board_table, board_value};
 
-/// Repairs the board. The flash number of the board must equal the number on the command line, or else the number in the inventory.
+/// Gives one board its lost number again. The flash number of the board must equal the flash number on the command line, or else
+/// the flash number in the inventory.
 pub(super) fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let board = args.board;
     let flash_number = match args.flash_id {
         Some(flash) => flash,
-        // The user must select the board, so a missing flash number is a usage error.
+        // The user must select the board by its flash number, so a missing flash number is a usage error.
         None => flash_number_of(&args.inventory, board).map_err(|e| Failure::usage(&e).next(e.hint()))?,
     };
     let mut driver = link.session()?;

@@ -1,4 +1,4 @@
-//! `ucom run`: starts all boards, supervises their control loops, and stops the boards.
+//! Command `ucom run`: starts boards, supervises their control loops, and stops the boards.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use super::outputs::finish;
 use super::typed::{obey, typed};
 use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
 
-/// Interval between the reports of `ucom run`.
+/// Interval between two reports of `ucom run`.
 const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
 /// Starts boards and supervises them until Ctrl-C.
@@ -34,13 +34,13 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     only(&boards, &args.ci, "run")?;
     only(&boards, &args.par, "run")?;
     let file = match &args.params {
-        // If all boards are selected, every board in the file must be connected.
+        // If the user selects all boards, every board in the parameter file must be connected.
         Some(path) => Some(ParameterFile::read(path, &args.inventory, |n| {
             args.boards == Boards::All || boards.contains(&n)
         })?),
         None => None,
     };
-    // The identities are read first, because this does not need a started application.
+    // The command reads the identities of the boards first, because this does not need a started application.
     if let Some(file) = &file {
         file.identities(&mut driver)?;
     }
@@ -49,7 +49,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     let (report, prepared) = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
-        // The procedure itself has already undone its changes.
+        // The failed procedure has already undone its own changes.
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
     })?;
@@ -83,7 +83,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     Ok(followed.nobody_left()?)
 }
 
-/// Prints that the boards run, including their flags and the load of the bus.
+/// Prints that the boards run, with their flags and the load of the bus.
 fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output) {
     let running = json!({
         "event": "running",
@@ -98,7 +98,7 @@ fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output)
     }));
 }
 
-/// Reads the signal names, prepares the changes, and starts all boards.
+/// Reads the signal names, prepares the inputs and parameters, and starts all boards.
 fn start(
     driver: &mut Driver,
     args: &RunArgs,
@@ -133,7 +133,8 @@ fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), 
     Ok(())
 }
 
-/// Supervises boards until Ctrl-C, `stop`, the end of the requested time, or the end of the last control loop.
+/// Supervises boards until Ctrl-C, until a typed `stop`, for the requested time, or until the last control
+/// loop ends.
 fn supervise(
     driver: &mut Driver,
     args: &RunArgs,
@@ -165,7 +166,7 @@ fn supervise(
         for notice in followed.look(&mut driver.master, now_us) {
             print(driver, notice);
         }
-        // The error occurred during the run, so it is a fault and not a refusal.
+        // An error during the run is a fault and not a refusal.
         nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {

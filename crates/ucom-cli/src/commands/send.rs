@@ -1,4 +1,4 @@
-//! `ucom send`: sends single frames unchanged.
+//! Command `ucom send`: sends single frames unchanged.
 
 use std::time::{Duration, Instant};
 
@@ -11,11 +11,11 @@ use ucom_host::session::{is_intrusive, replayed};
 use super::decode::parsed;
 use crate::args::{LinkArgs, SendArgs};
 
-/// Time for which the command listens after the last frame. A controller needs up to about 32 attempts to send a
-/// frame before it is bus-off.
+/// Time for which the command listens after it has sent its last frame. A CAN controller makes up to about 32
+/// attempts to send a frame before it is bus-off.
 const SENT: Duration = Duration::from_millis(50);
 
-/// Sends the frames in the order of the command line. All frames are checked before the first frame is sent.
+/// Sends frames in the order of the command line. The command checks all frames before it sends the first frame.
 pub(super) fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let frame = |(i, text): (usize, &String)| {
         let record = parsed(text.trim(), i + 1).unwrap_or_else(|| Err(Failure::usage("an empty frame")))?;

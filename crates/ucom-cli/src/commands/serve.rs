@@ -1,4 +1,4 @@
-//! `ucom serve`: runs the agent that owns a bus.
+//! Command `ucom serve`: runs the agent that owns a bus.
 
 use std::io::IsTerminal as _;
 use std::net::TcpListener;
@@ -21,10 +21,11 @@ use ucom_sim::{ChainConfig, ChainServer, ChainSim};
 use crate::args::{LinkArgs, ServeArgs};
 use crate::interrupt::listen;
 
-/// Interval at which the process checks for signals.
+/// Interval at which the agent's process checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Owns the bus until SIGINT or SIGTERM. Then the agent stops the boards that it has started.
+/// Runs the agent until SIGINT or SIGTERM. At its end, the agent stops the boards that it has
+/// started.
 pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
         return Err(
@@ -43,7 +44,8 @@ pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(
         signals: link.signal_table()?,
         cache: args.cache.cache(),
         cleanup: CleanupList::default(),
-        // Simulated boards are new at each start, so the inventory of real boards does not apply.
+        // Simulated boards are new at each start. The inventory of real boards does not apply to
+        // simulated boards.
         inventory: (!args.sim).then(|| args.inventory.clone()),
     };
     let stop = listen(&config.cleanup)?;
@@ -60,7 +62,7 @@ pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(
     })?;
     let address = listener.local_addr()?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
-    // The simulated chain must live longer than the owner of its bus.
+    // The simulated chain must exist longer than the owner of its bus.
     let simulated = args.sim.then(|| Simulated::start(args.boards, config.profile, out)).transpose()?;
     let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
     let owner = Owner::open(&bus, config)?;
@@ -89,7 +91,7 @@ pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(
     })
 }
 
-/// Prints a note that the command log cannot be written.
+/// Returns a function that prints a note when the command log cannot be written.
 fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + use<> {
     let out = *out;
     move |error| {
@@ -119,7 +121,7 @@ impl Simulated {
                 Ok(server) => server,
                 Err(error) => return drop(ready.send(Err(error.to_string()))),
             };
-            // The receiver of this message still exists.
+            // The receiver of this message still exists, so sending it cannot fail.
             let _ = ready.send(Ok(server.url()));
             while !end.load(Ordering::Relaxed) {
                 server.turn(LOOK);
@@ -136,7 +138,7 @@ impl Drop for Simulated {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of that thread was already printed.
+            // If the simulation thread has panicked, the panic was already printed.
             drop(thread.join());
         }
     }

@@ -1,4 +1,4 @@
-//! `ucom sim`: a simulated chain of boards with a server for the socketcand protocol.
+//! Command `ucom sim`: simulates a chain of boards, with a server for the socketcand protocol.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use super::typed::typed;
 use crate::args::{LinkArgs, SimArgs};
 use crate::interrupt::listen;
 
-/// Interval at which the process checks for signals and stdin.
+/// Interval at which the simulator checks for signals and for lines on stdin.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Serves a simulated chain until SIGINT or SIGTERM.

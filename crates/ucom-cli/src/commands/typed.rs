@@ -1,4 +1,4 @@
-//! Lines that the user types during `ucom run`: they set inputs and parameters, and switch outputs on and off.
+//! Lines that the user types during `ucom run`. Typed lines set inputs and parameters, and switch outputs on and off.
 
 use cli_kit::Failure;
 use std::io::{BufRead, ErrorKind};
@@ -10,15 +10,15 @@ use ucom_host::session::{Driver, History, Prepared, note_rounded, only, words};
 
 use crate::args::{Assignment, RunArgs};
 
-/// Reads lines from stdin while the bus continues to work.
+/// Reads lines from stdin in a separate thread, so that the bus session continues.
 pub(super) fn typed() -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || each_line(std::io::stdin().lock(), |line| sender.send(line).is_ok()));
     receiver
 }
 
-/// Passes each line to `take` until the end of input, or until `take` returns `false`. If a line contains a byte
-/// that is not text, the line is reported as invalid. A `stop` in a later line is still read.
+/// Passes each line of the input to `take` until the input ends, or until `take` returns `false`. If a line contains a
+/// byte that is not text, the line is reported as invalid. A `stop` in a later line still takes effect.
 fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     let mut line = Vec::new();
     loop {
@@ -35,7 +35,8 @@ fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     }
 }
 
-/// Parses the assignments in a line. A word without `=` is the unit of the previous value, as in `current_max=1500 mA`.
+/// Parses the assignments in a typed line. A word without `=` is the unit of the previous value, as in
+/// `current_max=1500 mA`.
 fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignment>, Failure> {
     let mut values: Vec<String> = Vec::new();
     for word in words {
@@ -70,7 +71,7 @@ pub(super) fn obey(
             };
             let boards: Vec<u8> = prepared.known.keys().copied().collect();
             if !on {
-                // Failures were already reported with their boards.
+                // The failure of each board was already reported.
                 let failed = driver.outputs_safe(&boards, true).failed;
                 return failed.into_iter().next().map_or(Ok(()), |(_, failure)| Err(failure.into()));
             }

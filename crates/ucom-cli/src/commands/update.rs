@@ -1,4 +1,4 @@
-//! `ucom update`: checks firmware files, writes them to boards, and verifies the result.
+//! Command `ucom update`: checks firmware files, writes them to boards, and verifies the result.
 
 use cli_kit::{ErrorKind, Failure, Output};
 use ucom::Profile;
@@ -14,7 +14,7 @@ use super::update_files::{Files, day};
 use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
 
-/// Programs the selected boards.
+/// Programs the boards that the user has selected.
 pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let profile = link.profile()?;
     let files = Files::read(args, &profile, out)?;
@@ -26,7 +26,7 @@ pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result
     };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
-    // The images and targets are shown before any confirmation prompt and any frame.
+    // The command shows the images and targets before it asks for a confirmation and before it sends a frame.
     files.notes.iter().for_each(|note| driver.note(note.clone()));
     driver.note(format!("onto {}", targets.iter().map(target).collect::<Vec<_>>().join(", ")));
     let options = UpdateOptions {
@@ -56,14 +56,15 @@ pub(super) fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result
     }
 }
 
-/// Describes a board and the identity that it must have.
+/// Returns a text about a board and the identity that the board must have.
 fn target(target: &UpdateTarget) -> String {
     let who =
         target.flash_number.map_or_else(|| "any flash number".into(), |f| format!("flash number 0x{f:04X}"));
     format!("board {} ({who})", target.board)
 }
 
-/// Returns the selected boards. `all` selects the boards that answer and the boards of the inventory, so that a missing board is reported.
+/// Returns the boards that the user has selected. `all` selects the boards that answer and the boards of the inventory. The command can
+/// therefore report a missing board.
 fn with_listed(mut numbers: Vec<u8>, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
     if args.boards == Boards::All && args.inventory.exists() {
         let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
@@ -78,7 +79,8 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
     (0..32).filter(|board| inventory.get(*board).is_some())
 }
 
-/// Handles Ctrl-C while the boards are identified. The report says that no board was changed.
+/// Processes Ctrl-C during the identification of the boards. After Ctrl-C during the identification, the report says that no board was
+/// changed.
 fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     let inventory = Inventory::read(&args.inventory).ok();
     let left = UpdateOutcome::Cancelled;
@@ -114,7 +116,8 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
             .next("for several boards, ucom reads the flash ids from the inventory that ucom init writes")),
         };
     }
-    // A single board can be selected by its board number alone. To select several boards, their identities are required.
+    // A single board can be selected by its board number alone, without its identity. To update several boards, the command requires the
+    // identity of each board.
     if let ([board], Boards::Some(_)) = (numbers, &args.boards)
         && !args.inventory.exists()
     {

@@ -1,5 +1,5 @@
-//! Progress bar of an update on stderr. A separate thread draws the bar, so that a blocked terminal (Ctrl-S) does not
-//! delay the transfer of a block.
+//! Progress bar of a firmware update on stderr. A separate thread draws the bar. A blocked terminal (Ctrl-S)
+//! therefore does not delay the transfer of a block.
 
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
@@ -8,15 +8,15 @@ use cli_kit::{ErrorKind, Failure, Output, ProgressBar};
 use ucom_host::master::Event;
 use ucom_host::master::update::Progress;
 
-/// Maximum number of waiting steps; further steps are dropped.
+/// Maximum number of steps that are queued for the progress bar; further steps are dropped.
 const WAITING: usize = 4;
-/// Maximum wait for a blocked terminal at the end.
+/// Maximum wait for a blocked terminal when the progress bar ends.
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Next state of the progress bar.
+/// State of the progress bar that is drawn next.
 struct Step {
     bar: ProgressBar,
-    /// Number of the progress bar. A bar with a new number replaces the previous bar.
+    /// Number of the progress bar. A progress bar with a new number replaces the previous bar.
     serial: usize,
     bytes: u64,
     message: String,
@@ -28,7 +28,7 @@ pub(super) struct Bar<'a> {
     bar: Option<(Vec<u8>, ProgressBar)>,
     serial: usize,
     steps: SyncSender<Step>,
-    /// Channel that closes when the thread ends.
+    /// Channel that closes when the drawing thread ends.
     ended: Receiver<()>,
 }
 
@@ -47,7 +47,7 @@ impl<'a> Bar<'a> {
         Ok(Self { out, bar: None, serial: 0, steps, ended })
     }
 
-    /// Draws the progress of an event, if the terminal accepts output.
+    /// Draws the progress that an event reports, if the terminal accepts output.
     pub(super) fn see(&mut self, event: &Event) {
         let Event::Progress { progress, .. } = event else { return };
         if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
@@ -59,16 +59,17 @@ impl<'a> Bar<'a> {
         if let Some((_, bar)) = &self.bar {
             let (bar, serial) = (bar.clone(), self.serial);
             let step = Step { bar, serial, bytes: progress.bytes, message: message(progress) };
-            // If too many steps wait, this step is dropped. The next step includes its progress.
+            // If the queue of steps is full, the new step is dropped. The next step also contains the progress of
+            // the dropped step.
             let _ = self.steps.try_send(step);
         }
     }
 
-    /// Removes the progress bar; must be called before any other output.
+    /// Removes the progress bar; must be called before the command prints other output.
     pub(super) fn end(self) {
         let Self { steps, ended, .. } = self;
         drop(steps);
-        // The thread sends no message; the channel closes when the thread ends.
+        // The drawing thread sends no message; the channel closes when this thread ends.
         let _ = ended.recv_timeout(PRINT_TIMEOUT);
     }
 }

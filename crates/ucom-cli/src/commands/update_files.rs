@@ -1,4 +1,4 @@
-//! Files and date of an update, which are checked against the plan of the profile.
+//! Firmware files and date of an update, which the command checks against the plan in the profile.
 
 use std::path::{Path, PathBuf};
 
@@ -14,18 +14,18 @@ use crate::args::{Addresses, UpdateArgs};
 
 /// Contents of the firmware files.
 pub(super) struct Files {
-    /// The image.
+    /// Image in the first file of the command line.
     pub image: UpdateImage,
-    /// Image of the other cycle.
+    /// Image in the second file; `None` if the user specifies only one file.
     pub second: Option<UpdateImage>,
-    /// Paths of the images, in the order of the images.
+    /// Paths of the image files, in the order of the images.
     pub names: Vec<PathBuf>,
-    /// Description of each file.
+    /// Text about each image file.
     pub notes: Vec<String>,
 }
 
 impl Files {
-    /// Reads the files that the plan needs, and refuses other files.
+    /// Reads the image files that the plan needs, and refuses other files.
     pub(super) fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
         if args.name_target && !has_header(profile) {
             return Err(Failure::usage(
@@ -51,7 +51,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     let format = args.raw.then_some(Format::Bin);
     let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
-        // Some errors already contain the file name.
+        // The texts of some errors already contain the file name.
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
         failure.next(advice(&e))
@@ -71,7 +71,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     Ok((image.into(), note))
 }
 
-/// Returns the hint for an invalid image file. The hint never suggests to skip a check of the content.
+/// Returns the hint for an invalid image file. The hint never suggests skipping a check of the file's content.
 fn advice(error: &ImageError) -> String {
     match error.advice() {
         ImageAdvice::None => String::new(),
@@ -95,7 +95,7 @@ fn advice(error: &ImageError) -> String {
     }
 }
 
-/// Returns the additional image file that the plan needs.
+/// Returns the path of the second image file. Returns an error if the files do not match the plan.
 fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     let options = [
         ("--exloader", Plan::ExloaderApp, &args.exloader),
@@ -129,7 +129,8 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     Ok(None)
 }
 
-/// Returns the flash date: the requested date, or else the current date (UTC); 0 if the headers contain no date.
+/// Returns the flash date: the requested date, or else the current date (UTC). Returns 0 if the headers contain
+/// no date.
 pub(super) fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let form = profile.prog_date;
     let date = match asked {
@@ -173,7 +174,7 @@ mod tests {
     use super::*;
     use ucom::DateForm;
 
-    /// D-45: a date is a calendar day in the format of the profile, or a plain number.
+    /// D-45: a flash date is a calendar day in the format of the profile, or a plain number.
     #[test]
     fn d45_dates_are_days_of_the_calendar() {
         let fat = Profile::default();
@@ -194,11 +195,11 @@ mod tests {
             assert!(read(wrong).is_none(), "{wrong}");
         }
         assert!(day(None, &fat).is_ok_and(|today| today > 0x3AC1));
-        // This format has no calendar, so only plain numbers are valid.
+        // The date format `Raw` has no calendar, so only plain numbers are valid.
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
         assert!(day(None, &raw).is_err_and(|e| e.next.to_string().contains("0x3AC1")));
-        // A profile without a header has no date.
+        // If a profile has no header, its programs have no date.
         let none = Profile { prog_plan: Plan::Raw, ..fat };
         assert_eq!(day(None, &none).ok(), Some(0));
         assert!(day(Some("2009-06-01"), &none).is_err());

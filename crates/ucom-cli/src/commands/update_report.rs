@@ -1,4 +1,4 @@
-//! Result of an update as text and as JSON.
+//! Result of a firmware update as text and as JSON.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use ucom::{BoardInfo, Memory, Profile};
 use ucom_host::date_text;
 use ucom_host::master::update::{PlannedImage, UpdateOutcome, UpdateReport, UpdateResult, has_header};
 
-/// Prints the report; `names` are the paths of its image files.
+/// Prints the report of an update; `names` are the paths of its image files.
 pub(super) fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &Output) {
     let images = report.images.iter().zip(names);
     let value = json!({
@@ -18,7 +18,8 @@ pub(super) fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile,
         "bytes": report.bytes,
         "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
         "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
-        // Most scripts read a single outcome: the outcome of one board, or the outcome of several boards if all are equal.
+        // Most scripts read a single outcome. The field `outcome` contains the outcome of one board, or of several boards
+        // if their outcomes are equal.
         "outcome": match report.boards.as_slice() {
             [first, rest @ ..] if rest.iter().all(|b| b.outcome == first.outcome) => json!(first.outcome.name()),
             _ => Value::Null,
@@ -76,7 +77,7 @@ fn not_known(report: &UpdateReport) -> String {
     }
 }
 
-/// Describes which property could not be verified, the reason, and how the user can verify it.
+/// Returns a text that says which property could not be verified, for what reason, and how the user can verify it.
 fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     let Some(why) = report.unverifiable else { return String::new() };
     let line = |b: &UpdateResult| {
@@ -106,7 +107,7 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     format!("{lines}{why};\n{}{accept}\n", why.hint())
 }
 
-/// Returns `true` if PC_INFO now reports another program than before.
+/// Returns `true` if PC_INFO reports another program after the update than before.
 fn changed(b: &UpdateResult) -> Option<bool> {
     let program = |info: BoardInfo| (info.program_id, info.date);
     Some(program(b.before?) != program(b.after?))

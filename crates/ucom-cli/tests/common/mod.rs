@@ -1,4 +1,4 @@
-//! Runs the `ucom` command like a user, with a simulated chain.
+//! Runs the `ucom` command as a user does, with a simulated chain.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
@@ -13,12 +13,12 @@ fn command() -> Command {
     program(env!("CARGO_BIN_EXE_ucom"), "UCOM_")
 }
 
-/// Runs `ucom` with these arguments.
+/// Runs `ucom` with the arguments `words`.
 pub(crate) fn ucom(words: &[&str]) -> CommandOutput {
     ucom_with(words, "")
 }
 
-/// Runs `ucom` with this text on its stdin.
+/// Runs `ucom` with the text `stdin` on its standard input.
 pub(crate) fn ucom_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
@@ -51,14 +51,14 @@ impl Sim {
         Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
     }
 
-    /// Like `start`, but with numbered boards.
+    /// Like `start`, but all boards have numbers.
     pub(crate) fn numbered(options: &[&str]) -> Self {
         let sim = Self::start(options);
         sim.ucom(&["init"]).ends(0);
         sim
     }
 
-    /// Returns a `ucom` command for the bus of the chain.
+    /// Returns a `ucom` command that uses the bus of the chain.
     pub(crate) fn command(&self) -> Command {
         let mut command = command();
         command.env("UCOM_BUS", &self.url).env("UCOM_INVENTORY", self.path("inventory.toml"));
@@ -66,7 +66,7 @@ impl Sim {
         command
     }
 
-    /// Runs `ucom` on the bus of the chain, with a separate inventory and cache.
+    /// Runs `ucom` on the bus of the chain, with an inventory and a cache that belong to this test.
     pub(crate) fn ucom(&self, words: &[&str]) -> CommandOutput {
         run(self.command(), words, "")
     }
@@ -99,7 +99,7 @@ impl Sim {
         self.path(name)
     }
 
-    /// Starts a fault.
+    /// Starts a fault in the simulated chain.
     pub(crate) fn fault(&mut self, line: &str) {
         let stdin = self.child.stdin.as_mut().expect("stdin");
         writeln!(stdin, "{line}").expect("the simulator reads");
@@ -112,7 +112,8 @@ impl Sim {
         Peer { bus: can_link::open(&self.url).expect("the bus opens") }
     }
 
-    /// Kills the simulator, which has the effect of a power cut. Its directory stays.
+    /// Kills the simulator. For other devices on the bus, a killed simulator is like a power cut. The
+    /// directory of the simulator is not removed.
     pub(crate) fn kill(mut self) -> tempfile::TempDir {
         self.child.kill().expect("kill");
         self.child.wait().expect("it ends");
@@ -170,7 +171,7 @@ impl Peer {
         self.bus.times_bus_off()
     }
 
-    /// Returns the next frame that arrives within this time.
+    /// Returns the next frame that arrives within `within_ms`.
     pub(crate) fn receive(&mut self, within_ms: u64) -> Option<String> {
         self.receive_for(Duration::from_millis(within_ms))
     }
@@ -181,7 +182,7 @@ impl Peer {
         Some(format!("{}#{data}", frame.id()))
     }
 
-    /// Returns all frames that arrive within this time.
+    /// Returns all frames that arrive within `within_ms`.
     pub(crate) fn all(&mut self, within_ms: u64) -> Vec<String> {
         let end = Instant::now() + Duration::from_millis(within_ms);
         let mut received = Vec::new();
@@ -213,7 +214,7 @@ pub(crate) fn image(bytes: usize, seed: u8) -> Vec<u8> {
     (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
 }
 
-/// Returns the example image of the protocol, whose Program ID is 0x4B3F.
+/// Returns the example image in the protocol document. The Program ID of the example image is 0x4B3F.
 pub(crate) fn golden() -> Vec<u8> {
     (0..1000_usize).map(|i| (37 * i + 11) as u8).collect()
 }

@@ -1,4 +1,4 @@
-//! Progress bars on stderr. Other output is printed above the bar, and a finished bar is removed.
+//! Progress bars on stderr. Other output is printed above the progress bar, and a finished progress bar is removed.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
@@ -10,7 +10,7 @@ use crate::view::LEAST;
 /// Progress bar that was created last.
 static LAST: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
-/// Prints while the bar is hidden; the bar is drawn again afterwards.
+/// Prints while the progress bar is hidden, and draws the progress bar again afterwards.
 pub(crate) fn suspended<T>(print: impl FnOnce() -> T) -> T {
     let bar = LAST.lock().unwrap_or_else(PoisonError::into_inner).as_ref().and_then(WeakProgressBar::upgrade);
     match bar.filter(|bar| !bar.is_finished()) {
@@ -19,7 +19,7 @@ pub(crate) fn suspended<T>(print: impl FnOnce() -> T) -> T {
     }
 }
 
-/// Stderr for code that writes whole lines next to a bar.
+/// Stderr for code that writes whole lines while a progress bar is shown.
 #[derive(Debug)]
 pub struct Stderr;
 
@@ -42,8 +42,8 @@ pub(crate) fn stderr_width() -> Option<u16> {
         .map(|(columns, _)| columns)
 }
 
-/// Returns `Ok` if stderr is a terminal that is wide enough for bars. Otherwise the error is the size of the terminal,
-/// or `None` if stderr is not a terminal.
+/// Returns `Ok` if stderr is a terminal that is wide enough for progress bars. If the terminal is too small, the error
+/// is its size. If stderr is not a terminal, the error is `None`.
 pub fn draws_bars() -> Result<(), Option<(u16, u16)>> {
     if !std::io::stderr().is_terminal() {
         return Err(None);
@@ -64,22 +64,22 @@ fn made(total: u64, template: &str) -> ProgressBar {
     bar
 }
 
-/// Creates a bar that shows a number of steps.
+/// Creates a progress bar that shows a number of steps.
 pub(crate) fn of_steps(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{msg:8} {wide_bar:.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
     bar.set_message(what.to_owned());
     bar
 }
 
-/// Creates a bar that shows a number of bytes. The text of its owner is below the bar, so that the bar fits on narrow
-/// terminals.
+/// Creates a progress bar that shows a number of bytes. The text that the caller sets is below the progress bar, so
+/// that the bar fits on narrow terminals.
 pub(crate) fn of_bytes(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{prefix:9} {wide_bar:.cyan/dim} {bytes:>9} of {total_bytes}\n  {msg}");
     bar.set_prefix(what.to_owned());
     bar
 }
 
-/// Creates a bar that shows the milliseconds of a motion.
+/// Creates a progress bar that shows the milliseconds of a motion.
 pub(crate) fn of_motion(total_ms: u64, what: &str, keys: &str) -> ProgressBar {
     let below = if keys.is_empty() { "" } else { "\n{prefix}" };
     let of = total_ms as f64 * 1e-3;

@@ -1,15 +1,15 @@
-//! Exit codes. Scripts may rely on them.
+//! Exit codes of the commands. Scripts may rely on these codes.
 use host_kit::ErrorKind;
 
 /// A device reported an error.
 pub const DEVICE: u8 = 1;
-/// Wrong usage or unreadable input.
+/// The usage is wrong, or the input is unreadable.
 pub const USAGE: u8 = 2;
-/// No connection to the device, or no answer.
+/// The command has no connection to the device, or the device does not answer.
 pub const NO_LINK: u8 = 3;
-/// Refused by a check; nothing was sent or moved.
+/// A check rejected the command, which did not send or move anything.
 pub const REFUSED: u8 = 4;
-/// Fault during the operation.
+/// A fault occurred during the operation.
 pub const FAULT: u8 = 5;
 
 /// Returns the exit code for a kind of failure.

@@ -1,31 +1,31 @@
 //! Input of single keys from the terminal. The terminal is restored when the command ends for any reason.
 //!
-//! Ctrl-C still sends a signal. Ctrl-Z is disabled while keys are read, because a suspended command would leave a
-//! moving machine without supervision. Ctrl-S is disabled because it would block the command at its next output, and
-//! the command could not read the stop key.
+//! While keys are read, Ctrl-C still sends a signal. Ctrl-Z is disabled while keys are read, because a suspended
+//! command would leave a moving machine without supervision. Ctrl-S is disabled because it would block the command at
+//! its next output, and the command could not read the stop key.
 
-/// A key.
+/// A key of the keyboard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
     /// Letter or other character.
     Char(char),
-    /// Arrow up.
+    /// Arrow key up.
     Up,
-    /// Arrow down.
+    /// Arrow key down.
     Down,
-    /// Arrow left.
+    /// Arrow key left.
     Left,
-    /// Arrow right.
+    /// Arrow key right.
     Right,
-    /// A page back.
+    /// Key that scrolls back by one page.
     PageUp,
-    /// A page on.
+    /// Key that scrolls forward by one page.
     PageDown,
     /// Key that scrolls to the first row.
     Home,
     /// Key that scrolls to the last row.
     End,
-    /// Esc.
+    /// Escape key.
     Escape,
 }
 
@@ -35,7 +35,8 @@ fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
     let (mut keys, mut rest) = (Vec::new(), bytes);
     while let [first, more @ ..] = rest {
         if *first != 0x1B {
-            // Characters beyond ASCII are not keys here; each of their bytes would produce a wrong key.
+            // This function ignores characters beyond ASCII, because each byte of such a character would produce a
+            // wrong key.
             if first.is_ascii() {
                 keys.push(Key::Char(char::from(*first)));
             }
@@ -99,18 +100,19 @@ mod terminal {
 
     /// Key input from stdin, if stdin is a terminal and this process is in the foreground.
     pub struct Keys {
-        /// Bytes of a key that has not arrived completely.
+        /// Bytes of a key whose remaining bytes have not arrived yet.
         begun: Vec<u8>,
         gone: bool,
     }
 
     impl Keys {
-        /// Starts to read single keys without echo; returns `None` without a terminal.
+        /// Starts to read single keys without echo. Returns `None` if stdin is not a terminal, or if this process is in
+        /// the background.
         pub fn listen() -> Option<Self> {
             if !std::io::stdin().is_terminal() {
                 return None;
             }
-            // In the background, changing the terminal would suspend this process.
+            // If a background process changed the terminal mode, the system would suspend the process.
             if tcgetpgrp(stdin()).is_ok_and(|foreground| foreground != getpgrp()) {
                 return None;
             }
@@ -138,7 +140,7 @@ mod terminal {
                 return Vec::new();
             }
             if !matches!(waited, Ok(1..)) {
-                // If the key had more bytes, they would have arrived together with the first byte.
+                // If the key had more bytes, these bytes would have arrived together with the first byte.
                 return if std::mem::take(&mut self.begun).is_empty() {
                     Vec::new()
                 } else {
@@ -180,7 +182,7 @@ mod console {
 
     use super::Key;
 
-    /// Does not do anything, because a console does not need another mode for single keys.
+    /// Does nothing, because a console does not need another mode for single keys.
     pub(crate) fn restore() {}
 
     /// Key input from the console.
@@ -237,7 +239,7 @@ mod tests {
         assert_eq!(keys(b"\x1BOA\x1B[6~\x1B[1~"), (vec![Key::Up, Key::PageDown, Key::Home], &b""[..]));
         assert_eq!(keys(b"x\x1B[5"), (vec![Key::Char('x')], &b"\x1B[5"[..]));
         assert_eq!(keys(b"\x1B"), (vec![], &b"\x1B"[..]));
-        // Unknown keys and letters that are not ASCII are ignored.
+        // The parser ignores unknown keys and letters that are not ASCII.
         assert_eq!(keys("\x1B[15~\u{e9}s".as_bytes()), (vec![Key::Char('s')], &b""[..]));
     }
 }

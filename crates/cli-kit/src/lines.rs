@@ -1,5 +1,5 @@
-//! Lines that a separate thread prints, so that a blocked reader (`ucom run --json | less`) does not block the control
-//! loop.
+//! Output lines that a separate thread prints, so that a blocked reader (`ucom run --json | less`) does not block the
+//! control loop.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use crate::bar::Stderr;
 use crate::stdout;
 
-/// Largest number of waiting lines.
+/// Largest number of lines that wait in the queue.
 const WAITING: usize = 1000;
 /// Longest wait for a blocked reader when the command ends.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// A queue of lines and the thread that prints them.
+/// A queue of output lines and the thread that prints the lines.
 pub struct Lines {
     shared: Arc<Shared>,
     is_stdout: bool,
@@ -30,11 +30,11 @@ struct Shared {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<String>,
-    /// `true` while a line was taken from the queue but is not written yet.
+    /// `true` while the thread has taken a line from the queue but not written it yet.
     writing: bool,
     written: u64,
     dropped: u64,
-    /// `true` if the reader has disconnected.
+    /// `true` if the reader of the output has disconnected.
     gone: bool,
     closed: bool,
 }
@@ -46,12 +46,12 @@ impl Shared {
 }
 
 impl Lines {
-    /// Prints to stdout.
+    /// Creates a queue whose lines are printed to stdout.
     pub fn stdout() -> std::io::Result<Self> {
         Self::to(std::io::stdout(), true)
     }
 
-    /// Prints to stderr, above a bar if there is one.
+    /// Creates a queue whose lines are printed to stderr, above the progress bar if there is a progress bar.
     pub fn stderr() -> std::io::Result<Self> {
         Self::to(Stderr, false)
     }
@@ -65,12 +65,12 @@ impl Lines {
         Ok(Self { shared, is_stdout, finished: false })
     }
 
-    /// Adds a line to the queue, which is printed in order; drops the line if too many lines wait.
+    /// Adds a line to the queue. The thread prints the lines in order. Drops the line if too many lines wait.
     pub fn push(&self, line: String) {
         self.add(line, WAITING);
     }
 
-    /// Like [`Self::push`], for a rare line that is never dropped.
+    /// Like [`Self::push`], for a rare line that must never be dropped.
     pub fn push_always(&self, line: String) {
         self.add(line, usize::MAX);
     }
@@ -89,12 +89,12 @@ impl Lines {
         self.shared.changed.notify_all();
     }
 
-    /// Returns `true` if the reader has disconnected (`ucom so | head`), or the output no longer accepts data.
+    /// Returns `true` if the reader has disconnected (`ucom so | head`), or if the output no longer accepts data.
     pub fn gone(&self) -> bool {
         self.shared.lock().gone
     }
 
-    /// Prints the waiting lines while they are read. Returns the number of lines that stay unread.
+    /// Prints the waiting lines as long as the reader accepts them. Returns the number of lines that stay unread.
     pub fn finish(&mut self) -> u64 {
         self.finished = true;
         let mut state = self.shared.lock();
@@ -160,7 +160,7 @@ mod tests {
 
     use super::*;
 
-    /// Accepts a line only when the test permits it; fails after the other side has disconnected.
+    /// Output that accepts a line only when the test permits it. A write fails after the reader has disconnected.
     struct Slow(SyncSender<Vec<u8>>);
 
     impl Write for Slow {
@@ -178,13 +178,14 @@ mod tests {
         (Lines::to(Slow(sender), false).unwrap(), receiver)
     }
 
-    /// With a blocked reader, lines can still be pushed and excess lines are counted. The wait at the end is limited.
+    /// With a blocked reader, the command can still push lines, and the queue counts excess lines. The wait at the end
+    /// of the command is limited.
     #[test]
     fn a_reader_that_does_not_read_stops_nothing() {
         let (mut lines, _reader) = slow();
         (0..3 * WAITING).for_each(|i| lines.push(i.to_string()));
         lines.push_always("end".into());
-        // The thread may already have taken one line.
+        // The printing thread may already have taken one line.
         let unseen = lines.finish();
         assert_eq!(unseen, 3 * WAITING as u64 + 1);
     }

@@ -1,4 +1,4 @@
-//! Output: results to stdout as text or JSON, progress and logs to stderr.
+//! Output of a command: results to stdout as text or JSON, progress and logs to stderr.
 //!
 //! With JSON, a long command prints events to stderr while it works, one object per line with the key `event`. Stdout
 //! contains only the result of the command. A blocked reader does not block a command: events wait in a queue, and
@@ -17,7 +17,7 @@ use crate::lines::Lines;
 use crate::stdout;
 use crate::{Failure, error_object};
 
-/// Events of this process that wait until they are read; empty if the process does not stream events.
+/// Events of this process that wait until the reader accepts them. Empty if the process does not stream events.
 static STREAM: OnceLock<Mutex<Stream>> = OnceLock::new();
 
 /// Lines of an event stream, and the start time of the stream.
@@ -34,7 +34,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Creates an output. `program` is printed before errors; `json` selects JSON objects instead of text.
+    /// Creates an output. The name `program` is printed before errors; `json` selects JSON objects instead of text.
     pub fn new(program: &'static str, json: bool) -> Self {
         Self { program, json }
     }
@@ -44,8 +44,8 @@ impl Output {
         self.json
     }
 
-    /// Starts the event stream: events are printed as they occur, and notes are printed as events. Does nothing unless
-    /// JSON was requested.
+    /// Starts the event stream. The command then prints events as they occur, and prints notes as events. Does nothing
+    /// unless JSON was requested.
     pub fn stream(&self) -> std::io::Result<()> {
         if self.json && STREAM.get().is_none() {
             let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stderr()?, began: Instant::now() }));
@@ -53,7 +53,7 @@ impl Output {
         Ok(())
     }
 
-    /// Prints an event, with the seconds since the stream began; does nothing without a stream.
+    /// Prints an event, with the seconds since the stream began. Does nothing without an event stream.
     pub fn event(&self, name: &str, value: Value) {
         let Some(stream) = STREAM.get() else { return };
         let stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
@@ -65,13 +65,13 @@ impl Output {
         stream.lines.push(event.to_string());
     }
 
-    /// Prints the waiting lines of a stream while the reader reads them.
+    /// Prints the waiting lines of the event stream as long as the reader accepts them.
     pub fn finish() {
         let Some(stream) = STREAM.get() else { return };
         stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
     }
 
-    /// Formats a result, which is `value` as one line of JSON, or the text.
+    /// Formats a result: `value` as one line of JSON, or the text.
     pub fn words(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> String {
         if self.json {
             serde_json::to_string(value)
@@ -81,14 +81,14 @@ impl Output {
         }
     }
 
-    /// Prints a result: `value` as one line of JSON, or the text, which is wrapped between words on a terminal.
+    /// Prints a result: `value` as one line of JSON, or the text. On a terminal, the text is wrapped between words.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         let width = if self.json { None } else { stdout_width() };
         let line = within(&self.words(value, text), width);
         Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
     }
 
-    /// Prints a result that is a complete file, unchanged.
+    /// Prints a result that is a complete file, without changes.
     pub fn bytes(bytes: &[u8]) {
         suspended(|| {
             let mut stdout = std::io::stdout().lock();
@@ -99,24 +99,24 @@ impl Output {
     }
 
     /// Stores the reason why output to stdout was lost. A reader that has disconnected (`… | head`) has read enough, so
-    /// this is not stored as a loss.
+    /// the function does not store this case as a loss.
     pub fn lose(why: &std::io::Error) {
         stdout::lose(why);
     }
 
-    /// Returns `true` if no reader accepts further output; a command that only prints may then end.
+    /// Returns `true` if no reader accepts further output. A command that only prints may then end.
     pub fn gone() -> bool {
         stdout::is_gone()
     }
 
-    /// Returns the reason why a result could not be printed, or `None` if the result was printed. In the first case the
-    /// command was successful, but the user cannot read the result.
+    /// Returns the reason why a result could not be printed, or `None` if the result was printed. If a reason is
+    /// returned, the command was successful, but the user cannot read the result.
     pub fn lost() -> Option<&'static str> {
         stdout::lost()
     }
 
-    /// Prints one line of a log. Text that cannot be printed is dropped, because a lost terminal must not leave a
-    /// machine without control.
+    /// Prints one line of a log. Drops text that cannot be printed, because a lost terminal must not leave a machine
+    /// without control.
     pub fn note(&self, text: impl std::fmt::Display) {
         if STREAM.get().is_some() {
             self.event("note", json!({ "text": text.to_string().trim() }));
@@ -126,8 +126,8 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
-    /// Prints one line of a log before the command begins. With JSON, the line is an event `note`, because the command
-    /// may stream events.
+    /// Prints one line of a log before the command begins. With JSON, the log line is an event `note`, because the
+    /// command may stream events.
     pub(crate) fn log(&self, text: &str) {
         if !self.json {
             return self.note(text);
@@ -136,18 +136,18 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{event}")));
     }
 
-    /// Creates a bar on stderr, which is invisible if stderr is not a terminal.
+    /// Creates a progress bar on stderr, which is invisible if stderr is not a terminal.
     pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
         bar::of_steps(total, what)
     }
 
-    /// Creates a bar of bytes on stderr, with the text of its owner below it.
+    /// Creates a progress bar of bytes on stderr, with the text that the caller sets below the bar.
     pub fn bytes_bar(&self, total: u64, what: &str) -> ProgressBar {
         bar::of_bytes(total, what)
     }
 
-    /// Creates a bar on stderr for a motion of `total_ms` milliseconds. The text of its owner is below the bar, and the
-    /// keys are below this text.
+    /// Creates a progress bar on stderr for a motion of `total_ms` milliseconds. The text that the caller sets is below
+    /// the bar, and the keys are below this text.
     pub fn motion_bar(&self, total_ms: u64, what: &str, keys: &str) -> ProgressBar {
         bar::of_motion(total_ms, what, keys)
     }
@@ -160,7 +160,8 @@ impl Output {
         self.warn(&failure.message, &failure.next.to_string());
     }
 
-    /// Prints an error and the next step, in the form used at the end of a command. On a terminal the text is wrapped between words.
+    /// Prints an error and the next step, in the same form as at the end of a command. On a terminal, the text is wrapped between
+    /// words.
     pub fn warn(&self, message: &str, hint: &str) {
         let width = bar::stderr_width();
         self.note(hanging(&format!("{}: ", self.program), message, width));
@@ -170,7 +171,7 @@ impl Output {
     }
 }
 
-/// Wraps long lines between words; rows of tables stay unchanged.
+/// Wraps long lines between words. Rows of tables stay unchanged.
 fn within(text: &str, width: Option<u16>) -> String {
     let Some(width) = width.filter(|width| *width >= 16) else { return text.to_owned() };
     let lines = text.lines().map(|line| {
@@ -186,8 +187,8 @@ fn within(text: &str, width: Option<u16>) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Formats text after a heading. Further lines are aligned with the start of the first line; the text is unchanged if
-/// the width is unknown.
+/// Formats text after a heading. Further lines are aligned with the start of the text in the first line. The text is
+/// unchanged if the width is unknown.
 fn hanging(head: &str, text: &str, width: Option<u16>) -> String {
     let Some(room) = width.and_then(|w| w.checked_sub(head.len() as u16 + 1)).filter(|room| *room >= 16)
     else {
@@ -197,7 +198,7 @@ fn hanging(head: &str, text: &str, width: Option<u16>) -> String {
     format!("{head}{}", lines.join(&format!("\n{:1$}", "", head.len())))
 }
 
-/// Formats a number with `digits` decimals; a number that rounds to zero has no sign.
+/// Formats a number with `digits` decimals. A number that rounds to zero has no sign.
 pub fn figure(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     match text.strip_prefix('-') {
@@ -211,9 +212,9 @@ fn stdout_width() -> Option<u16> {
     std::io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten().map(|size| size.0)
 }
 
-/// Formats rows as a text table. Words are aligned to the left; columns whose heading begins with `>` (numbers) are
-/// aligned to the right. On a terminal that is too narrow for all columns, the remaining columns follow below, with the
-/// first column repeated.
+/// Formats rows as a text table. Words are aligned to the left. Columns whose heading begins with `>` (numbers) are
+/// aligned to the right. If the terminal is too narrow for all columns, the columns that do not fit follow below, with
+/// the first column repeated.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     table_within(head, rows, stdout_width())
 }
@@ -222,7 +223,7 @@ fn table_within(head: &[&str], rows: &[Vec<String>], width: Option<u16>) -> Stri
     let text = whole_table(head, rows);
     let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
     let Some(width) = width.filter(|width| usize::from(*width) < widest) else { return text };
-    // Selects as many columns as fit next to the first column, but at least one.
+    // Selects as many columns as fit to the right of the first column, but at least one.
     for count in (2..head.len()).rev() {
         let rest: Vec<usize> = (count..head.len()).collect();
         let pick = |columns: &[usize]| {
@@ -279,7 +280,7 @@ mod tests {
         assert_eq!(within("one two three four five", None), "one two three four five");
     }
 
-    /// Columns are never truncated on a narrow terminal.
+    /// The table never truncates columns on a narrow terminal.
     #[test]
     fn columns_without_room_come_below() {
         let rows = [vec!["joint 1".into(), "0.201".into(), "0.773".into(), "12".into()]];

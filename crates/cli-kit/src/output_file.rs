@@ -1,4 +1,5 @@
-//! Output files of a command. Each is opened before any frame is sent, and is overwritten only on request.
+//! Output files of a command. The command opens each output file before it sends any frame, and overwrites existing
+//! files only on request.
 
 use std::fmt;
 use std::fs::{File, OpenOptions};
@@ -8,26 +9,26 @@ use std::sync::{Mutex, PoisonError};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Reason why an output is not written.
+/// Reason why a command does not write an output file.
 #[derive(Debug)]
 pub enum OutputError {
-    /// The file exists, and overwriting was not requested.
+    /// The output file exists, and overwriting was not requested.
     Exists {
-        /// The file.
+        /// Path of the output file.
         path: PathBuf,
     },
-    /// The file is also an input of the command, or another output.
+    /// The output file is also an input of the command, or another output of the command.
     SameFile {
-        /// The file.
+        /// Path of the output file.
         path: PathBuf,
-        /// Its other name.
+        /// Other name of the same file.
         other: PathBuf,
     },
-    /// The system cannot open or write the file.
+    /// The operating system cannot open or write the output file.
     Io {
-        /// The file.
+        /// Path of the output file.
         path: PathBuf,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -69,22 +70,23 @@ impl Diagnose for OutputError {
     }
 }
 
-/// Outputs that this process has created but not written yet.
+/// Paths of output files that this process has created but not written yet.
 static UNWRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes outputs that were created and never written, before the process ends without any `Drop`.
+/// Removes output files that were created and never written, before the process ends without any `Drop`.
 pub fn abandon() {
     for path in UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
         let _ = std::fs::remove_file(path);
     }
 }
 
-/// Removes `path` from the unwritten outputs.
+/// Removes `path` from the list of unwritten output files.
 fn settled(path: &Path) {
     UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).retain(|p| p != path);
 }
 
-/// Open output that is still empty or unchanged. If the output is dropped before it is written, a new file is removed.
+/// Open output file that is still empty or unchanged. If the `OutputFile` is dropped before it is written, a new file
+/// is removed.
 pub struct OutputFile {
     path: PathBuf,
     file: File,
@@ -94,9 +96,9 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Opens `path` for writing. An existing file is refused without `overwrite`. A file of `others` (inputs of the
-    /// command, and its other outputs) is always refused. Commands that send frames must themselves report that they
-    /// sent no frames.
+    /// Opens `path` for writing. Rejects an existing file if `overwrite` is `false`. Always rejects a file of `others`
+    /// (inputs of the command, and its other outputs). If a command that sends frames gets this error, the command must
+    /// report that it sent no frames.
     pub fn open(path: &Path, overwrite: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             return Err(OutputError::SameFile { path: path.to_owned(), other: other.to_path_buf() });
@@ -118,25 +120,25 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), file, made: false, written: false })
     }
 
-    /// Returns the name of the output for users.
+    /// Returns the name of the output file for users.
     pub fn name(&self) -> String {
         self.path.display().to_string()
     }
 
-    /// Returns the path of the file.
+    /// Returns the path of the output file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes the whole file.
+    /// Writes the complete output file.
     pub fn write(mut self, bytes: impl AsRef<[u8]>) -> Result<(), OutputError> {
         let mut file = self.begin()?;
         let done = file.write_all(bytes.as_ref()).and_then(|()| settle(&file));
         done.map_err(|e| self.failure(e))
     }
 
-    /// Returns a handle for writing, and discards the old content. The caller must call [`settle`] after the last
-    /// write.
+    /// Returns a handle for writing, and discards the old content of the file. The caller must call [`settle`] after
+    /// the last write.
     pub fn begin(&mut self) -> Result<File, OutputError> {
         self.written = true;
         settled(&self.path);
@@ -152,20 +154,20 @@ impl OutputFile {
         Ok(file)
     }
 
-    /// Marks the output as written, because other code created the file at its path, for example by renaming a complete
-    /// file.
+    /// Marks the output file as written, because other code created the file at its path, for example by renaming a
+    /// complete file.
     pub fn is_written(mut self) {
         self.written = true;
         settled(&self.path);
     }
 
-    /// Marks the content as useless. If the output is dropped in this state, its file is removed, unless the file
-    /// existed before.
+    /// Marks the content of the output file as useless. If the `OutputFile` is dropped in this state, its file is
+    /// removed, unless the file existed before.
     pub fn is_worthless(&mut self) {
         self.written = false;
     }
 
-    /// Returns the reason why writing failed.
+    /// Returns the error that explains why writing failed.
     pub fn failure(&self, source: io::Error) -> OutputError {
         OutputError::Io { path: self.path.clone(), source }
     }
@@ -180,7 +182,7 @@ impl Drop for OutputFile {
     }
 }
 
-/// Waits until the bytes are on the disk, because some systems report a full disk only at that time.
+/// Waits until the bytes of the file are on the disk, because some systems report a full disk only at that time.
 pub fn settle(file: &File) -> io::Result<()> {
     if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
 }
@@ -190,7 +192,7 @@ fn same(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || one_inode(a, b)
 }
 
-/// Returns `true` if two names are hard links of one file.
+/// Returns `true` if two paths are hard links of one file.
 #[cfg(unix)]
 fn one_inode(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -198,7 +200,7 @@ fn one_inode(a: &Path, b: &Path) -> bool {
     number(a).is_some_and(|n| number(b) == Some(n))
 }
 
-/// The standard library provides file numbers only on Unix.
+/// Always returns `false`, because the standard library provides file numbers only on Unix.
 #[cfg(not(unix))]
 fn one_inode(_: &Path, _: &Path) -> bool {
     false
@@ -217,7 +219,7 @@ mod tests {
         std::fs::write(&input, "read").unwrap();
         let code =
             |result: Result<OutputFile, OutputError>| result.err().map(|e| (exit::of(e.kind()), e.code()));
-        // Commands without a port or bus send no frames, so the message does not say that nothing was sent.
+        // Commands without a port or bus send no frames, so the message does not mention frames.
         let there = OutputFile::open(&old, false, &[]).err().unwrap();
         assert!(there.to_string().ends_with("already exists"), "{there}");
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));

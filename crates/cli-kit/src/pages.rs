@@ -7,7 +7,7 @@ use clap::CommandFactory;
 
 use crate::Output;
 
-/// Prints the completions of a shell.
+/// Prints the completions of the command line for a shell.
 pub fn completions<Cli: CommandFactory>(shell: clap_complete::Shell) {
     let mut command = Cli::command();
     let name = command.get_name().to_owned();

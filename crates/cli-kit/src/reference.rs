@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use clap::{Arg, Command, CommandFactory};
 
-/// Returns the page of all commands: usage, arguments, options with defaults and variables, and the text below the
-/// help. `opening` follows the title.
+/// Returns the reference page of all commands: usage, arguments, options with defaults and variables, and the text
+/// below the help. `opening` follows the title of the page.
 pub fn markdown<Cli: CommandFactory>(opening: &str) -> String {
     let mut command = Cli::command();
     command.build();
@@ -22,7 +22,8 @@ fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|sub| !sub.is_hide_set() && sub.get_name() != "help" || has_options(sub))
 }
 
-/// Returns `true` for the program's own `help`, which has arguments. The `help` that clap adds has no arguments.
+/// Returns `true` for a `help` command that the program defines, which has arguments. The `help` command that clap adds
+/// has no arguments.
 fn has_options(command: &Command) -> bool {
     command.get_name() == "help"
         && command.get_subcommands().next().is_none()
@@ -45,12 +46,12 @@ fn one(command: &Command, top: bool, page: &mut String) {
     if let Some(about) = command.get_long_about().filter(|_| command.get_about().is_none()) {
         let _ = write!(page, "{}\n\n", text(&about.to_string()));
     }
-    // Uses the usage text that clap prints on the screen, without its margins.
+    // This code uses the usage text that clap prints on the screen, without its margins.
     let usage = command.clone().render_usage().to_string();
     let usage = usage.trim_start_matches("Usage:").trim();
     let lines: Vec<&str> = usage.lines().map(str::trim).collect();
     let _ = write!(page, "```text\n{}\n```\n\n", lines.join("\n"));
-    // Options of every command are listed once, at the top of the page.
+    // The page lists the options that every command has only once, at the top.
     let shown = |arg: &&Arg| {
         !arg.is_hide_set()
             && !["help", "version"].contains(&arg.get_id().as_str())
@@ -94,7 +95,7 @@ fn names(arg: &Arg) -> String {
     format!("`{}`", format!("{typed} {values}").trim())
 }
 
-/// Returns the purpose of an argument, its possible values, its default and its variable.
+/// Returns the purpose of an argument, its possible values, its default and its environment variable.
 fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or_else(|| arg.get_help());
     let mut words = help.map(|help| text(&help.to_string())).unwrap_or_default();
@@ -115,7 +116,7 @@ fn meaning(arg: &Arg) -> String {
     words
 }
 
-/// Converts a help text to a line of Markdown. Special characters are escaped, except in code.
+/// Converts a help text to a line of Markdown. The function escapes special characters, except in code.
 fn text(help: &str) -> String {
     let mut out = String::new();
     for (n, part) in help.replace("\n\n", " ").replace('\n', " ").split('`').enumerate() {

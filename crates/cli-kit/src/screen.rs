@@ -1,4 +1,4 @@
-//! Live view on the whole terminal, which is restored when the command ends for any reason.
+//! Live view that uses the whole terminal. The terminal is restored when the command ends for any reason.
 
 use std::io::{IsTerminal, Stdout, Write};
 use std::mem::ManuallyDrop;
@@ -12,11 +12,11 @@ use ratatui::{Frame, Terminal};
 
 use crate::keys::{Key, Keys};
 
-/// `true` while a view is shown.
+/// `true` while a live view is shown.
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// Restores the terminal if a view or key input has changed it. A second call has no effect; a lost terminal is
-/// ignored.
+/// Restores the terminal if a live view or key input has changed it. A second call has no effect, and errors of a lost
+/// terminal are ignored.
 pub fn restore_terminal() {
     if SHOWN.swap(false, Ordering::Relaxed) {
         let mut stdout = std::io::stdout();
@@ -25,17 +25,17 @@ pub fn restore_terminal() {
     crate::keys::restore();
 }
 
-/// Terminal of a view, with the key input.
+/// Terminal of a live view, with the key input.
 pub struct Screen {
-    /// This value is never dropped, because its drop would print, and would panic if the terminal is lost.
+    /// The process never drops this value, because dropping it would print, and would panic if the terminal is lost.
     terminal: ManuallyDrop<Terminal<CrosstermBackend<Stdout>>>,
     keys: Keys,
     gone: bool,
 }
 
 impl Screen {
-    /// Opens a view on the terminal. Returns `None` if stdin or stdout is not a terminal, or if this process is in the
-    /// background; the caller then prints lines.
+    /// Opens a live view on the terminal. Returns `None` if stdin or stdout is not a terminal, or if this process is in
+    /// the background. The caller then prints lines instead.
     pub fn take() -> std::io::Result<Option<Self>> {
         if !std::io::stdout().is_terminal() {
             return Ok(None);
@@ -60,12 +60,12 @@ impl Screen {
         self.keys.pressed()
     }
 
-    /// Draws a view. After a failure, the view is not drawn again.
+    /// Draws the live view. After a failure, the view is not drawn again.
     pub fn draw(&mut self, picture: impl FnOnce(&mut Frame<'_>)) {
         self.gone |= self.terminal.draw(picture).is_err();
     }
 
-    /// Returns `true` if the terminal of the view was closed.
+    /// Returns `true` if the terminal of the live view was closed.
     pub fn gone(&self) -> bool {
         self.gone || self.keys.gone()
     }

@@ -1,11 +1,11 @@
-//! Ctrl-C and similar signals as a flag that loops check.
+//! Ctrl-C and similar signals as a flag, which loops of the command check.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Returns the signals that end a command: Ctrl-C, `kill`, and SIGHUP when its terminal closes. SIGHUP is omitted if
-/// the command was started with `nohup`.
+/// Returns the signals that end a command: Ctrl-C, `kill`, and SIGHUP when its terminal closes. SIGHUP is not in the
+/// list if the command was started with `nohup`.
 fn signals() -> impl Iterator<Item = i32> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     #[cfg(unix)]
@@ -15,7 +15,7 @@ fn signals() -> impl Iterator<Item = i32> {
     [SIGINT, SIGTERM].into_iter().chain(hangup)
 }
 
-/// Returns `true` if this process was started with SIGHUP ignored, and the system reports it.
+/// Returns `true` if the operating system reports that this process was started with SIGHUP ignored.
 #[cfg(unix)]
 fn hangup_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -25,7 +25,7 @@ fn hangup_ignored() -> bool {
 
 /// Interval at which the thread of [`Stop::listen_with`] checks for signals.
 const LOOK: Duration = Duration::from_millis(10);
-/// Signals within this time are treated as one.
+/// Time within which several signals count as one signal.
 const ONE_PRESS: Duration = Duration::from_millis(100);
 
 /// Flag that SIGINT, SIGTERM or SIGHUP sets.
@@ -33,12 +33,12 @@ const ONE_PRESS: Duration = Duration::from_millis(100);
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Starts to handle signals. The first SIGINT, SIGTERM or SIGHUP sets the flag; the second ends the process.
+    /// Starts to handle signals. The first SIGINT, SIGTERM or SIGHUP sets the flag; the second signal ends the process.
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         for signal in signals() {
-            // The second Ctrl-C ends the process in every state. This handler is registered first, because it must
-            // read the flag before the other handler sets it.
+            // The second Ctrl-C ends the process in every state. The handler for this case is registered first, because
+            // it must read the flag before the handler that sets the flag.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))?;
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
         }
@@ -46,10 +46,10 @@ impl Stop {
     }
 
     /// Starts to handle signals. The first SIGINT, SIGTERM or SIGHUP sets the flag. The second signal ends the process
-    /// in every state, with the terminal restored. The exit code comes from `last_words`, which runs in a separate
-    /// thread and may print.
+    /// in every state, after the terminal is restored. The closure `last_words` returns the exit code, runs in
+    /// a separate thread, and may print.
     ///
-    /// Signals that follow each other within 0.1 s are treated as one, because a terminal and a wrapper program may
+    /// Signals that follow each other within 0.1 s count as one signal, because a terminal and a wrapper program may
     /// both send a signal.
     pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
         let came = Arc::new(AtomicBool::new(false));
@@ -74,7 +74,7 @@ impl Stop {
         Ok(Self(asked))
     }
 
-    /// Returns `true` if a signal has requested the end.
+    /// Returns `true` if a signal has requested the end of the command.
     pub fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -4,7 +4,7 @@
 ///
 /// # Errors
 ///
-/// An error for users if the text is not a valid size, or the size is below `least`.
+/// Returns an error for users if the text is not a valid size, or the size is below `least`.
 pub fn size(text: &str, least: u64) -> Result<u64, String> {
     let text = text.trim();
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());

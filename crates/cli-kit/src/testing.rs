@@ -1,4 +1,4 @@
-//! Test support that runs a command as a user does, with or without a terminal.
+//! Test support that runs a command in the same way as a user, with or without a terminal.
 
 #[cfg(unix)]
 mod screen;
@@ -21,7 +21,7 @@ pub use terminal::Terminal;
 ///
 /// # Panics
 ///
-/// A paragraph has several lines.
+/// Panics if a paragraph has several lines.
 pub fn check_help_is_wrapped_once(command: &clap::Command) {
     for help in [command.get_after_help(), command.get_after_long_help(), command.get_long_about()] {
         let text = help.map(ToString::to_string).unwrap_or_default();
@@ -66,9 +66,9 @@ pub fn check_commands_of_next_steps(program: &clap::Command) {
 pub struct CommandOutput {
     /// Exit code of the command; −1 if a signal ended the command.
     pub code: i32,
-    /// Its stdout.
+    /// Text that the command printed to stdout.
     pub out: String,
-    /// Its stderr.
+    /// Text that the command printed to stderr.
     pub err: String,
 }
 
@@ -79,20 +79,20 @@ impl CommandOutput {
         serde_json::from_str(self.out.trim().lines().last().unwrap_or_default()).unwrap_or_else(error)
     }
 
-    /// Returns the lines of stderr as JSON objects; panics if a line is not JSON.
+    /// Returns the lines of stderr as JSON objects. Panics if a line is not JSON.
     pub fn events(&self) -> Vec<Value> {
         let parse = |line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line:?}"));
         self.err.lines().map(parse).collect()
     }
 
-    /// Returns the output if the command ended with this code; panics otherwise.
+    /// Returns the output if the command ended with this exit code. Panics if the exit code is different.
     pub fn ends(self, code: i32) -> Self {
         assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
         self
     }
 }
 
-/// Returns a program without environment variables that begin with `prefix`.
+/// Returns a program that runs without environment variables that begin with `prefix`.
 pub fn program(path: &str, prefix: &str) -> Command {
     let mut command = Command::new(path);
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with(prefix)) {
@@ -101,7 +101,7 @@ pub fn program(path: &str, prefix: &str) -> Command {
     command
 }
 
-/// Runs a command with these arguments and this stdin until it ends.
+/// Runs a command with these arguments and this stdin, and waits for its end.
 pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     let pipes = command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = pipes.spawn().expect("it starts");
@@ -121,7 +121,7 @@ pub fn ended(child: Child) -> CommandOutput {
     }
 }
 
-/// Sends a signal to a process of the test. The name is an option of `kill`, such as `-INT`.
+/// Sends a signal to a process that the test started. The name is an option of `kill`, such as `-INT`.
 pub fn signal(child: &Child, name: &str) {
     Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
 }

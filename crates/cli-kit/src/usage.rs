@@ -1,4 +1,4 @@
-//! Command-line parsing, with a JSON error for wrong usage if JSON was requested.
+//! Command-line parsing, which reports wrong usage as JSON if JSON was requested.
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -11,17 +11,17 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use crate::variables::{Variables, on_off};
 use crate::{Failure, Output, error_object, exit, print_within};
 
-/// Longest wait until text that is printed before the command begins is read.
+/// Longest wait until the reader has read the text that is printed before the command begins.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// Parses the command line of this process; otherwise prints help, version or wrong usage, and returns the exit code.
-/// Wrong usage is also one JSON object on stdout if `--json` or its variable requests JSON, in addition to the text on
-/// stderr. Variables that set an option of the command are listed on stderr.
+/// Parses the command line of this process. If this is not possible, prints help, version or wrong usage, and returns
+/// the exit code. If `--json` or its variable requests JSON, wrong usage is printed as one JSON object on stdout, in
+/// addition to the text on stderr. Variables that set an option of the command are listed on stderr.
 pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Result<Cli, ExitCode> {
     parse_with(program, variables, &[])
 }
 
-/// Like [`parse`]. `meant` lists words that users try as commands, each with the command to use.
+/// Like [`parse`]. The list `meant` contains words that users try as commands, each with the command to use.
 pub fn parse_with<Cli: Parser>(
     program: &'static str,
     variables: &Variables,
@@ -71,7 +71,7 @@ pub fn parse_with<Cli: Parser>(
     Err(ExitCode::from(exit::USAGE))
 }
 
-/// Replaces the parser's suggestion by the command to use, if `meant` lists the word.
+/// If the list `meant` contains the word, replaces the suggestion of the parser by the command to use.
 fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
     let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand) else { return };
     let word = word.to_lowercase();
@@ -81,14 +81,14 @@ fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
     }
 }
 
-/// Returns `true` if the words contain the option, or if the variable has a value that means "on".
+/// Returns `true` if the command line contains the option, or if the variable has a value that means "on".
 fn json_is_asked<'a>(words: impl Iterator<Item = &'a OsString>, variable: Option<&OsStr>) -> bool {
     let by_variable = variable.is_some_and(|v| on_off(&v.to_string_lossy()) == Ok(true));
     let mut options = words.take_while(|word| *word != "--");
     by_variable || options.any(|word| word == "--json")
 }
 
-/// Extracts the error and the hint from the parser's message.
+/// Extracts the error and the hint from the message of the parser.
 fn words(e: &clap::Error, program: &str) -> (String, String) {
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return ("a command is missing".into(), format!("`{program} --help` lists the commands"));

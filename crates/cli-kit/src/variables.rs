@@ -18,7 +18,8 @@ use clap::{Arg, ArgMatches, Command};
 
 use crate::Failure;
 
-/// Reads an on/off variable. Letter case is ignored; an empty value means off, like an unset variable.
+/// Parses the value of an on/off variable. Letter case is ignored, and an empty value means off, like an unset
+/// variable.
 pub fn on_off(text: &str) -> Result<bool, String> {
     match text.to_ascii_lowercase().as_str() {
         "1" | "true" | "yes" | "on" => Ok(true),
@@ -32,7 +33,7 @@ pub fn on_off(text: &str) -> Result<bool, String> {
 pub struct Variables {
     /// Environment variable of `--json`.
     pub json: &'static str,
-    /// Retired variables.
+    /// Retired environment variables of the program.
     pub retired: &'static [Retired],
     /// Commands that do not use a device, and therefore do not use the global options of the connection.
     pub offline: &'static [&'static str],
@@ -41,28 +42,28 @@ pub struct Variables {
 /// Retired variable that set an option in an earlier version.
 #[derive(Clone, Copy, Debug)]
 pub struct Retired {
-    /// Its name.
+    /// Name of the retired variable.
     pub variable: &'static str,
-    /// Words of the command that has the option; empty if all commands that have the option are meant.
+    /// Words of the command that has the option. Empty if all commands that have the option are meant.
     pub command: &'static str,
-    /// Long name of the option.
+    /// Long name of the option that the variable set.
     pub option: &'static str,
-    /// Consequence of ignoring the variable.
+    /// Effect on the command if the retired variable is ignored.
     pub without: Without,
 }
 
 /// Effect of an ignored variable on the command.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Without {
-    /// Without the variable the command does less: it continues, with a note.
+    /// Without the variable, the command does less: the command continues, with a note.
     Less,
-    /// Without the variable the command does more or something else, such as a motion at another speed: the command is
-    /// refused.
+    /// Without the variable, the command does more or something else, such as a motion at another speed: the command is
+    /// rejected.
     Other,
 }
 
 impl Retired {
-    /// Creates a retired variable that made a command do more.
+    /// Creates a retired variable that made a command do more than its default.
     pub const fn less(variable: &'static str, command: &'static str, option: &'static str) -> Self {
         Self { variable, command, option, without: Without::Less }
     }
@@ -81,7 +82,7 @@ impl Retired {
     }
 }
 
-/// Notes about the variables that are set.
+/// Notes about the environment variables that are set.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
     /// Line about the variables that set an option of this command.
@@ -92,7 +93,7 @@ pub(crate) struct Report {
     pub refused: Option<Failure>,
 }
 
-/// Command in the parsed command line.
+/// Command that the user selected in the parsed command line.
 struct Chosen<'a> {
     program: &'static str,
     command: &'a Command,
@@ -108,8 +109,8 @@ impl Chosen<'_> {
 }
 
 impl Variables {
-    /// Returns the notes about the variables of a parsed command line. `value` returns the value of an environment
-    /// variable.
+    /// Returns the notes about the environment variables of a parsed command line. `value` returns the value of an
+    /// environment variable.
     pub(crate) fn report(
         &self,
         program: &'static str,
@@ -151,8 +152,8 @@ impl Variables {
         }
     }
 
-    /// Returns the notes about variables if the command line could not be parsed: the variables that set an option in
-    /// the error, and the retired variables.
+    /// Returns the notes about environment variables if the command line could not be parsed. The notes contain the
+    /// variables that set an option in the error, and the retired variables.
     pub(crate) fn report_error(
         &self,
         program: &'static str,
@@ -219,7 +220,7 @@ impl Variables {
     }
 }
 
-/// Retired variable that is set.
+/// Retired variable that is set in the environment.
 struct Unread {
     variable: &'static str,
     value: String,
@@ -267,7 +268,7 @@ fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> C
     Chosen { program, command, words: words.join(" ") }
 }
 
-/// Returns the options that the error message contains.
+/// Returns the options that the error message of the parser contains.
 fn options_in(error: &clap::Error) -> Vec<String> {
     let mut all = Vec::new();
     for kind in [ContextKind::InvalidArg, ContextKind::PriorArg] {
@@ -280,7 +281,7 @@ fn options_in(error: &clap::Error) -> Vec<String> {
     all.iter().filter_map(|shown| shown.split([' ', '=']).next().map(str::to_owned)).collect()
 }
 
-/// Returns a value on one line, without control characters.
+/// Returns the value of a variable on one line, without control characters.
 fn shown(value: &OsStr) -> String {
     let mut text = String::new();
     for c in value.to_string_lossy().chars() {

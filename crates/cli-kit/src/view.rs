@@ -7,12 +7,12 @@ use ratatui::widgets::{Block, BorderType, Padding, Paragraph};
 
 use crate::keys::Key;
 
-/// Smallest number of columns and rows of a view.
+/// Smallest number of columns and rows of a live view.
 pub const LEAST: (u16, u16) = (40, 12);
-/// Smallest number of columns and rows of a view that has frames around its parts.
+/// Smallest number of columns and rows of a live view that has frames around its parts.
 pub const FRAMED: (u16, u16) = (80, 24);
 
-/// Returns a frame to draw around a part of a view.
+/// Returns a frame that encloses a part of a live view.
 pub fn panel(title: &str) -> Block<'static> {
     let title: String = if title.is_empty() { String::new() } else { format!(" {title} ") };
     Block::bordered()
@@ -22,7 +22,8 @@ pub fn panel(title: &str) -> Block<'static> {
         .padding(Padding::horizontal(1))
 }
 
-/// Wraps text between words into lines of at most `width` columns; a longer word continues on the next line.
+/// Wraps text between words into lines of at most `width` columns. A word that is longer than a line continues on the
+/// next line.
 pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     let width = usize::from(width.max(1));
     let mut lines: Vec<String> = Vec::new();
@@ -39,8 +40,8 @@ pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     lines
 }
 
-/// If the terminal is too small, draws one sentence with the required size and the key for Stop. The keys still work.
-/// Returns `true` if the terminal is too small.
+/// If the terminal is too small, draws one sentence with the required size and the key for Stop. The keys still work in
+/// this case. Returns `true` if the terminal is too small.
 pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     let area = frame.area();
     if area.width >= LEAST.0 && area.height >= LEAST.1 {
@@ -55,23 +56,23 @@ pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     true
 }
 
-/// Errors, and the next command that is recommended.
+/// Errors that a live view shows, and the next command that is recommended.
 #[derive(Clone, Debug, Default)]
 pub struct Trouble {
     /// Texts of the causes. A cause that produces other causes comes first.
     pub causes: Vec<String>,
     /// Defects that do not stop the operation.
     pub warnings: Vec<String>,
-    /// Next command; empty if none is recommended.
+    /// Recommended next command; empty if no command is recommended.
     pub next: String,
     /// Result of the last key press.
     pub message: String,
 }
 
 impl Trouble {
-    /// Returns the lines for the head of a view, at most about `most`. The lines contain as many complete causes as
-    /// fit, the next command, and the result of the last key press. The causes that do not fit are returned as the
-    /// first rows of the scrolled part.
+    /// Returns the lines for the head of a live view, at most about `most`. The lines contain as many complete causes
+    /// as fit, the next command, and the result of the last key press. The second list contains the causes that do not
+    /// fit, which are the first rows of the scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
         let yellow = |text: String| Line::from(text).style(Style::new().fg(Color::Yellow));
@@ -92,7 +93,7 @@ impl Trouble {
             .collect();
         let room = most.saturating_sub(foot.len());
         let all: usize = blocks.iter().map(Vec::len).sum();
-        // A line is reserved for "and N more" if not all causes fit.
+        // If not all causes fit, a line is reserved for "and N more".
         let room = if all <= room { room } else { room.saturating_sub(1) };
         let mut taken = 0;
         let mut head: Vec<Line<'static>> = Vec::new();
@@ -112,7 +113,7 @@ impl Trouble {
     }
 }
 
-/// Scroll position of rows.
+/// Scroll position of the rows in a live view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Scroll {
     at: usize,
@@ -121,8 +122,8 @@ pub struct Scroll {
 }
 
 impl Scroll {
-    /// Sets how many of all rows are visible. The scroll position is limited so that no line below the last row stays
-    /// empty.
+    /// Sets the number of visible rows and the number of all rows. The scroll position is limited so that no line below
+    /// the last row stays empty.
     pub fn fit(&mut self, room: usize, rows: usize) {
         (self.room, self.rows) = (room, rows);
         self.at = self.at.min(rows.saturating_sub(room));
@@ -133,7 +134,7 @@ impl Scroll {
         self.at
     }
 
-    /// Scrolls, if the key requests it.
+    /// Scrolls the rows if the key requests scrolling.
     pub fn key(&mut self, key: Key) {
         let page = self.room.max(1) as isize;
         let by = match key {
@@ -149,7 +150,7 @@ impl Scroll {
         self.fit(self.room, self.rows);
     }
 
-    /// Returns `↑↓ 3-5 of 10` if not all rows are visible.
+    /// Returns a text like `↑↓ 3-5 of 10` if not all rows are visible.
     pub fn place(&self) -> String {
         if self.rows <= self.room {
             return String::new();
@@ -172,7 +173,8 @@ mod tests {
         lines.iter().map(ToString::to_string).collect()
     }
 
-    /// Causes are never truncated. Causes that do not fit are counted, and are the first rows of the scrolled part.
+    /// The live view never truncates causes. The view counts the causes that do not fit, and shows them as the first rows of
+    /// the scrolled part.
     #[test]
     fn causes_are_shown_whole_or_scroll() {
         let trouble = Trouble {
@@ -192,7 +194,7 @@ mod tests {
         let (head, rest) = trouble.lines(20, 5);
         assert_eq!(text(&head), [&all[..2], &["3 more below", "next: jtc recover"]].concat());
         assert_eq!(text(&rest), all[2..]);
-        // The first cause is complete even without any space.
+        // The first cause is complete even if the view has no space for causes.
         assert_eq!(text(&trouble.lines(20, 0).0)[..2], all[..2]);
     }
 

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-/// Prints in a separate thread, and waits at most `timeout`, so that the process can end even if a pipe is not read
-/// (`2>&1 | less`).
+/// Prints in a separate thread, and waits at most `timeout`. The process can then end even if the reader of a pipe does
+/// not read (`2>&1 | less`).
 pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
     let (done, printed) = std::sync::mpsc::channel();
     let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
@@ -19,7 +19,7 @@ pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
 mod tests {
     use super::*;
 
-    /// Output that is not read does not prevent the end of the process.
+    /// A reader that does not read the output does not prevent the end of the process.
     #[test]
     fn words_without_a_reader_are_not_waited_for() {
         let (never, reader) = std::sync::mpsc::channel::<()>();

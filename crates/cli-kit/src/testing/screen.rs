@@ -1,32 +1,32 @@
-//! Terminal emulation: shows the output of a program. The emulation supports the functions that live views and
+//! Terminal emulation that shows the output of a program. The emulation supports the functions that live views and
 //! progress bars use.
 
-/// Cells of a terminal.
+/// Contents of the terminal screen, as characters in cells.
 pub struct Picture {
     cells: Vec<Vec<char>>,
     at: (usize, usize),
-    /// Start of an escape sequence or of a character.
+    /// First bytes of an escape sequence or of a character.
     begun: Vec<u8>,
 }
 
 impl Picture {
-    /// Creates an empty screen.
+    /// Creates an empty terminal screen.
     pub fn new(columns: u16, rows: u16) -> Self {
         let cells = vec![vec![' '; columns.into()]; rows.into()];
         Self { cells, at: (0, 0), begun: Vec::new() }
     }
 
-    /// Returns the rows of the screen, without trailing spaces.
+    /// Returns the rows of the terminal screen, without trailing spaces.
     pub fn rows(&self) -> Vec<String> {
         self.cells.iter().map(|row| row.iter().collect::<String>().trim_end().to_owned()).collect()
     }
 
-    /// Returns the rows of the screen as one text.
+    /// Returns the rows of the terminal screen as one text.
     pub fn text(&self) -> String {
         self.rows().join("\n")
     }
 
-    /// Processes output bytes of a program.
+    /// Processes the output bytes of a program.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.begun.push(*byte);

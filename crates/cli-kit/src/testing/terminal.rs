@@ -1,4 +1,4 @@
-//! Simulated terminal with a user, and a command that runs on it.
+//! Simulated terminal with a user, and a command that runs on this terminal.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -19,7 +19,7 @@ use test_kit::patience::Patience;
 
 use super::Picture;
 
-/// Reads the command's output until the terminal is closed.
+/// Reads the output of the command until the terminal is closed.
 fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
     let mut bytes = [0; 4096];
     let wait = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
@@ -34,17 +34,17 @@ fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
     }
 }
 
-/// A pseudo-terminal.
+/// A pseudo-terminal of the test.
 pub struct Terminal {
-    /// Input that the user types; when this input is closed, the terminal hangs up.
+    /// Input that the user types. When this input is closed, the terminal hangs up.
     person: Option<File>,
     slave: Option<OwnedFd>,
     closed: Arc<AtomicBool>,
     reader: Option<JoinHandle<()>>,
     sent: Receiver<Vec<u8>>,
-    /// Visible content.
+    /// Visible content of the terminal.
     pub picture: Picture,
-    /// All bytes received.
+    /// All bytes that the terminal received.
     pub bytes: Vec<u8>,
 }
 
@@ -83,7 +83,7 @@ impl Terminal {
         self.slave.as_ref().expect("it has not hung up").try_clone().expect("a handle")
     }
 
-    /// Starts a command with this terminal as controlling terminal, stdin and output, as a shell does.
+    /// Starts a command in the same way as a shell, with this terminal as controlling terminal, stdin and output.
     pub fn start(&self, command: &Command) -> Child {
         let mut own = Command::new("setsid");
         own.arg("--ctty").arg(command.get_program()).args(command.get_args());
@@ -101,13 +101,13 @@ impl Terminal {
         own.spawn().expect("it starts")
     }
 
-    /// Types these keys.
+    /// Types these keys on the terminal.
     pub fn press(&mut self, keys: &str) {
         self.person.as_mut().expect("it has not hung up").write_all(keys.as_bytes()).expect("it takes keys");
     }
 
-    /// Processes the command's output until the screen fulfils the condition; panics with the screen if the condition
-    /// is not met in time.
+    /// Processes the output of the command until the screen fulfils the condition. Panics with the contents of the
+    /// screen if the condition is not met in time.
     pub fn until(&mut self, what: &str, reached: impl Fn(&Picture) -> bool) {
         let mut patience = Patience::begin();
         while !reached(&self.picture) {
@@ -118,7 +118,7 @@ impl Terminal {
         }
     }
 
-    /// Like [`Self::until`], with words that must appear as the condition.
+    /// Like [`Self::until`], with the condition that these words appear on the screen.
     pub fn until_it_shows(&mut self, words: &str) {
         self.until(words, |picture| picture.text().contains(words));
     }
@@ -132,13 +132,13 @@ impl Terminal {
     /// terminal open.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
-        // The reading thread owns the last handle.
+        // The reading thread owns the last handle of the terminal.
         self.closed.store(true, Ordering::Relaxed);
         self.reader.take().map(JoinHandle::join);
     }
 
-    /// Waits for the end of the command and returns its exit code. The screen then contains the last output of the
-    /// command.
+    /// Waits for the end of the command and returns its exit code. After the call, the screen contains the last output
+    /// of the command.
     pub fn ends(&mut self, child: &mut Child) -> i32 {
         let mut patience = Patience::begin();
         let code = loop {

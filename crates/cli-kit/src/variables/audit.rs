@@ -1,4 +1,4 @@
-//! Audit of all options of a command line: each variable must be of an allowed kind.
+//! Audit of all options of a command line: the environment variable of each option must be of an allowed kind.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +6,12 @@ use clap::{Arg, ArgAction, Command, CommandFactory};
 
 use super::Variables;
 
-/// Reason why an option may have a variable.
+/// Reason why an option may have an environment variable.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Kind {
     /// Name of a port, a bus, an address, a host or a folder.
     Place,
-    /// Name of a file that is read, or of a file that belongs to the machine or the chain.
+    /// Name of a file that the command reads, or of a file that belongs to the machine or the chain of boards.
     File,
     /// Name of a file or folder that one command writes.
     Output,
@@ -21,7 +21,7 @@ pub enum Kind {
     Line,
     /// Limit of time or disk space of one command, which does not change a motion.
     Limit,
-    /// A setting of a simulator.
+    /// Setting of a simulator.
     Simulator,
     /// Safety option that makes a command send less.
     Caution,
@@ -42,9 +42,9 @@ const PLACES: [&str; 11] = [
     "ORIGIN",
 ];
 
-/// Returns all faults of the variables of a command line; an empty list if there are none. `allowed` lists each
-/// variable with the reason why it may exist. `without` lists options that name a file and still have no variable, for
-/// example `update --data`.
+/// Returns all faults of the environment variables of a command line. The list is empty if there are no faults.
+/// `allowed` lists each variable with the reason why it may exist. `without` lists options that name a file and still
+/// have no variable, for example `update --data`.
 pub fn faults<Cli: CommandFactory>(
     prefix: &str,
     variables: &Variables,
@@ -90,7 +90,7 @@ pub fn faults<Cli: CommandFactory>(
     faults
 }
 
-/// Finds entries of the two lists that match no option or variable.
+/// Finds entries of `allowed` and `without` that match no option or variable.
 fn lists(
     root: &Command,
     variables: &Variables,
@@ -138,7 +138,7 @@ fn lists(
     faults
 }
 
-/// Returns the reason why an option does not belong to this kind.
+/// Returns the reason why an option does not belong to this kind. Returns `None` if the option belongs to the kind.
 fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
     match kind {
@@ -152,7 +152,7 @@ fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     }
 }
 
-/// Returns `true` if two options with the same variable are the same option of two commands.
+/// Returns `true` if two commands use the same variable for the same option.
 fn mean_the_same(kind: Kind, one: &Arg, other: &Arg) -> bool {
     let help = |arg: &Arg| arg.get_help().map(ToString::to_string);
     one.get_long() == other.get_long()
@@ -165,8 +165,8 @@ fn value_name(arg: &Arg) -> Option<String> {
     names.first().map(ToString::to_string)
 }
 
-/// Collects all options, each with the words of its command, for example `update --data`. A global option is
-/// collected once.
+/// Collects all options of a command line, each with the words of its command, for example `update --data`. The
+/// function collects a global option only once.
 fn collect<'a>(command: &'a Command, words: &str, options: &mut Vec<(String, &'a Arg)>) {
     for arg in command.get_arguments().filter(|arg| words.is_empty() || !arg.is_global_set()) {
         if let Some(long) = arg.get_long() {
@@ -178,7 +178,7 @@ fn collect<'a>(command: &'a Command, words: &str, options: &mut Vec<(String, &'a
     }
 }
 
-/// Returns all commands with their words.
+/// Returns all commands with the words that select them.
 fn commands(root: &Command) -> Vec<(String, &Command)> {
     fn walk<'a>(command: &'a Command, words: &str, all: &mut Vec<(String, &'a Command)>) {
         all.push((words.to_owned(), command));

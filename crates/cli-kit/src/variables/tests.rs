@@ -89,7 +89,8 @@ fn variables_of_options_that_act_are_named_and_ignored_or_refused() {
         (2, "use --speed, or unset TRY_SPEED")
     );
     assert!(refused.message.contains("TRY_SPEED=9") && refused.message.contains("`try go`"), "{refused:?}");
-    // Cases: option typed, variable off, variable empty, or variable of another command.
+    // Cases: the option is typed, the variable is off, the variable is empty, or the variable belongs to another
+    // command.
     for (words, environment) in [
         (&["go", "--speed", "2"][..], &[("TRY_SPEED", "9")][..]),
         (&["go", "--active"], &[("TRY_ACTIVE", "1")]),
@@ -109,13 +110,13 @@ fn where_a_command_line_is_wrong_the_variable_behind_it_is_named() {
         let typed: Vec<OsString> = words.iter().map(OsString::from).collect();
         VARIABLES.report_error("try", &root, &error, &typed, of(environment))
     };
-    // The test sets no variable of its own process, so clap does not read one. The typed words cause the error, and the
-    // report finds the variable.
+    // The test does not set any variable of its own process, so clap does not read a variable. The typed words cause
+    // the error, and the report finds the variable.
     assert_eq!(lines(&["go", "--sped", "3"], &[("TRY_ACTIVE", "1")]).len(), 1);
     assert!(lines(&["go", "--bus"], &[("TRY_BUS", "x")]).is_empty(), "it is typed");
 }
 
-/// Finds each possible fault of an option.
+/// The audit finds each possible fault of an option.
 #[test]
 fn the_audit_finds_options_that_must_not_have_a_variable() {
     assert_eq!(faults::<Cli>("TRY_", &VARIABLES, &ALLOWED, &[]), [""; 0]);

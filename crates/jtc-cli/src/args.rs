@@ -376,7 +376,7 @@ pub(crate) enum Command {
     },
 }
 
-/// Words that users may type instead of a command, with the right command.
+/// Words that users may type instead of a command, each with the correct command.
 pub(crate) const MEANT: [(&str, &str); 15] = [
     ("pause", "jtc traj pause"),
     ("hold", "jtc traj pause"),
@@ -399,7 +399,8 @@ pub(crate) const MEANT: [(&str, &str); 15] = [
 ];
 
 impl Command {
-    /// Returns `true` if the command moves the arm or records a motion by hand, so that its result cannot be repeated.
+    /// Returns `true` if the command moves the arm or records a motion by hand. The result of such a command cannot be
+    /// repeated.
     pub(crate) fn moves(&self) -> bool {
         matches!(
             self,
@@ -419,7 +420,7 @@ mod tests {
 
     use super::*;
 
-    /// docs/commands-jtc.md; `UPDATE_DOCS=1` writes it again.
+    /// Compares docs/commands-jtc.md with the command line; `UPDATE_DOCS=1` writes the page again.
     #[test]
     fn the_page_of_the_commands_is_made_from_them() {
         let opening = "This page is generated from the definition of the command line, like `jtc help COMMAND` and the manual pages. The variable \

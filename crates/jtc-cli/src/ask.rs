@@ -1,9 +1,9 @@
-//! Confirmation by the user at the terminal. The user can also confirm in advance with an option.
+//! Confirmation of a command by the user at the terminal. The user can also confirm in advance with an option.
 
 use cli_kit::{ErrorKind, Failure};
 use std::io::{BufRead, IsTerminal, Write};
 
-/// Asks `question` and continues only if the answer is `yes`. Refuses the command if no terminal is present. The hint then suggests
+/// Asks `question` and continues only if the answer is `yes`. Rejects the command if no terminal is present. The hint then suggests
 /// `option`, with which the user confirms in advance.
 pub(crate) fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {

@@ -1,4 +1,4 @@
-//! Implementation of the commands. Each command or family of commands has a separate file.
+//! Implementation of the `jtc` commands. Each command or family of commands has a separate file.
 
 mod arm;
 mod bench;
@@ -41,7 +41,7 @@ use cli_kit::{Failure, Output, pages};
 
 use crate::args::Command;
 
-/// Runs the command.
+/// Runs a `jtc` command.
 pub(crate) fn run(command: Command, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::demo(&args, out),

@@ -2,26 +2,26 @@
 
 use cli_kit::{Key, Keys};
 
-/// Request of the user about the motion.
+/// Request of the user about the present motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wish {
-    /// Stop on the path (key `s`).
+    /// Request to stop on the path (key `s`).
     Stop,
-    /// Pause, or resume after a pause (space bar).
+    /// Request to pause, or to resume after a pause (space bar).
     PauseOrResume,
-    /// `+`: faster.
+    /// Request to move faster (key `+`).
     Faster,
-    /// `-`: slower.
+    /// Request to move slower (key `-`).
     Slower,
 }
 
-/// Key help for the user at the terminal.
+/// Key help that the terminal shows while the arm moves.
 pub(crate) const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
 
 /// Like [`HELP`], for controllers that can change the speed of a motion.
 pub(crate) const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
 
-/// Message if the speed cannot be changed, with the next step.
+/// Message if the controller cannot change the speed of a motion, with the next step.
 pub(crate) const NO_SPEED: &str = "this controller cannot change the speed of a motion: press s to stop it, then \
     use `jtc traj run FILE --speed PCT`";
 
@@ -37,7 +37,7 @@ fn strongest(keys: &[Key]) -> Option<Wish> {
     } else if pressed(&[' ']) {
         Some(Wish::PauseOrResume)
     } else {
-        // On many keyboards, `+` is typed with Shift and the `=` key.
+        // On many keyboards, the user types `+` with Shift and the `=` key.
         let faster = pressed(&['+', '=']).then_some(Wish::Faster);
         faster.or_else(|| pressed(&['-', '_']).then_some(Wish::Slower))
     }

@@ -1,4 +1,4 @@
-//! Parameters of an arm file that a controller does not use. The command lists these parameters and refuses them unless the user accepts
+//! Parameters of an arm file that a controller does not use. The command lists these parameters and rejects them unless the user accepts
 //! them.
 
 use cli_kit::{ErrorKind, Failure, Output, error_object};
@@ -8,8 +8,8 @@ use jtc_host::CheckError;
 use jtc_host::arm::{Arm, Difference};
 use serde_json::json;
 
-/// Returns the settings of `arm` that differ from those of the controller, and prints a warning for each. Returns an error unless the user
-/// has accepted the differences.
+/// Returns the settings of `arm` that differ from the settings of the controller, and prints a warning for each difference. Returns an
+/// error unless the user has accepted the differences.
 pub(crate) fn accept(
     arm: &Arm,
     device: &Config,
@@ -23,7 +23,7 @@ pub(crate) fn accept(
     Ok(warned(differences, out))
 }
 
-/// Prints the settings of an arm that differ from those of the controller, and returns the failure.
+/// Prints the settings of an arm that differ from the settings of the controller, and returns the failure.
 pub(crate) fn refused(arm: &str, differences: &[Difference], out: &Output) -> Failure {
     let error = CheckError::DeviceLimits { arm: arm.to_owned(), differences: differences.to_vec() };
     let message = format!(
@@ -72,7 +72,7 @@ fn warned(differences: Vec<Difference>, out: &Output) -> Vec<Difference> {
     differences
 }
 
-/// Prints a failure and the differences that caused it. The returned failure is not printed again.
+/// Prints a failure and the differences that caused it. The returned failure is marked as already printed.
 fn listed(failure: &Failure, differences: &[Difference], out: &Output) -> Failure {
     if out.is_json() {
         let error = error_object(failure);

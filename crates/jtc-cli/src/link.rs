@@ -1,5 +1,5 @@
-//! Link to the controller. The link uses the port that the user has specified, or the only port of the computer. If an agent owns the port,
-//! the link goes through the agent.
+//! Link to the controller. The link uses the port that the user has specified, or the only port of the computer. If an agent has opened the
+//! port, the link uses this agent.
 use cli_kit::{ErrorKind, Failure};
 use jtc_agent::access::Tokens;
 use jtc_client::agents::{Registered, is_same_port, owner_of, registered};
@@ -13,7 +13,7 @@ use crate::args::LinkArgs;
 pub(crate) type LinkPort = Box<dyn Port>;
 
 impl LinkArgs {
-    /// The port's name.
+    /// Returns the name of the port.
     pub(crate) fn name(&self) -> Result<String, Failure> {
         match &self.port {
             Some(port) => Ok(port.clone()),
@@ -21,21 +21,21 @@ impl LinkArgs {
         }
     }
 
-    /// Opens the port, or connects to the agent that owns the port.
+    /// Opens the port, or connects to the agent that has opened the port.
     pub(crate) fn open(&self) -> Result<LinkPort, Failure> {
         self.open_with(None)
     }
 
-    /// Like [`Self::open`]. `policy` defines how the agent treats a motion when this program disconnects.
+    /// Like [`Self::open`]. `policy` defines what the agent does with a motion when this program disconnects.
     pub(crate) fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
         Ok(self.open_as(policy, true)??)
     }
 
     /// Opens the link for a Stop or a Pause. An agent on this computer accepts a Stop or a Pause without a token, and even with an unknown
-    /// token. The inner error is the error of opening a serial port that no agent of this user owns.
+    /// token. The inner error is the error of opening a serial port that no agent of this user has opened.
     pub(crate) fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
-            // The agent does not answer, so a second attempt would only take time.
+            // The agent does not answer, so a second attempt would only waste time.
             ErrorKind::NoLink => Err(error),
             _ => self.open_as(None, false).map_err(|_| error),
         })
@@ -71,8 +71,8 @@ impl LinkArgs {
         Ok(Ok(Box::new(port)))
     }
 
-    /// Returns the name and token that this program sends to an agent. The token is sent only to agents of this user, or if the user has
-    /// specified a token file.
+    /// Returns the name and token that this program sends to an agent. The program sends the token only to agents of this user, or if
+    /// the user has specified a token file.
     fn options(
         &self,
         agent: Option<&Registered>,
@@ -86,7 +86,7 @@ impl LinkArgs {
         Ok(Options { name: who(), token, policy, certificates })
     }
 
-    /// Opens a session over the link.
+    /// Opens a session with the controller over the link.
     pub(crate) fn session(&self) -> Result<Session<LinkPort>, Failure> {
         Ok(Session::new(self.open()?))
     }
@@ -102,12 +102,12 @@ impl LinkArgs {
             return Err(Failure::from(PortError::Busy { path: name })
                 .next(format!("an agent owns the port: use `--port {}`", agent.url)));
         }
-        // Other programs stop the arm through the agent.
+        // Other programs stop the arm through the agent, so this port needs no socket for Stops.
         Ok(SerialPort::open_without_door(&name, self.baud)?)
     }
 }
 
-/// Returns the name that other clients see for this program, which contains the command and the user.
+/// Returns the name that other clients see for this program. The name contains the command and the user.
 pub(crate) fn who() -> String {
     let command = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     match std::env::var("USER").or_else(|_| std::env::var("LOGNAME")) {
@@ -116,7 +116,7 @@ pub(crate) fn who() -> String {
     }
 }
 
-/// Returns `true` for the address of an agent, `false` for a port of this computer.
+/// Returns `true` for the address of an agent, and `false` for a port of this computer.
 fn is_agent(name: &str) -> bool {
     name.starts_with("http://") || name.starts_with("https://")
 }

@@ -1,4 +1,4 @@
-//! Interaction with the user while an arm moves, with keys, Ctrl-C and the message if the command ends at once.
+//! Interaction with the user while an arm moves: keys, Ctrl-C, and a message if the command ends at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -13,10 +13,11 @@ use crate::keys::{HELP, HELP_WITH_SPEED, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
 
-/// Longest time for printing the last message, so that a blocked output does not block the command.
+/// Longest time for printing the last message, so that a blocked output does not block the end of the command.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
-/// Handles the second signal. Removes empty files, reports why the command ended, and returns the exit code.
+/// Handles the second signal. The function removes empty output files, reports why the command ended, and returns the
+/// exit code.
 pub(crate) fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
     output_file::abandon();
     let (done, written) = mpsc::channel();
@@ -29,23 +30,24 @@ pub(crate) fn ended_at_once(out: Output, message: &'static str, hint: &'static s
     FAULT
 }
 
-/// Values of the speed override that the user selects with keys, in percent.
+/// Values of the speed override that the user can select with keys, in percent.
 const SPEEDS: [u8; 10] = [5, 10, 20, 30, 40, 50, 60, 70, 85, 100];
 
-/// Reader of the requests of the user, which are read at each status.
+/// Reader of the requests of the user. The command reads the requests at each status.
 pub(crate) struct Operator<'a> {
-    /// Output of messages.
+    /// Output to which messages for the user are printed.
     pub out: &'a Output,
-    /// Events for programs.
+    /// Writer of JSON events.
     pub progress: Progress,
     stop: Stop,
-    /// Keyboard input, which is read only while the arm moves. At other times, the terminal mode is unchanged.
+    /// Keyboard input of the user. The command reads keys only while the arm moves; at other times, the terminal mode
+    /// is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,
-    /// Last announced trajectory state.
+    /// Trajectory state that the command announced last.
     announced: Option<Code<TrajectoryState>>,
-    /// Speed override in percent, if the controller supports it.
+    /// Speed override in percent; `None` if the controller does not support the override.
     pub speed: Option<u8>,
 }
 
@@ -79,12 +81,12 @@ impl<'a> Operator<'a> {
     }
 
     /// Returns `true` if the command must end. A Stop of the user ends the command even if the motion had already
-    /// ended, so that no other motion follows.
+    /// ended, so that the command does not start another motion.
     pub(crate) fn wants_the_end(&self) -> bool {
         self.stop.asked() || self.stopping
     }
 
-    /// Starts to read keys.
+    /// Starts to read keys from the terminal.
     pub(crate) fn motion_begins(&mut self) {
         self.moving.store(true, Ordering::Relaxed);
         self.announced = None;
@@ -93,7 +95,7 @@ impl<'a> Operator<'a> {
             return;
         }
         match draws_bars() {
-            // The key help is shown below the progress bar.
+            // The terminal shows the key help below the progress bar.
             Ok(()) if !self.out.is_json() => {}
             Err(Some((columns, rows))) => self.out.note(format_args!(
                 "{}: the progress bar needs {} columns and {} rows, but the terminal has {columns} and \
@@ -106,7 +108,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Returns the key help that is shown below a progress bar. Returns an empty text if no keys are read.
+    /// Returns the key help below a progress bar. Returns an empty text if the command does not read keys.
     pub(crate) fn keys(&self) -> &'static str {
         match (&self.keys, self.speed) {
             (None, _) => "",
@@ -115,27 +117,27 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Stops reading keys.
+    /// Stops reading keys from the terminal.
     pub(crate) fn motion_ended(&mut self) {
         self.moving.store(false, Ordering::Relaxed);
         self.keys = None;
     }
 
-    /// Returns the request of the user about the motion.
+    /// Returns the request of the user about the motion, from the keys and signals since the last status.
     pub(crate) fn wish(&mut self, status: &Status) -> Flow {
         if status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
             && self.announced != Some(status.trajectory)
-            // A held stop ends the run and is reported with a separate message.
+            // A held stop ends the run. The command reports the held stop with a separate message.
             && !status.is_held_stop()
         {
             let before = self.announced.replace(status.trajectory);
             match (status.trajectory == TrajectoryState::Pause, &self.keys) {
                 (true, Some(_)) => self.out.note("paused; press space to resume"),
                 (false, Some(_)) => self.out.note("moving"),
-                // The motion begins.
+                // The motion begins with this status.
                 (_, None) if before.is_none() => {}
-                // Another program has paused the motion, or the controller has paused it after a timeout without
-                // frames of this program (J-59).
+                // Another program has paused the motion. Alternatively, the controller has paused the motion after a
+                // timeout without frames of this program (J-59).
                 (true, None) => {
                     self.out.note("paused; `jtc traj resume` resumes the motion, `jtc traj stop` ends it");
                 }
@@ -157,7 +159,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Requests the next higher or lower speed.
+    /// Requests the next higher or next lower speed.
     fn another_speed(&mut self, wish: Wish) -> Flow {
         let Some(speed) = &mut self.speed else {
             self.out.note(NO_SPEED.replace('`', ""));

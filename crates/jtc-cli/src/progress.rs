@@ -1,4 +1,4 @@
-//! Progress reports for programs. The events of `--json` are written to stderr, with one object per line.
+//! Progress reports for other programs. With `--json`, the command writes events to stderr, with one object per line.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -14,19 +14,19 @@ use serde_json::{Value, json};
 /// Text of the page `jtc help events`.
 pub(crate) const EVENTS_HELP: &str = include_str!("progress.md");
 
-/// Shortest interval between two samples, or two upload events.
+/// Shortest interval between two sample events, or between two upload events.
 const MODEST: Duration = Duration::from_millis(200);
 
-/// State of the controller, state of the trajectory, and error bits that were reported.
+/// State of the controller, state of the trajectory, and error bits in the last report.
 type Reported = (Code<ControllerState>, Code<TrajectoryState>, u16);
 
-/// Writer of the events of a command.
+/// Writer of the JSON events of a command.
 #[derive(Clone)]
 pub(crate) struct Progress(Rc<Inner>);
 
 struct Inner {
     out: Output,
-    /// Last report.
+    /// States and error bits in the last report.
     reported: Cell<Option<Reported>>,
     sampled: Cell<Option<Instant>>,
     uploaded: Cell<Option<Instant>>,
@@ -34,7 +34,7 @@ struct Inner {
 }
 
 impl Progress {
-    /// Starts to print events, if JSON was requested.
+    /// Starts to print events if JSON was requested.
     pub(crate) fn begin(out: &Output) -> Result<Self, Failure> {
         out.stream()?;
         Ok(Self(Rc::new(Inner {
@@ -46,21 +46,21 @@ impl Progress {
         })))
     }
 
-    /// Prints an event.
+    /// Prints a JSON event.
     pub(crate) fn event(&self, name: &str, value: Value) {
         self.0.out.event(name, value);
     }
 
-    /// Reports all further statuses of this session as events. Callers with a separate observer pass the statuses to [`Progress::see`]
-    /// instead.
+    /// Reports all further statuses of this session as events. Callers with a separate status observer pass the statuses to
+    /// [`Progress::see`] instead.
     pub(crate) fn watch<P: Port>(&self, session: &mut Session<P>) {
         *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });
         let own = self.clone();
         session.observe(move |_, status| own.see(status));
     }
 
-    /// Reports a status. The first status is reported as `connected`. Changes of the state are reported at once. While the arm moves or may
-    /// be moved, measured values are reported at a limited rate.
+    /// Reports a status. The first status is reported as the event `connected`. The function reports changes of the state at once. While
+    /// the arm moves, or while a user can move it by hand, the function reports measured values at a limited rate.
     pub(crate) fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
         let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": labels::causes(s) });
@@ -80,7 +80,7 @@ impl Progress {
         }
     }
 
-    /// Reports the progress of an upload. `phase` is the motion that is uploaded.
+    /// Reports the progress of an upload. `phase` names the motion that is uploaded.
     pub(crate) fn uploading(&self, phase: &str, p: &session::Progress) {
         if due(&self.0.uploaded) || p.segments_done == p.segments {
             let fraction = if p.segments == 0 { 0.0 } else { p.segments_done as f64 / p.segments as f64 };
@@ -100,7 +100,7 @@ fn due(last: &Cell<Option<Instant>>) -> bool {
     due
 }
 
-/// Returns the measured values of all joints. The value of a joint that does not answer is null.
+/// Returns the measured values of all joints. The value is null for a joint that does not answer.
 fn sample(s: &Status) -> Value {
     let all = |value: fn(&jtc_wire::JointStatus) -> f32| -> Vec<Option<f32>> {
         let joints = s.joints.iter().enumerate();

@@ -1,4 +1,4 @@
-//! Simulated controller on a pseudo-terminal. One loop runs the world, the terminal and the clock.
+//! Simulated controller on a pseudo-terminal. A single loop advances the simulated world, the terminal and the clock.
 
 mod frames;
 mod pty;
@@ -18,20 +18,22 @@ use frames::{Frames, Incoming};
 pub(crate) use pty::{Pty, PtyError};
 pub(crate) use typed::{Typed, hand};
 
-/// Largest number of host bytes that wait for transmission, like the buffer of a serial adapter. When the buffer is full, writes of the
-/// host block.
+/// Largest number of host bytes that wait for transmission, like the buffer of a serial adapter. When this buffer is full, writes of
+/// the host block.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for a host that does not read before statuses are lost. The value applies to free-running virtual time.
+/// Longest wait for a host that does not read before statuses are lost. The value applies if virtual time does not
+/// follow the real-time clock.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that the simulator catches up on, µs. After a longer delay (for example a suspended computer), the missed time is skipped.
+/// Largest delay for which virtual time catches up, µs. After a longer delay (for example a suspended computer), the simulator skips the
+/// missed time.
 const CATCH_UP_US: u64 = 2_000_000;
-/// A tick, µs.
+/// Duration of a tick, µs.
 const TICK_US: u64 = 1000;
 
 /// Joint bus that is connected to a CAN bus, so that other programs can use the joint bus.
 pub(crate) type Tap = BusTap<Box<dyn CanBus + Send>>;
 
-/// The loop's state.
+/// State of the main loop.
 pub(crate) struct Server {
     world: World,
     pty: Pty,
@@ -48,7 +50,7 @@ pub(crate) struct Server {
     answers: bool,
     /// Sink for the samples of every tick.
     sink: Option<SampleSink>,
-    /// File of the stored arm, and the number of the arm that it contains.
+    /// File of the stored arm, and the sequence number of the arm in the file.
     keeps: Option<(PathBuf, u32)>,
 }
 
@@ -77,13 +79,13 @@ impl Server {
         Self { sink, ..self }
     }
 
-    /// Stores the controller's data in this file.
+    /// Sets the file in which the simulator stores the stored arm of the controller.
     pub(crate) fn keeping(self, file: Option<PathBuf>) -> Self {
         let number = self.world.stored_arm().map_or(0, |(_, number)| number);
         Self { keeps: file.map(|file| (file, number)), ..self }
     }
 
-    /// Writes an arm that the controller has just stored.
+    /// If the controller has just stored an arm, writes this arm to the file.
     fn keep(&mut self) {
         if let (Some((file, kept)), Some((image, number))) = (&mut self.keeps, self.world.stored_arm())
             && *kept != number
@@ -116,7 +118,7 @@ impl Server {
                 if due_us < TICK_US {
                     let rest = Duration::from_micros(TICK_US - due_us);
                     if self.world.host_write_pending() >= WAITING_MAX {
-                        std::thread::sleep(rest); // more input would not be accepted now
+                        std::thread::sleep(rest); // the simulated line would not accept more input now
                     } else {
                         self.pty.wait_input(rest)?;
                     }
@@ -138,7 +140,7 @@ impl Server {
             if let Some(tap) = &mut self.tap
                 && let Err(e) = tap.exchange(&mut self.world)
             {
-                // Other devices on the bus are optional, so the arm continues without them.
+                // Other devices on the CAN bus are optional, so the simulation continues without them.
                 eprintln!("jtc: CAN: {e}; the joint bus is no longer shared");
                 self.tap = None;
             }
@@ -169,7 +171,7 @@ impl Server {
         }
     }
 
-    /// Reports to the world how long the host has been silent within a frame; see [`Incoming`].
+    /// Passes the duration of the host's silence within a frame to the simulated world; see [`Incoming`].
     fn note_silence(&mut self) {
         let now = Instant::now();
         if self.world.host_write_pending() > 0 {
@@ -179,7 +181,7 @@ impl Server {
         self.world.limit_host_silence(silence.map(|silence| silence.as_micros() as u64));
     }
 
-    /// Passes statuses to the host. Without a host the statuses are lost, as on a serial line without a receiver.
+    /// Passes statuses to the host. Without a host, the statuses are lost, as on a serial line without a receiver.
     fn give_output(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let mut buffer = [0; 1024];
         loop {
@@ -216,7 +218,7 @@ impl Server {
     }
 
     /// Writes the remaining bytes of a frame. A host that does not read must not delay the arm, so the simulator does not wait in real
-    /// time. With free-running time the simulator waits only for a limited time.
+    /// time. If virtual time does not follow the real-time clock, the simulator waits only for a limited time.
     fn write_rest(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

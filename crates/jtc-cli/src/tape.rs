@@ -1,4 +1,4 @@
-//! Recordings that are written during a motion.
+//! Recordings that the command writes during a motion.
 
 use crate::failure::recording_interrupted;
 use std::fs::File;
@@ -15,8 +15,9 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Begins a recording in `output`. The file name extension selects the format. An earlier recording in the file is discarded. A later
-    /// write error is reported at once. `goes_on` is the part of the message that describes the consequence.
+    /// Begins a recording in `output`. The file name extension selects the format. The function discards an earlier recording in the
+    /// file. The recording reports a later write error at once. `goes_on` is the part of the error message that describes the
+    /// consequence.
     pub(crate) fn begin(
         output: &mut OutputFile,
         info: &RecordingInfo,
@@ -32,19 +33,19 @@ impl Tape {
         match live {
             Ok(live) => Ok(Self { name: output.name(), live, on_disk }),
             Err(e) => {
-                // A recording without its header is useless.
+                // If the header of the recording cannot be written, the recording is useless.
                 output.is_worthless();
                 Err(e.into())
             }
         }
     }
 
-    /// Returns the file name that is shown to the user.
+    /// Returns the name of the recording for messages to the user.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// Returns the sink of samples.
+    /// Returns the sink for the samples of the recording.
     pub(crate) fn sink(&self) -> SampleSink {
         self.live.sink()
     }
@@ -56,7 +57,7 @@ impl Tape {
         settle(&on_disk).map_err(|e| recording_interrupted(Failure::usage(format!("{name}: {e}"))))
     }
 
-    /// Ends the recording without completing the file. The caller will start the file again.
+    /// Ends the recording without completing the file. The caller must start the file again.
     pub(crate) fn abandon(self) {
         self.live.abandon();
     }

@@ -1,4 +1,4 @@
-//! Tests of interrupted runs. The remainder runs from the right position.
+//! Tests of interrupted runs. `jtc traj continue` runs the remainder of the trajectory from the right position.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,8 @@ fn phases(value: &Value) -> Vec<&str> {
     value["runs"].as_array().unwrap().iter().map(|run| run["phase"].as_str().unwrap()).collect()
 }
 
-/// If a closed path begins and ends at the position of the arm after a restart of the controller, the whole path is executed.
+/// After a restart of the controller, the arm is at the position at which a closed path begins and ends. The command then
+/// executes the whole path.
 #[test]
 fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let dir = tempfile::tempdir().unwrap();
@@ -44,7 +45,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
-    // The test replays the whole motion, and then the measured motion.
+    // The test replays the complete motion, and then the measured motion.
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
     assert!(output.err.contains("the whole trajectory of the recording; the run reached"), "{}", output.err);
     assert!((output.json()["verdict"]["duration_s"].as_f64().unwrap() - whole).abs() < 0.1);
@@ -53,7 +54,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     assert!(part["position_min_rad"].as_f64().unwrap() > -0.01, "{part}");
 }
 
-/// If a recording without its trajectory ends in motion, the output suggests a possible next step, and this step works.
+/// If a recording without its trajectory ends in motion, the output suggests a next step, and this step works.
 #[test]
 fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -69,7 +70,8 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     sim.json(&["traj", "continue", &record, "--trajectory", &file], 0);
 }
 
-/// The recording contains a motion that is as fast as the limits allow. The measured motion is replayed within the limits.
+/// The recording contains a motion that is as fast as the limits allow. The command replays the measured motion within the
+/// limits.
 #[test]
 fn a_measured_motion_at_its_limits_is_run_again() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -80,13 +82,13 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     let words = ["traj", "replay", &record, "--measured", "--approach", "--record", &again];
     let value = sim.json(&words, 0);
     let executed = value["verdict"]["duration_s"].as_f64().unwrap();
-    // The motion takes 2.4 s. The end time of a measured motion is accurate to 0.1 s.
+    // The motion takes 2.4 s. The end time of the measured motion is accurate to 0.1 s.
     assert!((2.3..8.0).contains(&executed), "{executed} s");
     let most = value["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }
 
-/// A pose cannot be saved during a motion, including the start of the motion, when the velocity is still zero.
+/// The user cannot save a pose during a motion, including the start of the motion, when the velocity is still zero.
 #[test]
 fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -105,7 +107,7 @@ fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(0);
 }
 
-/// Options that would be ignored are refused before any frame is sent.
+/// The command rejects options that would have no effect, before it sends any frame.
 #[test]
 fn options_without_a_meaning_are_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -133,7 +135,7 @@ fn options_without_a_meaning_are_refused() {
     assert!(jtc(&words).ends(2).err.contains("--waypoints"));
 }
 
-/// Starts a recorded run in real time and waits until the arm has moved for a second.
+/// Starts a recorded run in real time and waits until the arm has moved for one second.
 fn moving(sim: &Sim, file: &str, record: &str) -> std::process::Child {
     moving_with(sim, &[file, "--record", record])
 }
@@ -142,7 +144,8 @@ fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
     moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
 }
 
-/// After a Stop by the user, or if the program was killed, the remainder runs from the last recorded position.
+/// After a Stop by the user, or if the program was killed, the command runs the remainder of the trajectory from the
+/// last recorded position.
 #[test]
 fn a_run_that_was_broken_off_goes_on_where_it_was() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -159,8 +162,8 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let before = place(&sim);
         assert!(before[0] > 0.01, "{before:?}");
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // A recording that includes the stop contains the final position of the arm. A recording that ends before the stop does not contain
-        // the final position.
+        // If the recording includes the stop, it contains the final position of the arm. A recording that ends before the stop does not
+        // contain the final position.
         let stands =
             output.err.contains("and the arm is at rest there: the motion continues from that position");
         assert!(stands || signal == "-KILL" && output.err.contains("no later position"), "{}", output.err);
@@ -170,14 +173,14 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         assert!((3.0..6.0).contains(&executed), "{executed} s of the 6 s are left");
         at(&sim, [0.0; 6]);
     }
-    // A trajectory at another speed has other points, so it does not match the recording.
+    // A trajectory at another speed has other points, so this trajectory does not match the recording.
     let half = sim.path("half.csv");
     let mut child = moving_with(&sim, &[&file, "--speed", "80", "--record", &half]);
     cli_kit::testing::signal(&child, "-INT");
     child.wait().unwrap();
     let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
     assert!(output.err.contains("at another speed"), "{}", output.err);
-    // A finished run has no remainder. A CSV file does not contain the commanded path.
+    // A finished run has no remainder. A CSV recording does not contain the commanded path.
     let (other, whole, rest) =
         (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
     sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
@@ -188,12 +191,13 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     assert!(!std::path::Path::new(&rest).exists());
 }
 
-/// After an error the arm must be recovered first. If the arm was moved in the meantime, an approach moves it to the resume point.
+/// After an error, the user must first recover the arm. If the arm was moved after the interruption, an approach moves it to the
+/// resume point.
 #[test]
 fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     let faults =
         "format = 2\n[[fault]]\nkind = \"motor-fault\"\njoint = 3\nbits = 2\nfor_s = 0.05\nat_point = 1500\n";
-    // The simulator runs in real time, so that the recording contains a status for each 40 ms of the path.
+    // The simulator runs in real time, so that the recording contains a status for every 40 ms of the path.
     let sim = Sim::with_faults(&["--no-throttle"], faults).held();
     let (file, record) = (sim.file("motion.csv", &slow_motion(60)), sim.path("fault.mcap"));
     sim.jtc(&["traj", "run", &file, "--record", &record]).ends(5);
@@ -210,8 +214,8 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     at(&sim, [0.0; 6]);
 }
 
-/// After an interruption in the second of three runs, the remainder of the second run and the third run are executed. The command also
-/// works if the recording contains a remainder, or if the controller has finished the run without the program.
+/// After an interruption in the second of three runs, the command executes the remainder of the second run, and then the third run.
+/// The command also works if the recording contains a remainder, or if the controller has finished the run without the program.
 #[test]
 fn the_runs_that_are_left_are_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -232,15 +236,15 @@ fn the_runs_that_are_left_are_run() {
     // With `--repeat 3`, the user requests one more run.
     let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
     assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");
-    // The test continues from the first recording again, after the controller has executed another motion. The remainder of the second run
-    // and the third run are executed.
+    // The test continues from the first recording again, after the controller has executed another motion. The command executes the
+    // remainder of the second run, and then the third run.
     sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]).ends(0);
     let output = sim.jtc(&["--json", "traj", "continue", &run]).ends(0);
     assert!(output.err.contains("then the whole trajectory runs once"), "{}", output.err);
     let value = output.json();
     assert_eq!(value["runs_finished"], 2, "{value}");
     assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
-    // The command reports if a recording lacks required data.
+    // The command reports that a recording lacks required data.
     let csv = path("run.csv");
     let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);

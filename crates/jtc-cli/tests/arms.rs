@@ -1,4 +1,4 @@
-//! Tests of arm files and robot descriptions, including files that are refused.
+//! Tests of arm files and robot descriptions, including files that the command rejects.
 
 use crate::common;
 
@@ -16,14 +16,16 @@ fn slower(dir: &std::path::Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// J-55: parameters of an arm file that the controller does not use are listed and refused before any frame is sent.
+/// J-55: the command lists the parameters of an arm file that the controller does not use, and rejects them before it
+/// sends any frame.
 #[test]
 fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     let dir = tempfile::tempdir().unwrap();
     let (arm, motion_file) = (slower(dir.path()), dir.path().join("motion.csv"));
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let file = motion_file.to_str().unwrap();
-    // The command first requests the data of the controller. If the controller does not answer, the command reports this error.
+    // The command first requests the data of the controller. If the controller does not answer, the command reports an error of
+    // the link.
     let port = ["--port", "/nowhere/tty"];
     jtc(&["params", "push", &arm, port[0], port[1]]).ends(3);
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -50,8 +52,8 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
-/// Parameters that a URDF cannot contain are unknown, not zero. Unknown parameters are not listed as differences from the controller. A
-/// check reports that it does not use them.
+/// Parameters that a URDF cannot contain are unknown, not zero. The command does not list unknown parameters as differences from the
+/// controller. A check reports that it does not use the unknown parameters.
 #[test]
 fn j55_what_a_urdf_cannot_say_is_not_given() {
     let dir = tempfile::tempdir().unwrap();
@@ -60,7 +62,8 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     std::fs::write(&urdf, arm.to_urdf()).unwrap();
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let (urdf, file) = (urdf.to_str().unwrap(), motion_file.to_str().unwrap());
-    // The limits are equal to those of the controller, so the command continues and opens the port, which does not exist.
+    // The limits are equal to the limits of the controller. Therefore the command continues and opens the port, which
+    // does not exist.
     let output = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
     assert!(!output.err.contains("rotor_inertia"), "{}", output.err);
 
@@ -78,7 +81,8 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     assert!(output.err.contains("without friction: the file"), "{}", output.err);
 }
 
-/// J-55: a URDF does not contain friction and gains. The missing values are not replaced by the values of another arm.
+/// J-55: a URDF does not contain friction and gains. The command does not replace the missing values by the values of
+/// another arm.
 #[test]
 fn j55_recover_refuses_an_arm_that_is_not_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -94,7 +98,7 @@ fn j55_recover_refuses_an_arm_that_is_not_whole() {
     jtc(&["recover", "--arm", path.to_str().unwrap(), "--defaults", "--port", "/nowhere/tty"]).ends(2);
 }
 
-/// A robot description with a gripper is imported as a usable arm file.
+/// `jtc arm import` converts a robot description with a gripper to a usable arm file.
 #[test]
 fn an_arm_file_is_made_from_a_robot_description() {
     let dir = tempfile::tempdir().unwrap();
@@ -128,7 +132,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     let output = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
     assert!(output.err.contains("is not a robot description"), "{}", output.err);
 
-    // The text output also shows the changes and proposals, and the file passes its check with warnings.
+    // The text output of the import also shows the changes and proposals. The arm file passes its check with warnings.
     let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--overwrite"]).ends(0);
     for words in [
         "left out: ",
@@ -147,7 +151,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert!(codes.contains(&"proposed") && codes.contains(&"holding"), "{codes:?}");
 }
 
-/// J-06, J-35: the check and the controller refuse the same values. The check reports the joint, value, limit and next step.
+/// J-06, J-35: the check and the controller reject the same values. The check reports the joint, value, limit and next step.
 #[test]
 fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
     let dir = tempfile::tempdir().unwrap();
@@ -172,7 +176,7 @@ fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
         "{}",
         output.out
     );
-    // If the file cannot be read, the exit code is different.
+    // If the command cannot read the file, the exit code is 2.
     jtc(&["arm", "check", "nowhere.toml"]).ends(2);
     jtc(&["arm", "check", "Cargo.toml"]).ends(2);
 }
@@ -207,7 +211,7 @@ fn an_arm_is_shown_with_units_ranges_and_sources() {
     assert_eq!(one("pid.kp", 2)["value"].as_f64(), Some(8000.0));
 }
 
-/// J-71: the check refuses unstable gains, and no command sends unstable gains to a controller.
+/// J-71: the check rejects unstable gains, and no command sends unstable gains to a controller.
 #[test]
 fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     let dir = tempfile::tempdir().unwrap();
@@ -240,8 +244,8 @@ fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     sim.jtc(&["arm", "push", whole]).ends(0);
 }
 
-/// A robot description in degrees is refused, and no file is written. Values in degrees are converted only once if the header contains
-/// their unit.
+/// The import rejects a robot description in degrees, and writes no file. If the header of a file contains degrees as unit, the
+/// command converts the values only once.
 #[test]
 fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,16 +1,16 @@
-//! Tests of `jtc bench`, which declares absent joints (J-53).
+//! Tests of `jtc bench`, which declares that joints are absent (J-53).
 
 use crate::common;
 
 use common::{Sim, motion};
 
-/// Fault file for an arm whose joint 3 is missing on the bus.
+/// Fault file for an arm whose joint 3 is missing on the joint bus.
 const WITHOUT: &str = "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_s = 0\n";
 
 #[test]
 fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let sim = Sim::with_faults(&["--no-throttle"], WITHOUT);
-    // If the joint is not declared absent, the controller waits for the drive or reports an error.
+    // If joint 3 is not declared absent, the controller waits for its drive or reports an error.
     std::thread::sleep(std::time::Duration::from_secs(3));
     assert_ne!(sim.json(&["status"], 0)["state"], "HoldPos");
     let set = sim.json(&["bench", "absent", "3=30", "--deg"], 0);
@@ -35,7 +35,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let doctor = sim.jtc(&["doctor"]).ends(0).out;
     assert!(doctor.contains("joint 3 is marked as absent"), "{doctor}");
 
-    // The controller refuses motions and teaching. All joints except joint 3 can be jogged.
+    // The controller rejects motions and teaching. The user can jog all joints except joint 3.
     let file = sim.file("motion.csv", &motion(0.1));
     let refused = sim.jtc(&["traj", "run", &file]).ends(4).err;
     assert!(
@@ -50,7 +50,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let moved = way["to_rad"][4].as_f64().unwrap() - way["from_rad"][4].as_f64().unwrap();
     assert!(moved > 0.02, "{moved} rad");
 
-    // Joints can be declared absent or present only while the drives produce no torque.
+    // The user can declare joints absent or present only while the drives produce no torque.
     let refused = sim.jtc(&["bench", "present"]).ends(1).err;
     assert!(refused.contains("jtc disable"), "{refused}");
     sim.jtc(&["disable", "--yes"]).ends(0);

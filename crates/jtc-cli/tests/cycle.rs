@@ -13,19 +13,19 @@ const PAGE: &str = "from-two-poses-to-a-cycle.md";
 fn done(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command);
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
-    // The table heading is omitted, because its width depends on the measured numbers.
+    // The comparison omits the table heading, because its width depends on the measured numbers.
     let lines = seen.text.lines().filter(|line| !line.contains("peak rad/s"));
     Printed { code: seen.code, text: lines.map(measured).collect() }
 }
 
-/// Like [`done`], for commands whose output is identical in every run.
+/// Like [`done`], for commands that print the same output in every run.
 fn exact(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command).0;
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
     seen
 }
 
-/// Replaces the measured numbers of a line by placeholders, but not the words that the user types.
+/// Replaces the measured numbers of an output line by placeholders, but not the words that the user types.
 fn measured(line: &str) -> String {
     let (typed, rest) = match line.split_once(": ") {
         Some((typed, rest)) if typed.starts_with("move to ") => (format!("{typed}: "), rest),
@@ -138,7 +138,7 @@ fn runs(desk: &Desk) {
     page.finish();
 }
 
-/// The simulator runs in real time, so that a motion can be stopped.
+/// The simulator runs in real time, so that the test can stop a motion.
 fn broken_off() {
     let mut page = Page::new(PAGE, "continue");
     let desk = Desk::simulated(&["--no-throttle"]);
@@ -164,7 +164,7 @@ fn broken_off() {
     page.finish();
 }
 
-/// Tests the section in which a hand guides the simulated arm.
+/// Tests the section of the page in which a hand guides the simulated arm.
 fn taught() {
     let mut page = Page::new(PAGE, "teach");
     let mut desk = Desk::simulated(&["--no-throttle"]);

@@ -1,4 +1,4 @@
-//! Simulated workplace of a user who types commands, with a directory, a port and a controller.
+//! Simulated workplace of a user who types commands. The workplace has a directory, a port and a controller.
 #![cfg(target_os = "linux")]
 
 use std::fs::File;
@@ -19,7 +19,7 @@ use crate::common::{Sim, command};
 /// Name of the port in the documentation.
 const PORT: &str = "/tmp/jtc";
 
-/// Output of a command.
+/// Output of a command that the user typed.
 pub(crate) struct Seen(pub Printed);
 
 impl std::ops::Deref for Seen {
@@ -30,13 +30,13 @@ impl std::ops::Deref for Seen {
 }
 
 impl Seen {
-    /// Replaces values that are different in each run by placeholders.
+    /// Replaces values that differ between runs by placeholders.
     pub(crate) fn blurred(self) -> Printed {
         Printed { code: self.code, text: blurred(&self.text) }
     }
 }
 
-/// Creates a terminal. Returns the side of the test, and the path that a command opens.
+/// Creates a pseudo-terminal. Returns the side of the test, and the path that a command opens.
 fn terminal() -> (File, String, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -46,7 +46,7 @@ fn terminal() -> (File, String, OwnedFd) {
     (File::from(master), name.to_string_lossy().into_owned(), slave)
 }
 
-/// Serial line to which a device other than a controller is connected.
+/// Serial line with a connected device that is not a controller.
 pub(crate) struct Line {
     port: String,
     ended: Arc<AtomicBool>,
@@ -54,7 +54,7 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Creates a device that repeatedly sends this text, and ignores its input.
+    /// Creates a device that repeatedly sends this text, and ignores the bytes that it receives.
     pub(crate) fn new(text: &'static str) -> Self {
         let (mut end, port, slave) = terminal();
         let mut raw = rustix::termios::tcgetattr(&slave).unwrap();
@@ -78,7 +78,7 @@ impl Drop for Line {
     }
 }
 
-/// Directory and port.
+/// Directory and port of a simulated workplace.
 pub(crate) struct Desk {
     dir: tempfile::TempDir,
     sim: Option<Sim>,
@@ -86,22 +86,22 @@ pub(crate) struct Desk {
 }
 
 impl Desk {
-    /// Creates a desk without a device at the port.
+    /// Creates a workplace without a device at the port.
     pub(crate) fn new() -> Self {
         Self { dir: tempfile::tempdir().unwrap(), sim: None, line: None }
     }
 
-    /// Creates a desk with this serial line at the port.
+    /// Creates a workplace with this serial line at the port.
     pub(crate) fn at(line: Line) -> Self {
         Self { line: Some(line), ..Self::new() }
     }
 
-    /// Creates a desk with a simulated controller at the port.
+    /// Creates a workplace with a simulated controller at the port.
     pub(crate) fn simulated(options: &[&str]) -> Self {
         Self { sim: Some(Sim::start(options)), ..Self::new() }
     }
 
-    /// Returns the directory of the files of the desk.
+    /// Returns the directory with the files of the workplace.
     pub(crate) fn dir(&self) -> &Path {
         self.dir.path()
     }
@@ -114,7 +114,7 @@ impl Desk {
         }
     }
 
-    /// Returns a shell that writes stdout and stderr into one stream, like a terminal.
+    /// Returns a shell that writes stdout and stderr of its commands into one stream, like a terminal.
     fn shell(&self, shown: &str) -> Command {
         let jtc = command();
         let mut shell = Command::new("sh");
@@ -125,7 +125,7 @@ impl Desk {
         let programs = Path::new(env!("CARGO_BIN_EXE_jtc")).parent().unwrap();
         let path = std::env::var("PATH").unwrap_or_default();
         let real = shown.replace(PORT, &self.port());
-        // The shell runs a single command with `exec`, so that a signal reaches the command.
+        // If the shell runs a single command, it uses `exec`, so that a signal reaches the command.
         let alone = !real.contains([';', '|']);
         shell
             .args(["-c", &format!("exec 2>&1\n{}{real}", if alone { "exec " } else { "" })])
@@ -149,7 +149,7 @@ impl Desk {
         self.seen(output.status.code(), &String::from_utf8_lossy(&output.stdout))
     }
 
-    /// Like [`Self::run`], for a command that moves the arm. Calls `happens` when the arm moves.
+    /// Like [`Self::run`], for a command that moves the arm. The function calls `happens` when the arm moves.
     pub(crate) fn moving(&self, shown: &str, happens: impl FnOnce(&Child, &Sim)) -> Seen {
         let (_person, _, slave) = terminal();
         let mut child = self.shell(shown).stdin(Stdio::from(slave)).spawn().unwrap();
@@ -168,7 +168,7 @@ impl Desk {
         }
     }
 
-    /// Opens the port, as another program would do.
+    /// Opens the port of the workplace as another program does.
     pub(crate) fn hold_port(&self) -> jtc_host::port::SerialPort {
         jtc_host::port::SerialPort::open(&self.port(), 115_200).unwrap()
     }

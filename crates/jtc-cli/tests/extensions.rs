@@ -5,7 +5,8 @@ use crate::common;
 use common::{Sim, jtc, motion};
 use serde_json::Value;
 
-/// Writes an arm file with a gain, a joint limit and a controller setting that differ from the built-in arm.
+/// Writes an arm file with a gain, a joint limit and a controller setting that differ from the values of the built-in
+/// arm.
 fn another(sim: &Sim) -> String {
     let text = include_str!("../../../arms/avena.toml")
         .replacen("name = \"avena\"", "name = \"another\"", 1)
@@ -43,8 +44,8 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let sim = Sim::start(&["--no-throttle"]);
     let arm = another(&sim);
     let file = sim.file("motion.csv", &motion(0.2));
-    // Before the push, all these values differ from those of the controller. The gains and the friction of the controller are the built-in
-    // values.
+    // Before the push, all these values differ from the values of the controller. The gains and the friction of the controller are the
+    // built-in values.
     let diff = sim.json(&["arm", "diff", &arm], 4);
     assert_eq!(names(&diff), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
 
@@ -55,7 +56,8 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
     assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
 
-    // The new arm is now the default of the controller, and a run is checked with the new arm. A run with a different arm file is refused.
+    // The new arm is now the default of the controller, and the command checks a run with the new arm. The command rejects a run with a
+    // different arm file.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let sim = sim.held();
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
@@ -67,7 +69,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let named = sim.jtc(&["traj", "run", &file]).ends(0).err;
     assert!(named.contains("checked with the arm of the controller, another"), "{named}");
 
-    // The pulled arm is equal to the pushed arm.
+    // The arm file that the command has read from the controller is equal to the arm file that it has sent.
     let pulled = sim.path("pulled.toml");
     assert_eq!(sim.json(&["arm", "pull", "-o", &pulled], 0)["hash"], pushed["hash"]);
     assert_eq!(sim.json(&["arm", "diff", &pulled], 0)["equal"], true);
@@ -75,7 +77,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let shown = sim.json(&["arm", "show"], 0);
     assert_eq!(shown["arm"], "another");
 
-    // Settings of the arm can be changed only while the drives produce no torque.
+    // The user can change settings of the arm only while the drives produce no torque.
     let refused = sim.jtc(&["arm", "push", avena]).ends(1);
     assert!(
         refused.err.contains("jtc disable") && refused.err.contains("nothing was changed"),
@@ -83,14 +85,15 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
         refused.err
     );
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
-    // The command is refused without a terminal, because no user can confirm that the torque may be switched off.
+    // Without a terminal, the command rejects the request, because no user can confirm that the torque may be switched
+    // off.
     sim.jtc(&["disable"]).ends(4);
     assert_eq!(sim.json(&["disable", "--yes"], 0)["status"]["state"], "Init");
     sim.jtc(&["arm", "push", avena]).ends(0);
     assert_eq!(sim.json(&["arm", "diff", avena], 0)["equal"], true);
 }
 
-/// An arm without gains is incomplete.
+/// An arm without gains is incomplete, so the command does not send it.
 #[test]
 fn j55_an_arm_that_is_not_whole_is_not_pushed() {
     let text: String = include_str!("../../../arms/avena.toml")
@@ -119,7 +122,7 @@ fn j57_the_speed_of_a_motion_changes_while_it_runs() {
     let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
     assert!(run.err.contains("speed override of the controller is 50 %"), "{}", run.err);
     let executed = run.json()["recorded_s"].as_f64().unwrap();
-    // The lower speed does not apply to the approach, whose duration is unchanged.
+    // The lower speed does not apply to the approach, so the duration of the approach is unchanged.
     assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
     for wrong in ["4", "101", "nan"] {
         sim.jtc(&["traj", "speed", wrong]).ends(2);
@@ -133,12 +136,12 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     let way = sim.json(&["jog", "3", "0.2", "--duration", "1"], 0);
     let at = |value: &Value, j: usize| value[j].as_f64().unwrap();
     let moved = at(&way["to_rad"], 2) - at(&way["from_rad"], 2);
-    // The range is wide, because the arm comes to rest if a busy computer repeats the jog too late.
+    // The permitted range is wide, because the arm comes to rest if a busy computer repeats the jog too late.
     assert!((0.05..0.25).contains(&moved), "{moved}");
     assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
     let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
     assert!(at(&back["to_rad"], 2) < at(&way["to_rad"], 2) - 0.05);
-    // A killed command cannot send a Stop. The controller therefore stops the arm without a Stop.
+    // A killed command cannot send a Stop. Therefore the controller stops the arm without a Stop.
     let mut child = sim.command(&["jog", "1", "0.3"]).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(600));
     child.kill().unwrap();
@@ -158,12 +161,13 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
 
-/// If an error releases the arm during a jog, the command reports the error and its reason to the script.
+/// If an error switches off the torque of the arm during a jog, the command reports the error and its reason to the
+/// script.
 #[test]
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
         "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 4\nin_state = \"hold\"\nafter_s = 10\n";
-    // The drives are enabled 4 s after the controller enters HoldPos. Without the fault the jog would take a minute.
+    // The drives are enabled 4 s after the controller enters HoldPos. Without the fault, the jog would take a minute.
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     let output = sim.jtc(&["--json", "jog", "2", "0.01", "--duration", "60"]).ends(5);
     let error = &output.json()["error"];
@@ -172,7 +176,8 @@ fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() 
     assert!(error.to_string().contains("jtc recover"), "{error}");
 }
 
-/// The simulated board stores its arm in a file, as a real board stores it in flash. The file still exists after the end of the simulator.
+/// The simulated board stores its arm in a file, as a real board stores its arm in flash. The file still exists after the simulator has
+/// ended.
 #[test]
 fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -186,7 +191,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
         (&status["state"], status["missing_parameters"].as_array().unwrap().len()),
         (&"Init".into(), 3)
     );
-    // The torque of a held arm is not switched off without confirmation.
+    // The command does not switch off the torque of an arm that the controller holds, unless the user confirms this.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let refused = sim.jtc(&["arm", "push", &arm, "--store"]).ends(1);
     assert!(
@@ -222,7 +227,7 @@ fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
 }
 
-/// If parameters are only stored, the controller must not start position hold with them.
+/// If the user only stores parameters, the controller must not start position hold with these parameters.
 #[test]
 fn j54_an_arm_that_is_stored_is_not_held_in_between() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Tests of `jtc firmware` with folders as USB drives and boards on pseudo-terminals. The tests of the library cover the complete behaviour
-//! of an ST-LINK.
+//! Tests of `jtc firmware`, with folders as USB drives and boards on pseudo-terminals. The tests of the library cover the complete
+//! behaviour of an ST-LINK.
 
 #[cfg(unix)]
 mod board;
@@ -14,7 +14,7 @@ use common::{Dir, Sim, command};
 use serde_json::Value;
 
 const H745: &str = "nucleo-h745zi-q";
-/// SHA-256 that does not match the image of 4096 bytes. The library computes the correct SHA-256.
+/// SHA-256 that does not match the image of 4096 bytes. The library computes the correct SHA-256 of the image.
 const WRONG: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// Returns an image for this board. The program in the image does nothing.
@@ -30,7 +30,7 @@ fn image(board: &str) -> Vec<u8> {
     bytes[0x600] = 1;
     bytes[0xFFF] = 1;
     if board.starts_with("nucleo-h745") {
-        // The part after these bytes is the program of the second core.
+        // The bytes that are appended next are the program of the second core.
         bytes.resize(1024 * 1024, 0xFF);
         for word in [0x3004_8000u32].into_iter().chain([0x0810_0041; 15]).chain([0xE7FD_BF30]) {
             bytes.extend(word.to_le_bytes());
@@ -39,8 +39,8 @@ fn image(board: &str) -> Vec<u8> {
     bytes
 }
 
-/// Creates a USB drive with this label, an image, and a catalogue. The catalogue is in another folder and lists the image with a wrong
-/// digest.
+/// Creates a USB drive with this label, an image, and a catalogue of images. The catalogue is in another folder and lists the image
+/// with a wrong digest.
 fn desk(label: &str) -> (Dir, String, String) {
     let dir = Dir::new();
     fs::create_dir(dir.path(label)).unwrap();
@@ -107,7 +107,7 @@ fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let question = refused["error"]["message"].as_str().unwrap();
     assert!(question.contains("safety wires") && question.contains("file is complete"), "{question}");
     nothing_written(&drive);
-    // A drive that stays mounted shows that the board has not accepted the image, so the command fails.
+    // If the USB drive stays mounted, the board has not accepted the image, so the command fails.
     let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
     assert_eq!(done["error"]["code"], "not-taken");
     assert_eq!(fs::read(Path::new(&drive).join("openjtc.bin")).unwrap(), image(H745));
@@ -178,7 +178,7 @@ fn a_controller_that_holds_its_arm_or_is_another_one_is_not_reset() {
     assert_eq!(refused["error"]["code"], "has-torque");
     assert!(refused["error"]["hint"].as_str().unwrap().contains("jtc disable"));
     nothing_written(&drive);
-    // A simulated controller has no flash memory.
+    // A simulated controller has no flash memory, so it cannot report a program.
     let verified = sim.json(&["firmware", "verify", "--image", &new], 5);
     assert_eq!(verified["error"]["code"], "not-reported");
 }
@@ -207,7 +207,8 @@ mod with_a_board {
         let board = Board::new(H745, Path::new(&drive), image(H745).len());
         let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
         let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
-        // In the second pass, a board already runs the image. The command cannot determine if the drive belongs to this board.
+        // In the second pass of the loop, a board already runs the image. The command cannot determine if the USB drive
+        // belongs to this board.
         for _ in 0..2 {
             let done = json(&jtc(&dir, &words).ends(0));
             assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");
@@ -218,7 +219,7 @@ mod with_a_board {
         }
         let verified = jtc(&dir, &["--json", "firmware", "verify", "--image", &new, "--port", &board.port]);
         assert_eq!(json(&verified.ends(0))["proved"], true);
-        // With `--no-read-back`, the command ends without verification when the drive has appeared again.
+        // With `--no-read-back`, the command ends without verification when the USB drive has appeared again.
         let done = json(&jtc(&dir, &[&words[..], &["--no-read-back"]].concat()).ends(0));
         assert_eq!((&done["proved"], &done["drive_after"]), (&false.into(), &"came_back".into()), "{done}");
     }
@@ -253,7 +254,8 @@ mod with_a_board {
             },
             "the report of the board has changed in the meantime",
         );
-        // The drive is unmounted, but its folder still exists. Then another drive is mounted at this folder.
+        // The USB drive is unmounted, but its folder still exists. After that, another USB drive is mounted at this
+        // folder.
         let page = Path::new(&drive).join("MBED.HTM");
         answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is at this place");
         fs::remove_file(page).unwrap();

@@ -17,7 +17,7 @@ use crate::common::{Sim, jtc};
 /// Time from enabling the drives until every joint has settled.
 const SETTLES: Duration = Duration::from_secs(8);
 
-/// External torque at which a push is reported, N·m. The value is 30 % of the 40 N·m of joint 5.
+/// External torque above which the controller reports a push, N·m. The value is 30 % of the 40 N·m of joint 5.
 const LIMIT: f64 = 12.0;
 
 fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
@@ -30,7 +30,7 @@ fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
     }
 }
 
-/// Pushes joint 5 with a torque above its friction until `ask` returns a held stop. The joints must have settled since they were enabled.
+/// Pushes joint 5 with a torque above its friction until `ask` returns a held stop. The joints must have settled after they were enabled.
 fn pushed(sim: &mut Sim, mut ask: impl FnMut() -> Option<Value>) -> Value {
     std::thread::sleep(SETTLES);
     let mut looks = 0;
@@ -43,7 +43,7 @@ fn pushed(sim: &mut Sim, mut ask: impl FnMut() -> Option<Value>) -> Value {
     })
 }
 
-/// Checks kind, joint, value and limit of a push against joint 5.
+/// Checks kind, joint, value and limit of a held stop that a push against joint 5 has caused.
 fn is_a_push(stop: &Value) {
     assert_eq!((&stop["kind"], &stop["joint"], &stop["unit"]), (&"push".into(), &5.into(), &"N·m".into()));
     assert_eq!((&stop["number"], &stop["code"]), (&2.into(), &"held-stop-push".into()));
@@ -148,8 +148,8 @@ fn j69_the_agent_asks_for_the_cause_and_shows_it() {
     agent.wait().expect("it ends");
 }
 
-/// The command that sends gains to an arm under torque ends when the gains have held the arm stable. If the controller rejects them, the
-/// command reports the reason.
+/// A command that sends gains to an arm with torque ends when the arm was stable with these gains. If the controller rejects the gains,
+/// the command reports the reason.
 #[test]
 fn j71_params_push_waits_for_the_trial_of_its_gains() {
     let mut sim = Sim::start(&["--no-throttle"]).held();

@@ -1,5 +1,5 @@
-//! Tests of `jtc plan` with the flange on lines and arcs. The tests check the flange positions in the written trajectory, and the refused
-//! plans.
+//! Tests of `jtc plan` with the flange on lines and arcs. The tests check the flange positions in the written trajectory, and the plans
+//! that the command rejects.
 
 use crate::common;
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
@@ -14,8 +14,8 @@ use serde_json::Value;
 type Vec3 = [f64; 3];
 
 impl Dir {
-    /// Returns the output for a plan of this text, and ten flange poses in each interval of the written trajectory. The poses are
-    /// interpolated as in the controller.
+    /// Returns the output for a plan of this text, and ten flange poses in each interval of the written trajectory. The function
+    /// interpolates the poses in the same way as the controller.
     fn plan(&self, text: &str, options: &[&str]) -> (Value, Vec<(f64, Pose)>) {
         let name = if text.starts_with('[') { "waypoints.json" } else { "waypoints.csv" };
         let (file, out) = (self.file(name, text), self.path("out.csv"));
@@ -25,7 +25,7 @@ impl Dir {
         (printed, flange(&std::fs::read_to_string(out).unwrap()))
     }
 
-    /// Returns the output of a refused plan, and checks that no file was written.
+    /// Returns the output of a plan that the command rejects, and checks that no file was written.
     fn refused(&self, text: &str, options: &[&str], code: i32) -> String {
         let (file, out) = (self.file("refused.csv", text), self.path("none.csv"));
         let output = jtc(&[&["plan", &file, "-o", &out], options].concat()).ends(code);
@@ -82,14 +82,14 @@ fn a_line_is_straight_and_a_leg_in_joint_space_says_that_it_is_not() {
     let (a, b) = ([0.6, -0.3, 0.4], [0.6, 0.3, 0.4]);
     let furthest =
         |all: &[(f64, Pose)]| all.iter().map(|(_, p)| off_leg(p.position, a, b)).fold(0.0, f64::max);
-    // In joint space the flange leaves the line, and the distance is printed.
+    // In joint space, the flange leaves the line, and the command prints the distance of the flange from the line.
     let (printed, all) = dir.plan(TWO, &[]);
     let note = printed["notes"][0].as_str().unwrap();
     let mm: f64 = note.split_once("by up to ").unwrap().1.split_once(" mm").unwrap().0.parse().unwrap();
     assert!((1e3 * furthest(&all) - mm).abs() < 0.5 && mm > 50.0, "{note}: {}", furthest(&all));
     assert!(note.contains("between waypoints 1 and 2") && note.contains("`--line`"), "{note}");
-    // A line can be requested by an option, by a column of the file, and in JSON. The line is planned at any speed, with and without steps
-    // in the acceleration.
+    // The user can request a line by an option, by a column of the file, and in JSON. The command plans the line at any speed, with and
+    // without steps in the acceleration.
     let column = TWO.replace("qw", "qw,leg").replace("0.3,0.4,0,0,0,1\n", "0.3,0.4,0,0,0,1,line\n");
     let json = r#"[{"x":0.6,"y":-0.3,"z":0.4,"qx":0,"qy":0,"qz":0,"qw":1},
         {"x":0.6,"y":0.3,"z":0.4,"qx":0,"qy":0,"qz":0,"qw":1,"leg":"line"}]"#;
@@ -140,11 +140,12 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
         }
         durations.push(printed["duration_s"].as_f64().unwrap());
     }
-    // A motion with blends is never slower than one that stops at the waypoints.
+    // A motion with blends is never slower than a motion that stops at the waypoints.
     assert!(durations[1] <= durations[0] && durations[2] < durations[1], "{durations:?}");
 }
 
-/// The arc is a quarter circle about the vertical axis of the base. The orientation of the point on the arc is ignored and may be omitted.
+/// The arc is a quarter circle about the vertical axis of the base. The command ignores the orientation of the point on the arc, so the
+/// file may omit it.
 #[test]
 fn an_arc_is_round() {
     let dir = Dir::new();
@@ -174,7 +175,8 @@ fn an_arc_is_round() {
     }
 }
 
-/// The end points can be named poses and joint positions. Segments in joint space between lines, and times, are possible.
+/// The end points can be named poses and joint positions. The file can also contain times, and segments in joint space
+/// between lines.
 #[test]
 fn waypoints_of_any_kind_may_be_ends_of_lines() {
     let dir = Dir::new();
@@ -199,7 +201,7 @@ fn waypoints_of_any_kind_may_be_ends_of_lines() {
     let early = text.replace("\n5,", "\n0.2,");
     let refused = dir.refused(&early, &["--arm", &arm], 4);
     assert!(refused.contains("line 4: waypoint 3: 0.200 s after waypoint 1 is too early"), "{refused}");
-    // The second end is another joint configuration with the same flange pose.
+    // The second end point is another joint configuration with the same flange pose.
     let other = robots_other(&q);
     let cells = other.map(|v| v.to_string()).join(",");
     let refused =
@@ -207,7 +209,7 @@ fn waypoints_of_any_kind_may_be_ends_of_lines() {
     assert!(refused.contains("line 5: waypoint 4: the line ends there with joint "), "{refused}");
 }
 
-/// Returns other joint positions with the same flange pose.
+/// Returns different joint positions with the same flange pose.
 fn robots_other(q: &[f64; 6]) -> [f64; 6] {
     use jtc_host::plan::kinematics::Kinematics;
     let all =
@@ -244,12 +246,12 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
         refused.contains("line 4: waypoint 3: the three points of the arc are not on a circle"),
         "{refused}"
     );
-    // In the first case, the end point is out of reach. In the second case, both end points are in reach, but the middle of the line is out
-    // of reach.
+    // In the first plan, the end point is out of reach of the arm. In the second plan, the arm can reach both end points, but not the
+    // middle of the line.
     let far = "x,y,z,qx,qy,qz,qw\n0.6,0,0.4,0,0,0,1\n0.6,0.2,0.4,0,0,0,1\n2.6,0,0.4,0,0,0,1\n";
     let refused = dir.refused(far, &["--line"], 4);
     assert!(refused.contains("line 4: waypoint 3: out of reach"), "{refused}");
-    // The line passes through a singular pose. The error reports the joints and the position on the line.
+    // The line passes through a singular pose of the arm. The error reports the joints and the position on the line.
     let through = "q1,q2,q3,q4,q5,q6\n0.3,-0.2,1.2,0.4,0.3,0.2\n0.5,-0.1,1.1,0.4,-0.3,0.2\n";
     let refused = dir.refused(through, &["--line"], 4);
     let place = refused.split_once("line 3: leg 1 (to waypoint 2), ").map(|(_, rest)| rest);

@@ -1,4 +1,4 @@
-//! Tests in which a user reads the flight recorder (J-56) after a fault, while the arm moves, and again from a file.
+//! Tests in which a user reads the flight recorder (J-56) after a fault, during a motion, and again from a file.
 
 use crate::common;
 
@@ -9,7 +9,7 @@ use serde_json::Value;
 const SILENT: &str =
     "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_point = 700\nfor_s = 0.5\n";
 
-/// Returns a simulated controller after this fault has occurred.
+/// Returns a simulated controller after joint 3 has stopped answering.
 fn after_fault() -> Sim {
     let sim = Sim::with_faults(&["--no-throttle"], SILENT).held();
     let file = sim.file("motion.csv", &slow_motion(30));
@@ -35,7 +35,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
         (&Value::from("joint 3: does not answer"), &Value::from(true))
     );
     assert_eq!(first["joints"], serde_json::json!([3]));
-    // The log begins at least two seconds before the fault and ends 0.3 s after it, with all measured values.
+    // The log begins at least two seconds before the fault and ends 0.3 s after the fault, with all measured values.
     let at = first["time_s"].as_f64().unwrap();
     assert!(fetched["from_s"].as_f64().unwrap() < at - 2.0);
     assert!((fetched["to_s"].as_f64().unwrap() - at - 0.3).abs() < 1e-9);
@@ -43,7 +43,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     assert!(count(&fetched, "replayed") > 2_300, "{fetched}");
     assert_eq!((count(&fetched, "other_arm"), count(&fetched, "other_trajectory")), (0, 0));
 
-    // The page begins with the fault. The recording is a normal recording that also contains the log.
+    // The report page begins with the fault. The recording is a normal recording that also contains the log.
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains("after the start of the device: joint 3: does not answer"));
     let report = jtc(&["--json", "report", &recording, "--out", &sim.path("again.html")]).ends(0).json();
@@ -53,7 +53,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     let text = jtc(&["log", "replay", &recording]).ends(0).out;
     assert!(text.contains(" replayed, no difference"), "{text}");
 
-    // A request that clears errors does not remove the log. A request that clears the log removes it.
+    // A request that clears errors does not remove the log. A request that clears the log removes the log.
     sim.jtc(&["recover"]).ends(0);
     assert_eq!(sim.json(&["log", "fetch"], 0)["first"], *first);
     let info = sim.jtc(&["info"]).ends(0).out;
@@ -62,7 +62,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     std::thread::sleep(std::time::Duration::from_millis(300));
     let anew = sim.json(&["log", "fetch"], 0);
     assert_eq!((&anew["state"], &anew["first"]), (&Value::from("recording"), &Value::Null));
-    // An existing output file is never overwritten.
+    // The command never overwrites an existing output file.
     sim.jtc(&["log", "fetch", "-o", &recording]).ends(4);
 }
 

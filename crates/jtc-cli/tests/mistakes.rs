@@ -4,7 +4,7 @@ use crate::common;
 
 use common::{Dir, jtc};
 
-/// The errors for degrees, a missing header and a too fast move contain a hint, and each hint works.
+/// The errors for degrees, a missing header and a too fast motion contain a hint, and each hint works.
 #[test]
 fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let dir = tempfile::tempdir().unwrap();
@@ -31,7 +31,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let output = jtc(&["--json", "traj", "check", file, "--deg"]).ends(0).json();
     let top = output["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((top - 45f64.to_radians()).abs() < 1e-3, "{top}");
-    // The units in the header are used.
+    // The command uses the units in the header of the file.
     std::fs::write(&path, header.replace("q1,", "q1_deg,") + &rows(45.0, 0.01)).unwrap();
     let output = jtc(&["traj", "info", file, "--deg"]).ends(2);
     assert!(output.err.contains("the file states its units"), "{}", output.err);
@@ -53,7 +53,8 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     jtc(&["traj", "check", file, "--speed", &percent.to_string()]).ends(0);
     jtc(&["traj", "check", file, "--speed", &(percent + 5.0).to_string()]).ends(4);
 
-    // The waypoints are too far apart for their times. The error must report this cause, and not a gap between two parts of the path.
+    // The waypoints are too far apart for their times. The error must report this cause, and must not report a gap between two parts
+    // of the path.
     let waypoints = "0,0,0,0,0,0,0\n1,0.1,0,0,0,0,0\n2,0.2,0,0,0,0,0\n3,0.3,0,0,0,0,0\n3.4,1.5,0,0,0,0,0\n4.4,1.6,0,0,0,0,0\n\
                      5.4,1.7,0,0,0,0,0\n6.4,1.8,0,0,0,0,0\n";
     std::fs::write(&path, header.to_owned() + waypoints).unwrap();
@@ -64,7 +65,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     assert!(output.err.contains("the curve exceeds them: joint 1 by"), "{}", output.err);
 }
 
-/// Option values are interpreted as the user expects, and errors name the options of the command.
+/// The command interprets option values as the user expects, and errors name the options of the command.
 #[test]
 fn mistakes_in_options_are_named_with_what_helps() {
     let dir = Dir::new();

@@ -20,7 +20,7 @@ fn arm(sim: &Sim) -> String {
     sim.file("arm.toml", include_str!("../../../arms/avena.toml"))
 }
 
-/// If no speed is specified, a move and an approach are slow, and the command prints the speed.
+/// If the user specifies no speed, a move and an approach are slow, and the command prints the speed.
 #[test]
 fn j52_a_move_without_a_speed_is_slow() {
     // The simulator runs in real time, because a run reports its duration.
@@ -49,7 +49,8 @@ fn j52_a_move_without_a_speed_is_slow() {
     assert!(!approach(&["--speed", "100"]).contains("of the limits"));
 }
 
-/// J-55: the whole run is checked with the arm, limits and payload of the controller before an approach begins.
+/// J-55: the command checks the complete run with the arm, limits and payload of the controller before an approach
+/// begins.
 #[test]
 fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let sim = Sim::start(&FAST);
@@ -78,7 +79,8 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     loaded.jtc(&["traj", "run", &motion, "--approach", "--speed", "100"]).ends(0);
 }
 
-/// The arm moves to a flange pose in joint space, and then on a straight line. Impossible moves are refused before the arm moves.
+/// The arm moves to a flange pose in joint space, and then on a straight line. The command rejects impossible moves before the
+/// arm moves.
 #[test]
 fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
     let sim = ready();
@@ -115,7 +117,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
         let cells: Vec<&str> = line.split(',').collect();
         let q: Vec<f64> = columns.iter().filter_map(|i| cells[*i].parse().ok()).collect();
         let [x, y, z] = if q.len() == 6 { flange(&q).position } else { continue };
-        // The tolerance is wide, because the previous position of the arm was measured.
+        // The tolerance is wide, because the command measured the previous position of the arm.
         assert!((x - 0.6).abs() < 3e-3 && (z - 0.4).abs() < 3e-3, "{x} {y} {z}");
         passed += usize::from(y.abs() < 0.1);
     }
@@ -153,7 +155,8 @@ fn an_arm_moves_between_positions_and_the_poses_that_were_saved() {
     at(&sim, [10f64.to_radians(), 0.0, 0.0, 0.0, 0.0, (-20f64).to_radians()]);
     let list = jtc(&["--json", "pose", "list", "--arm", &arm]).ends(0).json();
     assert_eq!(list["poses_rad"].as_object().unwrap().len(), 2);
-    // An existing pose is overwritten only if the user requests this. After a pose was removed, only the end of the file is different.
+    // The command overwrites an existing pose only if the user requests this. After the command has removed a pose, only the end of
+    // the file is different.
     let refused = sim.jtc(&["pose", "save", "up", "--arm", &arm]).ends(4);
     assert!(refused.err.contains("pose \"up\" exists already"), "{}", refused.err);
     sim.jtc(&["pose", "save", "up", "--arm", &arm, "--overwrite"]).ends(0);
@@ -198,7 +201,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
     let output = jtc(&["pose", "remove", "hone", "--arm", &arm]).ends(2);
     assert!(output.err.contains("did you mean \"home\"?"), "{}", output.err);
     at(&sim, [0.0; 6]);
-    // Like `traj run`, a move begins only in HoldPos.
+    // Like `traj run`, a move can begin only in HoldPos.
     let sim = Sim::start(&FAST);
     let all_are_there = || sim.json(&["status"], 0)["missing_nodes"].as_array().unwrap().is_empty();
     assert!((0..100).any(|_| all_are_there()), "the drives are brought up");
@@ -239,7 +242,7 @@ fn waypoints_are_run_several_times() {
     assert_eq!(again["outcome"], "finished");
 }
 
-/// The example with straight lines can be planned as its text describes, and executed.
+/// The user can plan the example with straight lines as its text describes, and execute the motion.
 #[test]
 fn the_example_of_lines_is_run() {
     let sim = ready();
@@ -257,7 +260,7 @@ fn the_example_of_lines_is_run() {
     }
 }
 
-/// A path that does not end at its start point is repeated only with an approach.
+/// The command repeats a path that does not end at its start point only with an approach.
 #[test]
 fn an_open_path_is_repeated_with_approaches() {
     let sim = ready();
@@ -274,8 +277,8 @@ fn an_open_path_is_repeated_with_approaches() {
     at(&sim, [0.4, 0.1, -0.2, 0.0, 0.3, 0.0]);
 }
 
-/// A robot description of a small arm with the proportions of a UR5 is imported, simulated, and moved through
-/// waypoints.
+/// The test imports and simulates the robot description of a small arm with the proportions of a UR5. The arm then
+/// moves through waypoints.
 #[test]
 fn another_arm_is_led_through_waypoints() {
     let dir = tempfile::tempdir().unwrap();
@@ -302,7 +305,7 @@ fn another_arm_is_led_through_waypoints() {
     }
 }
 
-/// Returns a description with the origins, axes, masses and limits of a UR5. The links of the arm are rods.
+/// Returns a robot description with the origins, axes, masses and limits of a UR5. The links of the arm are rods.
 fn ur5() -> String {
     let half = std::f64::consts::FRAC_PI_2;
     let joints = [
@@ -331,7 +334,7 @@ fn ur5() -> String {
     text + "</robot>"
 }
 
-/// J-33: like a run, a move is stopped on its path, and the arm comes to rest.
+/// J-33: like a run, a move stops on its path, and the arm comes to rest.
 #[test]
 fn j33_a_move_is_stopped_on_its_path() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -349,7 +352,8 @@ fn j33_a_move_is_stopped_on_its_path() {
     assert!(here[1..].iter().all(|q| q.abs() < 3e-3), "{here:?}");
 }
 
-/// J-55: if an arm file differs from the arm of the controller, no joint moves. Without an arm file, the limits of the controller apply.
+/// J-55: if an arm file differs from the arm of the controller, the arm does not move. Without an arm file, the limits of the controller
+/// apply.
 #[test]
 fn j55_a_move_for_another_arm_is_refused() {
     let sim = ready();
@@ -367,7 +371,7 @@ fn j55_a_move_for_another_arm_is_refused() {
     at(&sim, [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// A hand guides the arm. The motion is converted to waypoints and planned, or it is replayed as measured.
+/// A hand guides the arm. The command converts the motion to waypoints and plans it, or replays the motion as measured.
 #[test]
 fn a_motion_by_hand_is_waypoints_or_run_again() {
     let dir = tempfile::tempdir().unwrap();
@@ -383,7 +387,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     let planned = jtc(&["--json", "plan", &taught, "-o", &out, "--blend", "0.02"]).ends(0).json();
     assert_eq!(planned["waypoints"].as_u64(), Some(count));
     sim.jtc(&["traj", "run", &out, "--approach"]).ends(0);
-    // The replayed motion is the motion of the hand, which is 0.3 rad and back.
+    // The replayed motion is the motion of the hand, which moves joint 1 by 0.3 rad and back.
     let replay = ["traj", "replay", &recording, "--measured", "--approach"];
     let mut patience = Patience::begin();
     let output = loop {

@@ -7,7 +7,7 @@ use common::{jtc, jtc_with, motion};
 #[test]
 fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["traj", "rum", "x"]).ends(2);
-    // The user must specify the nodes, and a bit mask is refused. The command does not open the port.
+    // The user must specify the nodes, and the command rejects a bit mask. The command does not open the port.
     jtc(&["reset", "--port", "/nowhere/tty"]).ends(2);
     let output = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
     assert!(output.err.contains("--joints 3") && output.err.contains("--joints 1,2"), "{}", output.err);
@@ -20,7 +20,7 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
-/// Errors in the usage are also reported as JSON if JSON was requested before the command, after the command, or by the environment
+/// The command also reports wrong usage as JSON if JSON was requested before the command, after the command, or by the environment
 /// variable.
 #[test]
 fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
@@ -36,7 +36,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 
-/// Options that every command has may be typed before or after the command.
+/// The user may type an option that every command has before or after the command.
 #[test]
 fn the_port_may_stand_before_the_command() {
     for words in [
@@ -47,12 +47,13 @@ fn the_port_may_stand_before_the_command() {
         let output = jtc(words).ends(3);
         assert!(output.err.contains("/nowhere/tty"), "{}", output.err);
     }
-    // The option that is closer to the command is used.
+    // The command uses the option that is closer to the name of the command.
     let output = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
     assert!(output.err.contains("/near/tty"), "{}", output.err);
 }
 
-/// The joint bus is CAN FD. A transport without CAN FD is refused, and the error suggests a suitable transport.
+/// The joint bus is CAN FD. The command rejects a transport without CAN FD, and the error suggests a suitable
+/// transport.
 #[cfg(unix)]
 #[test]
 fn a_bus_that_cannot_carry_the_joints_is_refused() {
@@ -87,7 +88,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     let output = jtc(&["--json", "traj", "check", file]).ends(4);
     let problems = output.json()["verdict"]["problems"].clone();
     assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
-    // The suggested command can be typed as it is printed.
+    // The user can type the suggested command as it is printed.
     let spaced = dir.path().join("my motion.csv");
     std::fs::write(&spaced, motion(0.3)).unwrap();
     let spaced = spaced.to_str().unwrap();
@@ -95,7 +96,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     assert!(output.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", output.out);
     let output = jtc(&["traj", "check", file]).ends(4);
     assert!(output.out.contains(&format!("jtc traj check {file} --speed ")), "{}", output.out);
-    // The run is refused before any file or port is opened. The port of this test does not exist.
+    // The command rejects the run before it opens any file or port. The port of this test does not exist.
     let output = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
     assert_eq!(output.json()["outcome"], "refused");
     let output = jtc(&["--json", "traj", "info", file]).ends(0);
@@ -139,10 +140,10 @@ fn decode_knows_frames_of_both_directions() {
     let output = jtc_with(&["--json", "decode"], "9B0B0007 03 7D9E").ends(0);
     assert_eq!(output.json()["frame"], "TrajSetExecStatus");
     assert_eq!(output.json()["type"], 0x0B);
-    // Noise before and after a frame does not cause the loss of the frame.
+    // The decoder does not lose a frame because of noise before and after the frame.
     let output = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
     assert!(output.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", output.out);
-    // In the bit mask, bit 2 is joint 3.
+    // In the bit mask of the frame, bit 2 is joint 3.
     let output = jtc_with(&["decode"], "9B 10 00 0A 04 00 00 00 AD BE").ends(0);
     assert!(output.out.contains("ResetCanDevices: node 2 (joint 3)"), "{}", output.out);
     jtc_with(&["decode"], "hello").ends(2);
@@ -166,7 +167,8 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     assert!(output.err.contains("already uses"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
     run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--overwrite"]).ends(4);
-    // Overwriting is allowed, but the port does not exist. The old file is unchanged, and no empty file was created.
+    // Overwriting is allowed, but the port does not exist. The command has not changed the old file, and has not
+    // created an empty file.
     run(&["--record", &old, "--report", &path("new.html"), "--overwrite"]).ends(3);
     assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
     assert!(!std::path::Path::new(&path("new.html")).exists());
@@ -209,7 +211,8 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // A second demo and a report do not overwrite existing files without the option. A refused command does not run a simulation.
+    // A second demo and a second report do not overwrite existing files without the option. If the command rejects the request,
+    // it does not run a simulation.
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
     let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
@@ -224,7 +227,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     let file = out.join("recording.mcap");
     let page = out.join("report.html");
     jtc(&["report", file.to_str().unwrap(), "--out", page.to_str().unwrap()]).ends(4);
-    // A report from the recording contains the numbers of the first report.
+    // A report from the recording contains the same numbers as the first report.
     let again = jtc(&["--json", "report", file.to_str().unwrap()]).ends(0).json();
     for (a, b) in again["joints"].as_array().unwrap().iter().zip(value["joints"].as_array().unwrap()) {
         let rms = |v: &serde_json::Value| v["rms_error_mrad"].as_f64().unwrap();
@@ -232,7 +235,8 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     }
 }
 
-/// If the result cannot be printed, the command fails. If the reader has closed the pipe, the command does not fail.
+/// If the command cannot print its result, the command fails. If the reader has closed the pipe, the command does not
+/// fail.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -278,7 +282,7 @@ fn examples_are_files_that_the_named_commands_take() {
             }
             _ => drop(jtc(&["traj", "check", file]).ends(0)),
         }
-        // The file is not overwritten, because the user may have changed it.
+        // The command does not overwrite the file, because the user may have changed it.
         jtc(&["example", name, "-o", to]).ends(4);
         jtc(&["example", name, "-o", to, "--overwrite"]).ends(0);
     }
@@ -301,7 +305,7 @@ fn help_knows_pages_and_commands() {
     assert!(output.err.contains("traj") && output.err.contains("files"), "{}", output.err);
 }
 
-/// Decimal commas of a German spreadsheet are reported as an error. A file in degrees can be read.
+/// The command reports decimal commas of a German spreadsheet as an error, and can read a file in degrees.
 #[test]
 fn decimal_commas_are_named_and_degrees_are_read() {
     let dir = tempfile::tempdir().unwrap();

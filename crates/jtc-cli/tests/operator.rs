@@ -1,4 +1,4 @@
-//! Tests of a user at a terminal while an arm moves, with keys, signals, and the restored terminal.
+//! Tests of a user at a terminal while an arm moves. The tests cover keys, signals, and the restored terminal.
 #![cfg(unix)]
 
 use crate::common;
@@ -14,7 +14,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 use test_kit::patience::Patience;
 
-/// Creates a terminal. Returns the side of the user and the side of the command.
+/// Creates a pseudo-terminal. Returns the side of the user and the side of the command.
 fn terminal() -> (File, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -34,7 +34,7 @@ fn until(err: &mut impl BufRead, words: &str) {
     }
 }
 
-/// Running command with a simulated user at its terminal. The simulator runs in real time.
+/// A `jtc` command that runs with a simulated user at its terminal. The simulated controller runs in real time.
 struct Session {
     sim: Sim,
     child: Child,
@@ -60,7 +60,7 @@ impl Session {
         session
     }
 
-    /// Starts a run, and waits until immediately before the motion.
+    /// Starts a run, and waits until the motion is about to begin.
     fn run() -> Self {
         let sim = Sim::start(&["--no-throttle"]).with_parameters();
         let (file, record) = (sim.path("motion.csv"), sim.path("run.csv"));
@@ -130,13 +130,13 @@ fn stands(sim: &Sim) {
     }
 }
 
-/// J-33: if the user or the system ends the command, the arm is first stopped on its path.
+/// J-33: if the user or the operating system ends the command, the command first stops the arm on its path.
 #[test]
 fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let mut run = Session::run();
         if signal == "-HUP" {
-            // The terminal is closed, so the output has no reader.
+            // The terminal is closed, so the output of the command has no reader.
             run.err = None;
         }
         run.signal(signal);
@@ -167,13 +167,13 @@ fn j33_keys_pause_resume_and_stop() {
     stands(&sim);
 }
 
-/// After a second Ctrl-C the command reports the possible state of the arm, restores the terminal and ends at once.
+/// After a second Ctrl-C, the command reports the possible state of the arm, restores the terminal and ends at once.
 #[test]
 fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut run = Session::run();
     run.signal("-INT");
     run.until("stopping on the path");
-    // Signals within 0.1 s count as one signal, so the test waits longer.
+    // Signals within 0.1 s count as one signal, so the test waits for a longer time.
     std::thread::sleep(std::time::Duration::from_millis(150));
     run.signal("-INT");
     let Ended { code, value, err, sim } = run.end();
@@ -182,13 +182,13 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
     let words = err.contains("MAY BE MOVING") || err.contains("moves nothing more");
     assert!(!at_once || words, "{err}");
-    // The recording exists and can be read.
+    // The recording of the run exists, and `jtc report` can read it.
     jtc(&["report", &sim.path("run.csv")]).ends(0);
     sim.jtc(&["traj", "stop"]);
 }
 
-/// If both a terminal and a wrapper program send a signal during Teaching, the two signals count as one. A second Ctrl-C ends the command
-/// with a message about the controller.
+/// If both a terminal and a wrapper program send a signal during Teaching, the two signals count as one signal. A second Ctrl-C ends the
+/// command with a message about the controller.
 #[test]
 fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching() {
     for close in [true, false] {
@@ -205,7 +205,8 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
             assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
         } else {
-            // The first signal took effect before the second signal arrived. The arm was not moved, and the controller holds it again.
+            // The first signal took effect before the second signal arrived. The user has not moved the arm, and the controller holds
+            // the arm again.
             assert_eq!((code, state.as_str()), (2, Some("HoldPos")), "{value}");
         }
     }
@@ -230,13 +231,13 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     (code, serde_json::from_str(out.trim()).unwrap_or_else(|e| panic!("{e}: {out:?}")))
 }
 
-/// After Ctrl-C in any wait before the motion, the arm does not move. The command reports this with exit code 5.
+/// After Ctrl-C in any wait before the motion, the arm does not move. The command reports this result with exit code 5.
 #[test]
 fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
     let file = sim.file("motion.csv", &slow_motion(200));
     let run = ["traj", "run", &file];
-    // The test sets the parameters first. Enabling the drives then takes some seconds.
+    // The test sets the parameters before the run. After that, enabling the drives takes some seconds.
     sim.jtc(&["params", "use-defaults"]).ends(0);
     let waits = [("waiting until", "wait for the drives"), ("uploading", "upload")];
     for (at, during) in waits {
@@ -253,13 +254,13 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
-/// After Ctrl-C while a jog waits for the drives, the command reports that no jog was sent. The report is different from the report of a
-/// jog by 0 rad.
+/// After Ctrl-C while a jog waits for the drives, the command reports that it sent no jog. The report differs from the report of a jog
+/// by 0 rad.
 #[test]
 fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     let sim = Sim::start(&[]);
     sim.jtc(&["params", "use-defaults"]).ends(0);
-    // The drives are enabled one after another, which takes seconds.
+    // The controller enables the drives one after another, which takes seconds.
     loop {
         let status = sim.json(&["status"], 0);
         if status["state"] == "HoldPos" {
@@ -273,7 +274,7 @@ fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     assert!(message.contains("during the wait for the drives"), "{value}");
 }
 
-/// Ctrl-C during the approach stops the arm on its path, and the motion does not begin.
+/// Ctrl-C during the approach stops the arm on the path of the approach, and the motion does not begin.
 #[test]
 fn j33_an_interrupt_on_the_approach_stops_on_it() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -303,22 +304,22 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
     assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
 }
 
-/// After Ctrl-C in a wait of `recover`, the command sends no further requests, but it stops a motion. The output of the command is also
-/// tested in each state.
+/// After Ctrl-C in a wait of `recover`, the command sends no further requests, but it stops a motion. The test also checks the output
+/// of the command in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     let cancelled = |sim: &Sim, words: &[&str], at: &str| {
         let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // After a start of the controller, the command waits for the drives, but one drive is never enabled.
+    // After a start of the controller, the command waits for the drives. In this test, one drive is never enabled.
     let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
     cancelled(
         &Sim::with_faults(&["--no-throttle"], fault),
         &["recover", "--defaults"],
         "waiting for joint 1",
     );
-    // The emergency stop is pressed during teaching, after `teach on` has received a status with Teaching.
+    // The user presses the emergency stop during teaching, after `teach on` has received a status with Teaching.
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     // The arm is in motion, but no program monitors the motion.

@@ -1,14 +1,14 @@
-//! Tests of `jtc payload`, the payload of the arm (J-60).
+//! Tests of `jtc payload`, which sets the payload of the arm (J-60).
 
 use crate::common;
 
 use common::{Sim, jtc, moving_while};
 use serde_json::Value;
 
-/// Motion to a bent pose, in which shoulder and elbow carry the payload.
+/// Trajectory file whose motion ends in a bent pose, in which shoulder and elbow carry the payload.
 const BENT: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1.5,0,0.35,0.3,0,0.3,0\n3,0,0.7,0.6,0,0.6,0\n";
 
-/// Returns a motion to a stretched pose.
+/// Returns a trajectory file whose motion ends in a stretched pose.
 fn stretched() -> String {
     BENT.replace("0.7,0.6,0,0.6", "1.5,0.1,0,0.1").replace("0.35,0.3,0,0.3", "0.75,0.05,0,0.05")
 }
@@ -17,8 +17,9 @@ fn mass(value: &Value) -> f64 {
     value["mass_kg"].as_f64().unwrap()
 }
 
-/// Returns two magnitudes of the torque that the control law adds to the model at joint 2 (N·m), from a recording of the simulator. The
-/// first value is from the time before the model torque of the held arm changes by more than 2 N·m. The second value is from the end.
+/// Returns two magnitudes of the torque that the control law adds to the model torque at joint 2 (N·m), from a recording of the
+/// simulator. The first magnitude is from the time before the model torque of the held arm changes by more than 2 N·m. The second
+/// magnitude is from the end of the recording.
 fn missing(recording: &str) -> (f64, f64) {
     let mut lines = recording.lines().filter(|line| !line.starts_with('#'));
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -38,7 +39,8 @@ fn missing(recording: &str) -> (f64, f64) {
     ((rows[changed - 300][2] - rows[changed - 300][1]).abs(), (last[2] - last[1]).abs())
 }
 
-/// The integral part of the control law carries an unknown payload of 3 kg. After the payload is set, the model carries the 3 kg.
+/// The integral part of the control law compensates an unknown payload of 3 kg. After the user has set the payload, the arm model
+/// compensates the 3 kg.
 #[test]
 fn j60_a_payload_that_is_given_is_carried() {
     let dir = tempfile::tempdir().unwrap();
@@ -61,7 +63,8 @@ fn j60_a_payload_that_is_given_is_carried() {
     assert!(before > 8.0 && after < 0.5 * before, "{before} N·m became {after} N·m");
 }
 
-/// A refused request reports the joint and its torque, and changes no setting.
+/// If the controller rejects a payload, the command reports the joint and its torque. The rejected request changes no
+/// setting.
 #[test]
 fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -98,7 +101,7 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     assert!(none.err.contains("nothing was sent"), "{}", none.err);
 }
 
-/// If the arm cannot follow a path with its payload, the path is refused before any frame is sent.
+/// If the arm cannot follow a path with its payload, the command rejects the path before it sends any frame.
 #[test]
 fn j60_a_run_is_checked_with_the_payload() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -123,8 +126,8 @@ fn j60_a_run_is_checked_with_the_payload() {
     sim.json(&["traj", "run", &far, "--approach"], 0);
 }
 
-/// The remainder of a paused motion is checked with a new payload. An unknown motion is not checked, and the command
-/// reports this.
+/// The command checks the remainder of a paused motion with a new payload. If the motion is unknown, the command
+/// reports that it does not check the motion.
 #[cfg(unix)]
 #[test]
 fn j60_a_paused_motion_goes_on_with_another_payload_only_if_it_can() {

@@ -1,4 +1,4 @@
-//! Tests of `jtc plan`: trajectories through waypoints, and refused plans.
+//! Tests of `jtc plan`: trajectories through waypoints, and plans that the command rejects.
 
 use crate::common;
 
@@ -32,7 +32,8 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// With `--deg`, the positions and the blend are in degrees. The command reports each waypoint that a rounded corner does not pass.
+/// With `--deg`, the positions and the blend are in degrees. The command reports each waypoint that the path does not pass because
+/// its corner is rounded.
 #[test]
 fn a_blend_is_in_the_unit_of_the_positions() {
     let dir = Dir::new();
@@ -55,8 +56,8 @@ fn a_blend_is_in_the_unit_of_the_positions() {
     }
 }
 
-/// `plan` keeps and prints the torque margin. `plan` and `traj check` print a warning if the margin is below 10 %. If the margin is out of
-/// range, it is refused, and the error contains the range.
+/// `plan` leaves the requested torque margin and prints it. `plan` and `traj check` print a warning if the margin is below 10 %. The
+/// command rejects a margin that is out of range, and the error contains the range.
 #[test]
 fn a_plan_leaves_the_margin_that_is_asked_for() {
     let dir = Dir::new();
@@ -97,8 +98,9 @@ fn a_plan_leaves_the_margin_that_is_asked_for() {
     }
 }
 
-/// The trajectory passes the check of a run and is at rest at its ends. The distance of the trajectory from the waypoints is at most the
-/// blend distance. Without a speed limit, the motion is at least as fast. The printed values match the file.
+/// The trajectory passes the check of a run, and the arm is at rest at both ends of the trajectory. The distance of the trajectory from
+/// the waypoints is at most the blend distance. Without a jerk limit, or with a blend, the motion is faster. The printed values match
+/// the file.
 #[test]
 fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     let dir = Dir::new();
@@ -144,7 +146,7 @@ fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     assert!(jumps < stops && blended < stops && half > 1.5 * blended, "{durations:?}");
 }
 
-/// Waypoints in other units, as poses and as JSON result in identical motions.
+/// Waypoints in other units, as poses, and in JSON result in identical motions.
 #[test]
 fn the_forms_of_waypoints_are_the_same_motion() {
     let dir = Dir::new();
@@ -241,10 +243,10 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         assert!(output.err.contains(message), "{words:?}: {}", output.err);
         assert!(!dir.has("out.csv"), "{words:?} leaves an output");
     }
-    // The hint contains suggestions.
+    // The hint of the error suggests similar pose names.
     let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
     assert!(output.err.contains("did you mean \"above-table\"?"), "{}", output.err);
-    // An output file is refused if it exists or if it is the input file.
+    // The command rejects an output file that exists, and an output file that is also the input file.
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);
     assert!(
@@ -256,7 +258,8 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     jtc(&["plan", &good, "-o", &good, "--overwrite"]).ends(4);
 }
 
-/// A motion through many waypoints can be planned. A motion that does not fit in a trajectory is refused.
+/// The command can plan a motion through many waypoints. The command rejects a motion that does not fit in a
+/// trajectory.
 #[test]
 fn ten_thousand_waypoints_are_planned_or_too_long() {
     let dir = Dir::new();
@@ -278,7 +281,7 @@ fn ten_thousand_waypoints_are_planned_or_too_long() {
     );
 }
 
-/// The page shows the motion, the limits, and the limiting constraints over time. The page needs no other file.
+/// The report page shows the motion, the limits, and the limiting constraints over time. The page needs no other file.
 #[test]
 fn the_report_names_what_binds_when() {
     let dir = Dir::new();
@@ -290,7 +293,7 @@ fn the_report_names_what_binds_when() {
     assert!(text.contains(&format!("\"plan\":[{bound}")), "{bound}");
     assert!(text.contains("Limiting constraints and their time") && text.contains("[\"joint 6\","));
     assert!(!text.contains("src=\"http") && text.contains("set_position_rad"));
-    // The page already exists, so no file is written.
+    // The report page already exists, so the command writes no file.
     let other = dir.path("other.csv");
     jtc(&["plan", &file, "-o", &other, "--report", &page]).ends(4);
     assert!(!dir.has("other.csv"));

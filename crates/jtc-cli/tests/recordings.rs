@@ -16,21 +16,21 @@ fn json(words: &[&str]) -> serde_json::Value {
     jtc(&[&["--json"], words].concat()).ends(0).json()
 }
 
-/// The simulator records each millisecond of a motion that is commanded over the serial port. The recording can be read while the simulator
-/// runs and after `kill -9`. The motion can be replayed.
+/// The simulator records each millisecond of a motion that a host commands over the serial port. A user can read the recording while the
+/// simulator runs and after `kill -9`, and can replay the motion.
 #[test]
 fn the_simulator_records_each_millisecond() {
     for name in ["sim.mcap", "sim.csv"] {
         let dir = tempfile::tempdir().unwrap();
         let record = dir.path().join(name).to_str().unwrap().to_owned();
-        // The simulator runs in real time. Otherwise the file would grow by many megabytes per second.
+        // The simulator runs in real time. With free-running time, the file would grow by many megabytes per second.
         let sim = ready(&["--no-throttle", "--record", &record]);
         let file = sim.file("motion.csv", &motion(0.2));
         sim.jtc(&["traj", "run", &file]).ends(0);
-        // The recording was already started, so the file exists and is not overwritten.
+        // The simulator has already started the recording, so the file exists, and the command does not overwrite it.
         let output = jtc(&["sim", "--record", &record]).ends(4);
         assert!(output.err.contains("already exists"), "{}", output.err);
-        // Data younger than 0.2 s may be missing.
+        // The recording may lack the data of the last 0.2 s.
         until("1201 places", || jtc(&["traj", "info", &record]).err.contains("at 1201 places"));
         assert_eq!(sim.end("-KILL").0, -1);
         let info = json(&["traj", "info", &record]);
@@ -64,7 +64,7 @@ fn a_simulator_that_is_ended_completes_its_recording() {
     assert!(!info["notes"].to_string().contains("completed"), "{info}");
 }
 
-/// If the recording program is killed during a motion, the recording lacks only the last moments of the motion.
+/// If a program is killed while it records a motion, the recording lacks only the last moments of the motion.
 #[test]
 fn a_run_that_is_killed_leaves_its_recording() {
     for name in ["run.mcap", "run.csv"] {
@@ -83,7 +83,8 @@ fn a_run_that_is_killed_leaves_its_recording() {
         run.wait().unwrap();
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
-        // An MCAP file contains the whole trajectory, 6 s at 20 %, even if only a part of the trajectory was executed.
+        // An MCAP file contains the complete trajectory, 6 s at 20 %, even if the controller executed only a part of
+        // the trajectory.
         assert!(
             if name == "run.mcap" { (seen - 30.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
             "{info}"
@@ -100,13 +101,13 @@ fn a_run_that_is_killed_leaves_its_recording() {
     }
 }
 
-/// Returns the path time of a recording that is still being written, ms.
+/// Returns the path time in ms that a recording has reached while a program still writes it.
 fn recorded_ms(record: &str) -> u64 {
     let samples = jtc_host::recording::Recording::read(std::path::Path::new(record)).map(|read| read.samples);
     samples.unwrap_or_default().iter().map(|sample| u64::from(sample.point)).max().unwrap_or(0)
 }
 
-/// A disk without space is detected before the arm moves.
+/// The command detects a disk without free space before the arm moves.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_found_before_anything_moves() {
@@ -127,8 +128,8 @@ fn a_full_disk_is_found_before_anything_moves() {
     assert!(output.err.contains("No space left") && output.out.is_empty(), "{}", output.err);
 }
 
-/// If the disk becomes full during a motion, the command reports this at once. The motion continues to its end, and the exit code shows the
-/// loss.
+/// If the disk becomes full during a motion, the command reports the full disk at once. The motion continues to its end, and the exit code
+/// shows the loss of data.
 #[test]
 fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good() {
     let sim = ready(&["--speed", "max", "--no-throttle"]);
@@ -136,7 +137,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
     std::fs::write(&file, motion(0.2)).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    // The reader of the recording reads only its header.
+    // The reader of the recording reads only the header of the recording.
     let reader = std::thread::spawn({
         let pipe = pipe.clone();
         move || {
@@ -153,6 +154,6 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
         (Some("finished"), Some("output-lost"))
     );
     assert!(output.err.contains("no more data are recorded, the motion continues"), "{}", output.err);
-    // The other output file is not affected.
+    // The full disk does not affect the report page.
     assert_eq!(value["files"], serde_json::json!([page]));
 }

@@ -1,4 +1,4 @@
-//! Tests of `jtc serve`, and of every other command through this agent.
+//! Tests of `jtc serve`, and of all other commands through this agent.
 #![cfg(unix)]
 
 use crate::common;
@@ -84,13 +84,14 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     assert!(log.out.contains("HoldPos"), "{}", log.out);
     let second = run(agent.command(&["serve", "--listen", "127.0.0.1:0"], &port), &[], "").ends(3);
     assert!(second.err.contains(&agent.url), "{}", second.err);
-    // The file of the killed agent still exists, but no program listens at its address.
+    // The registration file of the killed agent still exists, but no program listens at its address.
     Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
     std::thread::sleep(std::time::Duration::from_millis(200));
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
 }
 
-/// The token is not printed into a log file, because other users may read the journal of the system or a file.
+/// The agent does not print the token into a log file, because other users may read the journal of the system or a
+/// file.
 #[test]
 fn the_operators_token_is_printed_on_a_terminal_alone() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -149,7 +150,8 @@ fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
     assert!(open.err.contains("chmod 600"), "{}", open.err);
 }
 
-/// Writes two arm files. The first arm has another name, and the second arm contains gains that no frame can transmit.
+/// Writes two arm files. The first arm has another name, and the second arm contains gains that a frame cannot
+/// transmit.
 fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     let avena = include_str!("../../../arms/avena.toml");
     let file = |name: &str, text: String| {
@@ -163,7 +165,8 @@ fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     ]
 }
 
-/// In both simulators, the specified arm is stored in the controller. An arm that a controller cannot store is refused.
+/// In both simulators, the controller has stored the specified arm. The command rejects an arm that a controller cannot
+/// store.
 #[test]
 fn an_arm_is_simulated_as_by_jtc_sim() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -184,7 +187,8 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
     }
 }
 
-/// Modbus has no tokens. The server is off by default, and refuses other computers unless their addresses are allowed.
+/// Modbus has no tokens. The Modbus server is off by default, and rejects other computers unless the user allows their
+/// addresses.
 #[test]
 fn modbus_is_there_for_those_who_are_named() {
     let dir = tempfile::tempdir().expect("a directory");

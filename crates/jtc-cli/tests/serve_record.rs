@@ -26,7 +26,7 @@ fn recording_in(dir: tempfile::TempDir) -> Agent {
     agent
 }
 
-/// Waits for `count` recordings with this file name extension, and returns their paths, oldest first.
+/// Waits for `count` recordings with this file name extension. Returns the paths of the recordings, oldest first.
 fn recorded(agent: &Agent, ending: &str, count: usize) -> Vec<PathBuf> {
     let mut patience = Patience::begin();
     loop {
@@ -53,7 +53,7 @@ fn read(path: &Path) -> Recording {
     Recording::read(path).expect("a recording")
 }
 
-/// Checks that `jtc report` can create a report page from the recording.
+/// Checks that `jtc report` can create a report page from this recording.
 fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
     let words = ["--json", "report", path.to_str().expect("a name"), "--overwrite"];
     run(command_in(dir), &words, "").ends(0).json()
@@ -79,7 +79,7 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     assert!(!info.commanded_by.is_empty() && info_of_run.commanded_by.is_empty(), "{}", info.commanded_by);
     assert!(info.device.is_some() && info.hash.is_some() && info.start_unix_ns > 0);
     // At each point, the commanded values in both recordings are equal. The recording of the agent contains all samples of the run, and
-    // samples from before the run.
+    // also samples from before the run.
     let at = |recording: &Recording, point: u32| {
         let found = recording.samples.iter().find(|s| s.is_operating() && s.point == point);
         found.map(|s| {
@@ -95,7 +95,7 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     assert!(of_agent.samples.is_sorted_by(|a, b| a.time_s <= b.time_s));
     let report = is_reported(&agent.dir, &file);
     assert!(report["joints"][0]["rms_error_mrad"].is_number() && report["failure"].is_null(), "{report}");
-    // A jog and teaching are also recorded.
+    // The agent also records a jog and teaching.
     agent.jtc(&["jog", "1", "0.1", "--duration", "1"]).ends(0);
     agent.jtc(&["teach", "on"]).ends(0);
     agent.jtc(&["teach", "off"]).ends(0);
@@ -122,7 +122,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
         .expect("it starts");
     let part = recorded(&agent, ".part.mcap", 1).remove(0);
     let moving = |recording: &Recording| recording.samples.iter().filter(|s| s.is_operating()).count();
-    // The recording can be read while the agent writes it.
+    // A user can read the recording while the agent writes it.
     until("20 samples in motion", || Recording::read(&part).is_ok_and(|recording| moving(&recording) >= 20));
     let (_, dir) = agent.end("-KILL");
     runs.wait().expect("it ends");
@@ -139,7 +139,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     agent.jtc(&["traj", "run", &agent.motion(20)]).ends(0);
     let whole = recorded(&agent, ".mcap", 1).remove(0);
     assert!(part.exists() && whole.to_str().is_some_and(|name| name.ends_with("-000002.mcap")), "{whole:?}");
-    // Two agents cannot use the same directory.
+    // Two agents cannot use the same directory for recordings.
     let second = command_in(&agent.dir)
         .args(["serve", "--sim", "--listen", "127.0.0.1:0", "--record"])
         .arg(agent.dir.path().join("recordings"))
@@ -149,7 +149,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     assert!(String::from_utf8_lossy(&second.stderr).contains("another agent"), "{second:?}");
 }
 
-/// A recording contains the arm of the controller, even after a new arm was sent to the controller.
+/// A recording contains the arm of the controller, even after a host has sent a new arm to the controller.
 #[test]
 fn the_arm_in_a_recording_is_that_of_the_controller() {
     let agent = recording();

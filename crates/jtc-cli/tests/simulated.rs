@@ -41,7 +41,7 @@ fn a_port_that_is_served_is_not_taken_over() {
     );
     assert_eq!(std::fs::read_link(&sim.port).unwrap(), to);
     sim.jtc(&["status"]).ends(0);
-    // The terminal of another program now has the number of the terminal of a killed simulator.
+    // The terminal of another program now has the same number as the terminal of the killed simulator.
     let shell =
         rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR | rustix::pty::OpenptFlags::NOCTTY).unwrap();
     rustix::pty::grantpt(&shell).unwrap();
@@ -59,7 +59,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(status["joints"].as_array().unwrap().len(), 6);
     assert!(status["missing_parameters"].as_array().unwrap().len() == 3, "{status}");
 
-    // The controller cannot execute a motion yet, and the output suggests the next step.
+    // The controller cannot execute a motion yet, and the output of the command suggests the next step.
     let file = sim.file("motion.csv", &motion(0.25));
     let output = sim.jtc(&["--json", "traj", "run", &file]).ends(1);
     assert!(output.json()["error"]["hint"].as_str().unwrap().contains("params"), "{}", output.out);
@@ -93,7 +93,7 @@ fn from_power_up_to_a_recorded_motion() {
 
     let status = sim.json(&["status"], 0);
     assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
-    // J-34: a motion can be resumed only after a pause.
+    // J-34: the user can resume a motion only after a pause.
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(
         output.err.contains("no motion is paused") && output.err.contains("trajectory Finish"),
@@ -104,7 +104,8 @@ fn from_power_up_to_a_recorded_motion() {
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(output.err.contains("trajectory Stop") && output.err.contains("jtc traj run"), "{}", output.err);
     sim.jtc(&["traj", "pause"]).ends(1);
-    // While the arm is held, a reset needs a confirmation. In Teaching, a joint cannot be reset even with confirmation.
+    // While the controller holds the arm, a reset needs a confirmation. In Teaching, the command rejects a reset of a
+    // joint even with confirmation.
     let output = sim.jtc(&["reset", "--joints", "2"]).ends(4);
     assert!(output.err.contains("joint 2") && output.err.contains("--yes"), "{}", output.err);
     sim.jtc(&["gripper", "on"]).ends(0);
@@ -119,7 +120,7 @@ fn from_power_up_to_a_recorded_motion() {
     assert_eq!(output.json()["reset"], serde_json::json!(["joint 2"]));
 }
 
-/// A stream ends without an error when its reader has closed the pipe.
+/// A stream of statuses ends without an error when its reader has closed the pipe.
 #[test]
 fn monitor_ends_with_its_reader() {
     use std::io::BufRead;
@@ -176,15 +177,16 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     let output = sim.jtc(&["--json", "traj", "run", &file, "--record", &record, "--report", &page]).ends(5);
     let value = output.json();
     assert_eq!(value["outcome"], "fault");
-    // The first failure is reported first, with its joint and the values before and after it.
+    // The command reports the first failure first, with the joint and the values before and after the failure.
     assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
     assert!(value["failure"]["causes"][0].as_str().unwrap().starts_with("joint 3: "), "{}", value["failure"]);
-    // The fault occurs at 500 ms. Statuses arrive every 40 ms. After the fault, their times are arrival times.
+    // The fault occurs at 500 ms. Statuses arrive every 40 ms. After the fault, the times of the statuses are arrival
+    // times.
     let at_ms = value["failure"]["at_ms"].as_f64().unwrap();
     assert!((440.0..700.0).contains(&at_ms), "{}", value["failure"]);
     let text = std::fs::read_to_string(&page).unwrap();
     assert!(text.contains("<title>FAILED: ") && text.contains("ms into the run: joint 3: "));
-    // The report from the recording shows the same failure.
+    // The report that is created from the recording shows the same failure.
     let again = sim.path("again.html");
     let output = jtc(&["report", &record, "--out", &again]).ends(0);
     assert!(
@@ -197,7 +199,8 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     assert_eq!(output.json()["status"]["state"], "HoldPos", "{}", output.out);
 }
 
-/// A fault during the approach is recorded and reported like any other fault. The report states that the fault occurred in the approach.
+/// The command records and reports a fault during the approach like any other fault. The report states that the fault occurred in the
+/// approach.
 #[test]
 fn a_fault_on_the_approach_is_recorded_and_named() {
     let sim = Sim::with_faults(&["--speed", "max"], &FAULT.replace("at_point = 500", "at_point = 200"))
@@ -265,8 +268,8 @@ fn typed_events_happen_and_mistakes_are_named() {
 #[test]
 fn the_arm_can_be_taught_by_hand() {
     let mut sim = Sim::start(&["--speed", "max"]).with_parameters();
-    // The trajectory moves joint 1 to 0.3 rad in 2 s. Joint 1 rotates about the vertical axis, so the joint keeps its position when it is
-    // released.
+    // The trajectory moves joint 1 to 0.3 rad in 2 s. Joint 1 rotates about the vertical axis, so the joint keeps its position when its
+    // torque is switched off.
     let rows = (0..=200).map(|i| {
         let q = 0.15 - 0.15 * (std::f64::consts::PI * f64::from(i) / 200.0).cos();
         format!("{:.2},{q},0,0,0,0,0\n", f64::from(i) * 0.01)
@@ -326,10 +329,11 @@ fn the_examples_run_in_the_simulator() {
     assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", output.err);
 }
 
-/// A recorded motion can be replayed. The recording of the replay contains the same motion.
+/// A user can replay a recorded motion. The recording of the replay contains the same motion.
 #[test]
 fn a_recording_is_looked_at_checked_and_run_again() {
-    // The simulator runs in real time. At full speed, a busy computer receives too few positions to plan the return path to the start.
+    // The simulator runs in real time. With free-running time, a busy computer would receive too few positions to plan the return path
+    // to the start.
     let sim = Sim::start(&["--no-throttle"]).held();
     jtc(&["example", "motion", "-o", sim.dir.path().to_str().unwrap()]).ends(0);
     let motion = sim.path("motion.csv");
@@ -345,11 +349,11 @@ fn a_recording_is_looked_at_checked_and_run_again() {
     }
 }
 
-/// A host that sends a frame byte by byte does not delay the arm, and statuses still arrive.
+/// If a host sends a frame byte by byte, the arm is not delayed, and statuses still arrive.
 #[test]
 fn time_goes_on_while_a_frame_arrives() {
-    // In real time a status arrives every 25 ms, so at least 12 statuses arrive during the frame. With a single tick per part of the frame,
-    // only 6 statuses would arrive.
+    // In real time, a status arrives every 25 ms, so at least 12 statuses arrive during the frame. With a single tick per part of the
+    // frame, only 6 statuses would arrive.
     for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
         let sim = Sim::start(options);
         let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();
@@ -361,8 +365,8 @@ fn time_goes_on_while_a_frame_arrives() {
                 && send.send(count).is_ok()
             {}
         });
-        // The start of a trajectory segment of 1000 bytes is sent repeatedly. Even after a gap that ends a frame, the next frame is
-        // therefore incomplete.
+        // The test repeatedly sends the start of a trajectory segment of 1000 bytes. Therefore, even after a gap that ends a frame,
+        // the next frame is incomplete.
         let start = [0x9B, 0x0A, 0x03, 0xE8];
         port.write_all(&start).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -378,7 +382,8 @@ fn time_goes_on_while_a_frame_arrives() {
     }
 }
 
-/// The support holds the arm until its drives are enabled, and after an error. The first line of the output mentions the support.
+/// The simulated support holds the arm until the drives are enabled, and after an error. The first line of the output mentions
+/// the support.
 #[test]
 fn the_support_of_the_arm_is_chosen() {
     for (options, note, falls_first, falls_later) in [
@@ -387,14 +392,14 @@ fn the_support_of_the_arm_is_chosen() {
         (&["--support", "stand"], "note: a stand carries the simulated arm until", false, true),
         (&["--support", "none"], "note: nothing supports the simulated arm", true, true),
     ] {
-        // The payload is needed, because friction alone would hold the upright arm.
+        // The test needs the payload, because friction alone would hold the upright arm.
         let options = [&["--speed", "max", "--payload", "3,0.2,0.2,0.2"], options].concat();
         let error = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"hold\"\nafter_s = 8\n";
         let mut sim = Sim::with_faults(&options, error);
         let line = sim.error_line();
         assert!(line.starts_with(note), "{options:?}: {line}");
         let sim = sim.with_parameters();
-        // The variables are the largest positions of any joint before the drives are enabled and after the error.
+        // The two variables are the largest positions of any joint: before the drives are enabled, and after the error.
         let (mut first, mut later) = (0.0f64, 0.0f64);
         for _ in 0..600 {
             let status = sim.json(&["status"], 0);

@@ -51,7 +51,8 @@ impl Cell {
         child
     }
 
-    /// Like `start`, but waits for a line with this text. Then waits for an event with a path time of at least `seconds`.
+    /// Like `start`, but waits for a line with this text. After that, waits for an event with a path time of at least
+    /// `seconds`.
     fn moving(&self, words: &[&str], text: &str, seconds: f64) -> Child {
         let behind = std::cell::Cell::new(text.is_empty());
         self.start(words, |line| {
@@ -61,8 +62,8 @@ impl Cell {
         })
     }
 
-    /// Stops the arm. Checks that the Stop has stopped this program, and that the program ends with exit code 5. Returns the JSON results
-    /// of the program and of the Stop.
+    /// Runs `jtc stop`. Checks that the Stop has stopped this program, and that the program ends with exit code 5. Returns the JSON
+    /// results of the program and of the `jtc stop` command.
     fn stops(&self, child: Child) -> (Value, Value) {
         let stopped = self.jtc(&["--json", "stop"]).ends(0).json();
         let pid = child.id();
@@ -114,7 +115,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm is at rest; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // The message states which requests the program may still send.
+    // The message of the Stop states which requests the program may still send.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -145,7 +146,8 @@ fn a_move_is_stopped() {
     assert_eq!(ended["outcome"], "stopped", "{ended}");
 }
 
-/// On a simulated line with the speed of a real serial line, the upload takes many seconds. After the Stop, the upload has no effect.
+/// On a simulated line with the speed of a real serial line, the upload takes many seconds. After the Stop, this upload has no
+/// effect.
 #[test]
 fn an_upload_does_not_go_on_after_a_stop() {
     let cell = Cell(Sim::start(&[]).held());
@@ -165,7 +167,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
         );
         cell.stands();
     }
-    // A new command is a new request, so it may move the arm.
+    // A new command of the user is a new request, so it may move the arm.
     let short = cell.0.file("short.csv", &motion(0.1));
     cell.jtc(&["traj", "run", &short]).ends(0);
 }
@@ -174,7 +176,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
 fn a_jog_is_stopped_and_does_not_start_again() {
     let cell = Cell::held();
     let before = place(&cell.0)[0];
-    // The program does not report when its upload starts, so the test tries several times.
+    // The program does not report the start of its upload, so the test tries several times.
     let (child, stopped) = (1..6)
         .map(|seconds| {
             let mut jog = cell.command(&["jog", "1", "0.2"]);
@@ -202,7 +204,7 @@ fn teaching_is_ended_and_the_arm_is_held() {
     assert!(stopped.out.contains("stopped: the arm is at rest; jtc teach record"), "{}", stopped.out);
     ends(child, 5);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
-    // A direct Stop also ends teaching.
+    // A Stop that goes directly to the controller also ends teaching.
     cell.jtc(&["teach", "on"]).ends(0);
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
@@ -215,17 +217,17 @@ fn a_pause_reaches_the_program_too() {
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let paused = cell.jtc(&["traj", "pause"]).ends(0);
     assert!(paused.out.contains("pausing on the path; jtc traj run"), "{}", paused.out);
-    // After the arm has come to rest, the controller no longer executes a motion.
+    // When the arm has come to rest, the controller no longer executes a motion.
     let mut tries = (0..100).map(|_| cell.jtc(&["traj", "pause"]));
     let refused = tries.find(|again| again.code != 0).expect("the arm comes to rest").ends(1);
     assert!(refused.err.contains("trajectory Pause"), "{}", refused.err);
-    // A paused motion does not continue after a Stop, and its program ends.
+    // A paused motion does not continue after a Stop, and the program of the motion ends.
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// Like a Python program, the program keeps the port open for longer than one motion. The program may be busy with other work while the arm
-/// moves.
+/// Like a Python program, this program keeps the port open for longer than one motion. The program may be busy with other work while the
+/// arm moves.
 #[test]
 fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let cell = Cell::held();
@@ -247,14 +249,15 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     assert!(!status.is_executing());
     let halted =
         |error: Error| matches!(error, Error::Link(LinkError::Port(PortError::Halted { by: Some(_) })));
-    // The next requests of the same program are refused, because they were sent before the Stop or too soon after the Stop.
+    // The library rejects the next requests of the same program, because the program sent them before the Stop or too soon
+    // after the Stop.
     assert!(session.execute(&checked).is_err_and(halted));
     assert!(session.upload(&checked, |_| Flow::Continue).is_err_and(halted));
     session.ask_to_move().unwrap();
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     assert!(session.teach(true).is_err_and(halted));
     session.jog(&[0.0; 6]).unwrap();
-    // A new request is accepted three seconds later.
+    // Three seconds later, the library accepts a new request.
     std::thread::sleep(Duration::from_millis(3100));
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     session.ask_to_move().unwrap();
@@ -271,7 +274,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
         assert_eq!(direct.out.trim_end(), words);
         let value = cell.jtc(&["--json", "traj", "stop"]).ends(0).json();
         assert_eq!((&value["command"], &value["arms"][0]["moved"]), (&"stop".into(), &false.into()));
-        // The Stop is sent through a program that only shows the status.
+        // `jtc stop` sends the Stop through a program that only shows the status.
         let mut monitor = cell.command(&["--json", "monitor"]).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         let mut out = BufReader::new(monitor.stdout.take().unwrap());
@@ -286,7 +289,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     cell.jtc(&["recover", "--defaults"]).ends(0);
     nothing("HoldPos", "Null");
     cell.jtc(&["traj", "run", &file]).ends(0);
-    // The first Stop resets the state of a finished trajectory.
+    // The first Stop resets the trajectory state of the finished trajectory.
     let direct = cell.jtc(&["stop"]).ends(0);
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
     nothing("HoldPos", "Stop");
@@ -326,7 +329,7 @@ fn an_arm_that_falls_without_torque_does_not_stand() {
     let file = cell.0.file("motion.csv", &slow_motion(50));
     cell.jtc(&["traj", "run", &file]).ends(5);
     stops(&cell, "Error");
-    // The controller is in Init without torque, but its drives were enabled before.
+    // The controller is in Init without torque, but the drives were enabled before.
     let cell = Cell(Sim::start(&["--no-throttle"]).held());
     cell.jtc(&["disable", "--yes"]).ends(0);
     stops(&cell, "Init");
@@ -344,12 +347,13 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!((&stopped["arms"][0]["moved"], &stopped["arms"][0]["holder"]), (&true.into(), &Value::Null));
     cell.stands();
-    // The next program listens at the same socket.
+    // The next program listens at the same socket as the previous program.
     let child = cell.moving(&["traj", "run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     cell.stops(child);
 }
 
-/// The program is suspended (SIGSTOP), so no frame can be sent, and the message mentions the emergency stop.
+/// The program that has opened the port is suspended (SIGSTOP). Therefore no frame can be sent, and the message
+/// mentions the emergency stop.
 #[test]
 fn a_program_that_does_not_answer_is_named() {
     let cell = Cell::held();
@@ -372,8 +376,8 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     let file = cell.0.file("motion.csv", &slow_motion(100));
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let socket = std::fs::read_dir(cell.0.path("openjtc")).unwrap().flatten().next().unwrap().path();
-    // The first client connects and sends nothing. The second client sends an invalid request, and the third client disconnects after its
-    // request.
+    // The first client of the socket connects and sends nothing. The second client sends an invalid request, and the third client
+    // disconnects after its request.
     let silent = std::os::unix::net::UnixStream::connect(&socket).unwrap();
     for words in [vec![b'x'; 10_000], b"{\"halt\":\"execute\",\"by\":\"x\"}\n".to_vec()] {
         let mut stream = std::os::unix::net::UnixStream::connect(&socket).unwrap();
@@ -399,7 +403,7 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     cell.stands();
 }
 
-/// If no port is specified, a Stop is sent to all arms whose ports are open in programs of this user.
+/// If the user specifies no port, the command sends a Stop to all arms whose ports are open in programs of this user.
 #[test]
 fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     let cell = Cell::held();
@@ -454,7 +458,7 @@ fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     other.stands();
 }
 
-/// A hanging program does not delay the Stop of another arm. A single JSON object reports all arms.
+/// A program that hangs does not delay the Stop of another arm. A single JSON object reports the results for all arms.
 #[test]
 fn a_program_that_hangs_delays_no_other_stop() {
     let two = Two::moving();

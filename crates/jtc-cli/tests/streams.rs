@@ -1,4 +1,5 @@
-//! Tests of the events of `--json`. Events are written to stderr when they happen, and only the result is written to stdout.
+//! Tests of the events of `--json`. The command writes events to stderr when they occur, and writes only the result to
+//! stdout.
 #![cfg(unix)]
 
 use crate::common;
@@ -11,7 +12,7 @@ use common::{Sim, jtc, motion};
 use serde_json::Value;
 use test_kit::patience::until;
 
-/// Returns the events of a command, and its result.
+/// Returns the events of a command, and the result of the command.
 fn stream(output: &CommandOutput) -> (Vec<Value>, Value) {
     let events = output.events();
     for event in &events {
@@ -88,7 +89,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert_eq!(result["outcome"], "refused");
 }
 
-/// A failure during a motion is reported at once. The first cause is reported first.
+/// The command reports a failure during a motion at once. The first cause is the first in the list.
 #[test]
 fn what_breaks_in_motion_is_reported_at_once() {
     let fault =
@@ -117,14 +118,15 @@ fn the_demo_has_events_and_all_events_are_documented() {
     }
 }
 
-/// If the reader of the events is blocked (`2>&1 >report.json | less`), the run still moves and reacts to Ctrl-C.
+/// If the reader of the events is blocked (`2>&1 >report.json | less`), the run still moves the arm and reacts to
+/// Ctrl-C.
 #[test]
 fn j33_a_reader_that_does_not_read_holds_no_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // The write call fills the pipe to its capacity.
+    // The test fills the pipe to its capacity.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();

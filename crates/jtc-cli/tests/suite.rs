@@ -1,4 +1,4 @@
-//! Test program with all tests of the crate. Each file is a module. Only one program must therefore be linked.
+//! Test program with all tests of the crate. Each file is a module, so the linker must link only one program.
 mod again;
 mod arms;
 mod bench;

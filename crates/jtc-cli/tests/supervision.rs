@@ -1,5 +1,5 @@
-//! Tests of host supervision (J-59) as described in docs/arm.md. Motions of `jtc` run to their end, and a motion is paused if its program
-//! is killed.
+//! Tests of host supervision (J-59) as described in docs/arm.md. Motions of `jtc` run to their end. If the program of a motion is killed,
+//! the controller pauses the motion.
 #![cfg(unix)]
 
 use crate::common;
@@ -7,7 +7,7 @@ use crate::common;
 use common::{Sim, agent::Agent, moving_while};
 use test_kit::patience::Patience;
 
-/// Returns a simulated arm that is held by a controller with host supervision.
+/// Returns a simulated arm that a controller with host supervision holds.
 fn supervised(host_timeout_ms: u32) -> Sim {
     let sim = Sim::start(&[]);
     let arm = include_str!("../../../arms/avena.toml");
@@ -17,12 +17,12 @@ fn supervised(host_timeout_ms: u32) -> Sim {
     sim.held()
 }
 
-/// Motion with a duration of 8 s.
+/// Trajectory file whose motion takes 8 s.
 const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]
 fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
-    // The timeout allows for the longest time that a program may wait on a busy computer.
+    // The timeout is longer than the longest time that a program may wait on a busy computer.
     let sim = supervised(4000);
     let file = sim.file("motion.csv", MOTION);
     assert_eq!(sim.json(&["traj", "run", &file], 0)["outcome"], "finished");
@@ -38,7 +38,7 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     let mut child = moving_while(&sim, &["traj", "run", &file], 0.5);
     child.kill().unwrap();
     child.wait().unwrap();
-    // A program that only shows the status does not prevent the pause of the motion.
+    // A program that only shows the status does not prevent the controller from pausing the motion.
     loop {
         let status = sim.json(&["status"], 0);
         let (state, trajectory) = (status["state"].as_str(), status["trajectory"].as_str());
@@ -50,7 +50,8 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     }
 }
 
-/// Only the previous agent knows the timeout. A new agent reads the timeout before it forwards requests.
+/// Only the previous agent knows the timeout of the controller. A new agent reads the timeout before it forwards
+/// requests.
 #[test]
 fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let sim = supervised(3000);
@@ -61,7 +62,7 @@ fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let agent = Agent::start(&["--port", sim.port.to_str().unwrap()]);
     let mut patience = Patience::begin();
     loop {
-        // Each command sends a frame to the controller if the agent forwards the request.
+        // If the agent forwards the requests, each command sends a frame to the controller.
         agent.jtc(&["info"]);
         let status = agent.jtc(&["--json", "status"]).ends(0).json();
         if status["trajectory"] == "Pause" {

@@ -1,4 +1,5 @@
-//! Runs each case about `jtc` in docs/troubles.md with the real program, mostly against `jtc sim`. `UPDATE_DOCS=1` updates it.
+//! Runs each case about `jtc` in docs/troubles.md with the real program, mostly against `jtc sim`. `UPDATE_DOCS=1` updates the
+//! page.
 #![cfg(target_os = "linux")]
 
 mod files;
@@ -9,7 +10,7 @@ use test_kit::page::Page;
 
 use crate::desk::{Desk, Line};
 
-/// Adds the files that the cases need.
+/// Adds the files that the cases need to the workplace.
 fn with_files(desk: Desk) -> Desk {
     files::write(desk.dir());
     desk
@@ -140,7 +141,7 @@ fn moving(page: &mut Page) {
     let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
     pushed.run(run);
     let mut doctor = pushed.run("jtc doctor").blurred();
-    // The simulated time passes at full speed, so the age may be seconds or hours.
+    // The simulated time runs at full speed, so the age of the stop may be seconds or hours.
     for unit in ["s", "min", "h", "days"] {
         doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
     }

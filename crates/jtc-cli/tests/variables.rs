@@ -14,8 +14,8 @@ fn with((name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     run(command, words, "")
 }
 
-/// In older versions some variables changed a motion or a result. The command refuses such a variable before it opens a port (which would
-/// cause exit code 3). If the variable were ignored, the motion could be different, faster or longer than the user expects.
+/// In older versions, some variables changed a motion or a result. The command rejects such a variable before it opens a port (which
+/// would cause exit code 3). If the command ignored the variable, the motion could be different, faster or longer than the user expects.
 #[test]
 fn a_variable_that_shaped_a_motion_refuses_the_command() {
     let dir = Dir::new();
@@ -49,7 +49,8 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
         with((variable, value), &["plan", &file, "-o", &out]).ends(2);
         assert!(!dir.has("out.csv"), "{variable}");
     }
-    // The command is not refused if the variable is off or empty, or if the option is typed. A Stop is never refused.
+    // The command continues if the variable is off or empty, or if the user types the option. No variable can prevent a
+    // Stop.
     let plan = ["plan", &file, "-o", &out, "--overwrite", "--speed", "50"];
     for (variable, value) in [("JTC_DEG", "off"), ("JTC_LINE", ""), ("JTC_SPEED_PERCENT", "5")] {
         with((variable, value), &plan).ends(0);
@@ -59,8 +60,8 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
     }
 }
 
-/// In older versions some variables caused a motion or a reset, confirmed an action or overrode a check. A variable of this kind has no
-/// effect now, and one output line reports this.
+/// In older versions, some variables caused a motion or a reset, confirmed an action or overrode a check. Such a variable has no effect
+/// now, and one output line reports this.
 #[test]
 fn no_variable_acts() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -74,7 +75,7 @@ fn no_variable_acts() {
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
         output
     };
-    // Parameters are missing. Only an option on the command line can supply them.
+    // The controller lacks parameters. Only an option on the command line can supply these parameters.
     ignored("JTC_DEFAULTS", "1", &["recover", "--port", &port], 4);
     ignored("JTC_ARM", &arm, &["recover", "--port", &port], 4);
     assert_eq!(sim.json(&["status"], 0)["state"], "Init");
@@ -88,14 +89,14 @@ fn no_variable_acts() {
     ignored("JTC_TO_FLANGE", "0.6,0,0.4,0,0,0", &["move", "--port", &port], 2);
     ignored("JTC_FORCE", "1", &["example", "motion", "-o", &dir], 4);
     ignored("JTC_OCCURRED", "1", &["clear", "--port", &port], 0);
-    // The name of the variable has changed.
+    // The environment variable now has a new name.
     let output = ignored("JTC_OUT", &dir, &["example", "no-such-example"], 2);
     assert!(output.err.contains("use --out or JTC_EXAMPLE_DIR"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(existing).unwrap(), "mine");
     assert_eq!(sim.json(&["status"], 0)["state"], "HoldPos");
 }
 
-/// The variables accept eight words for on and off, in upper or lower case.
+/// The on/off variables accept eight words, in upper or lower case.
 #[test]
 fn on_off_variables_take_eight_words_and_nothing_else() {
     for (variable, words) in [
@@ -118,8 +119,8 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// The command reports a variable that has an effect in one line on stderr. The command does not report the variable if the option is typed
-/// before or after the command.
+/// The command reports a variable that has an effect in one line on stderr. The command does not report the variable if the user types the
+/// option before or after the command.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -133,12 +134,12 @@ fn a_variable_in_effect_is_shown() {
     let programs = with(("JTC_PORT", &port), &["--json", "status"]).ends(0);
     assert_eq!(programs.events()[0]["text"], line.trim_end(), "{}", programs.err);
     assert!(programs.json()["state"].is_string());
-    // The error about an invalid value of a variable contains the name of the variable.
+    // The error about an invalid value contains the name of the environment variable.
     let wrong = with(("JTC_BAUD", "fast"), &["status"]).ends(2);
     assert!(wrong.err.contains("--baud is set by the variable JTC_BAUD=fast"), "{}", wrong.err);
 }
 
-/// `--force` of older scripts means `--overwrite`. The help text does not contain `--force`.
+/// The command accepts `--force` of older scripts as `--overwrite`. The help text does not contain `--force`.
 #[test]
 fn force_is_taken_for_overwrite() {
     let dir = Dir::new();

@@ -1,4 +1,4 @@
-//! Tests of `jtc` at a terminal, with the live view from start to end, and a run with its progress bar.
+//! Tests of `jtc` at a terminal: the live view from start to end, and a run with its progress bar.
 #![cfg(unix)]
 
 use crate::common;
@@ -9,7 +9,7 @@ use std::process::Stdio;
 use cli_kit::testing::{Terminal, signal};
 use common::{Sim, motion, slow_motion};
 
-/// Starts a slow motion that continues after its command has ended.
+/// Starts a slow motion that continues after the end of its command.
 fn moving(sim: &Sim) {
     let file = sim.file("slow.csv", &slow_motion(300));
     let mut run = sim.command(&["--json", "traj", "run", &file]);
@@ -20,7 +20,7 @@ fn moving(sim: &Sim) {
     run.wait().unwrap();
 }
 
-/// The view can stop a motion whose command has ended. The view shows the Stop and restores the terminal.
+/// The live view can stop a motion whose command has ended. The view shows the Stop and restores the terminal.
 #[test]
 fn j33_the_stop_key_of_the_view_stops() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -37,7 +37,7 @@ fn j33_the_stop_key_of_the_view_stops() {
     assert!(terminal.is_as_before());
 }
 
-/// For every cause of its end, the view ends at once and restores the terminal.
+/// The live view ends at once and restores the terminal, for every cause of its end.
 #[test]
 fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -48,7 +48,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         signal(&child, name);
         assert_eq!(terminal.ends(&mut child), 0, "{name}");
         assert!(terminal.is_as_before() && !terminal.picture.text().contains("thread"), "{name}");
-        // The terminal shows its previous screen again.
+        // After the live view, the terminal shows its previous screen again.
         assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
     }
     // The test closes the terminal window, once in a session that receives the signal and once in a session that ignores the signal.
@@ -79,7 +79,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
-/// If a terminal has fewer than 40 columns, the keys work and the required size is printed.
+/// If a terminal has fewer than 40 columns, the keys still work, and the command prints the required size.
 #[test]
 fn a_small_terminal_says_so_and_its_keys_work() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -92,8 +92,8 @@ fn a_small_terminal_says_so_and_its_keys_work() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// Text that is printed during a progress bar appears above the bar, and no part of the bar remains. The command reports if a key has no
-/// effect.
+/// Text that the command prints during a progress bar appears above the bar, and no part of the bar remains. The command reports if a
+/// key has no effect.
 #[test]
 fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -101,7 +101,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let mut terminal = Terminal::new(40, 40);
     let mut child = terminal.start(&sim.command(&["traj", "run", &file, "--speed", "10"]));
     terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
-    // Ctrl-S does not block a command whose stop key is active.
+    // Ctrl-S does not block a command that reads the stop key.
     terminal.press("\u{13} ");
     terminal.until_it_shows("paused; press space to resume");
     terminal.press(" ");
@@ -113,7 +113,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let text = terminal.picture.text();
     assert!(!text.contains('━') && !text.contains('╸') && !text.contains("keys:"), "{text}");
     assert!(text.contains("stopping on the path") && text.contains("stopped"), "{text}");
-    // The words of the result are complete at the edge of the terminal.
+    // At the edge of the terminal, the words of the result are complete.
     let words: Vec<&str> = text.split_whitespace().collect();
     for whole in ["statuses,", "frames", "damaged"] {
         assert!(words.contains(&whole), "{whole}: {text}");

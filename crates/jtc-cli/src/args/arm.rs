@@ -1,4 +1,4 @@
-//! `jtc arm`: arm files, and the arm of a controller.
+//! `jtc arm`: options of the commands for arm files, and for the arm of a controller.
 
 use std::path::PathBuf;
 

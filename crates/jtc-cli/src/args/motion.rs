@@ -324,7 +324,7 @@ pub(crate) enum TeachCommand {
 }
 
 impl ExecuteArgs {
-    /// Returns the policy under the name that the agent uses.
+    /// Returns the policy for the loss of the client, under the name that the agent uses.
     pub(crate) fn policy(&self) -> Option<&'static str> {
         ["continue", "pause", "stop"].into_iter().find(|word| self.when_gone.as_deref() == Some(word))
     }

@@ -57,7 +57,7 @@ pub(crate) struct PayloadArgs {
 }
 
 impl PayloadArgs {
-    /// The body.
+    /// Returns the payload.
     pub(crate) fn payload(&self) -> Payload {
         let Self { mass, com, inertia } = *self;
         let [xx, yy, zz, xy, xz, yz] = inertia.unwrap_or_default();
@@ -65,7 +65,7 @@ impl PayloadArgs {
     }
 }
 
-/// Numbers between commas.
+/// Parses numbers that are separated by commas.
 pub(super) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| {
         let number = word.trim().parse::<f64>().ok().filter(|number| number.is_finite());

@@ -145,7 +145,7 @@ pub(crate) enum Target {
     Pose(String),
 }
 
-/// Parses six numbers with commas between them, or a name.
+/// Parses the target of a move: six numbers with commas between them, or the name of a pose.
 fn target(text: &str) -> Result<Target, String> {
     let text = text.trim();
     if text.is_empty() {
@@ -161,7 +161,7 @@ fn target(text: &str) -> Result<Target, String> {
     Ok(Target::Joints(joints))
 }
 
-/// Parses six numbers with commas between them.
+/// Parses six numbers of a flange pose with commas between them.
 fn flange_pose(text: &str) -> Result<[f64; 6], String> {
     numbers(text)?.try_into().map_err(|all: Vec<f64>| {
         format!("{} numbers, not 6: expected x, y, z in m, then roll, pitch and yaw, with commas", all.len())

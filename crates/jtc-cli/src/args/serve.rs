@@ -97,12 +97,12 @@ pub(crate) struct ServeArgs {
     pub link: LinkArgs,
 }
 
-/// Parses the size limit of the recordings, which must be sufficient for some minutes.
+/// Parses the size limit of the recordings. The limit must be sufficient for some minutes of recording.
 fn record_size(text: &str) -> Result<u64, String> {
     size(text, 10_000_000)
 }
 
-/// Parses the size limit of the command log, which must be sufficient for some thousand lines.
+/// Parses the size limit of the command log. The limit must be sufficient for some thousand lines.
 fn log_size(text: &str) -> Result<u64, String> {
     size(text, 1_000_000)
 }

@@ -37,7 +37,7 @@ fn over_speed(text: &str) -> Result<[f64; JOINTS], String> {
     of_joints(text, DriveConfig::OVER_SPEED, "rad/s")
 }
 
-/// Parses a number for all joints, or a number for each joint, within limits.
+/// Parses one number for all joints, or a number for each joint. Each number must be within the limits.
 fn of_joints(text: &str, (low, high): (f64, f64), unit: &str) -> Result<[f64; JOINTS], String> {
     let numbers = super::payload::numbers(text)?;
     let all = match numbers[..] {

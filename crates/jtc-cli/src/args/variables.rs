@@ -2,12 +2,12 @@
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Variables of `jtc`, and variables of earlier versions.
+/// Environment variables of `jtc`, and environment variables of earlier versions.
 pub(crate) const VARIABLES: Variables = Variables {
     json: "JTC_JSON",
     retired: &[
-        // Variables that caused a motion, a reset, flashing or overwriting, that confirmed an action, overrode a check, or selected another
-        // file.
+        // Variables that caused a motion, a reset, flashing or overwriting. Others confirmed an action, overrode a check, or selected
+        // another file.
         Retired::less("JTC_ACCEPT_DEVICE_LIMITS", "", "accept-device-limits"),
         Retired::less("JTC_ACCEPT_SUPPLY", "", "accept-supply"),
         Retired::less("JTC_AGAIN", "", "again"),
@@ -79,7 +79,8 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option must not have a variable that acts: this list contains each variable, with the reason why it may exist.
+    /// A new option must not have a variable that causes an action. This list contains each variable, with the reason why
+    /// it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{File, Format, Limit, Line, Output, Place, Simulator};

@@ -56,8 +56,8 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
     if refused { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }
 }
 
-/// Formats each finding as a line. If several findings suggest the same next step, the step is printed once, after the last of these
-/// findings.
+/// Formats each finding as a line. If several findings suggest the same next step, the next step is printed once, after the last of
+/// these findings.
 fn as_text(findings: &[ArmFinding]) -> String {
     let mut text = String::new();
     for (i, f) in findings.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! `jtc bench`: declares absent joints (J-53).
+//! `jtc bench`: declares joints that are absent on a bench (J-53).
 
 use cli_kit::{Failure, Output};
 use jtc_core::JOINTS;
@@ -53,7 +53,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// Describes the absent joints.
+/// Describes the absent joints and their angles as text.
 pub(super) fn words(absent: &[Option<f64>; JOINTS]) -> String {
     let all = Joint::ALL.iter().zip(absent);
     let all: Vec<String> =

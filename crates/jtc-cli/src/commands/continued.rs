@@ -40,13 +40,13 @@ pub(super) fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure
     perform(&course, |out| Ok(Job::made(arm, words, out)), Some(&mut make), out)
 }
 
-/// Remainder of a run, and the runs after it.
+/// Remainder of an interrupted run, and the runs after the remainder.
 struct Left {
     /// Interrupted trajectory and its resume point; `None` if only complete runs remain.
     current: Option<(Trajectory, ResumePoint)>,
-    /// Trajectory of the following runs.
+    /// Trajectory of the runs after the remainder of the interrupted run.
     then: Trajectory,
-    /// Number of the following runs.
+    /// Number of runs after the remainder of the interrupted run.
     runs: u32,
 }
 
@@ -72,7 +72,7 @@ impl Left {
         }
     }
 
-    /// Sets the remainder and the following runs as the motion of a job.
+    /// Sets the remainder and the runs after it as the motion of a job.
     fn make(&self, job: &mut Job, status: &Status, out: &Output) -> Result<(), Failure> {
         let rest = match &self.current {
             None => None,
@@ -94,7 +94,7 @@ impl Left {
                      requested"
                 ),
             });
-            // The runs after the remainder are checked before the arm moves.
+            // The command checks the runs after the remainder before the arm moves.
             let verdict = job.verdict(&self.then, None, UploadOptions::default());
             if !verdict.is_ok() {
                 return Err(job.refuse(&verdict, out));
@@ -107,7 +107,7 @@ impl Left {
     }
 }
 
-/// Returns the trajectory of the run.
+/// Returns the trajectory of the interrupted run.
 fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajectory, Failure> {
     if let Some(file) = &args.trajectory {
         return Ok(Loaded::load(file, Some(&arm.joint_names)).map_err(Failure::nothing_sent)?.trajectory);
@@ -124,7 +124,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     })
 }
 
-/// Returns the path time of the resume point, ms. Prints the reason for the chosen time on stderr.
+/// Returns the path time of the resume point, ms. Prints on stderr why the function chose this path time.
 fn place(
     job: &Job,
     whole: &Trajectory,

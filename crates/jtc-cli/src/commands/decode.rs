@@ -1,4 +1,4 @@
-//! `jtc decode`: decodes frames of both directions from hex text, a capture, or raw bytes.
+//! `jtc decode`: decodes the frames of host and controller from hex text, a capture, or raw bytes.
 
 use std::io::Read;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::status;
 
-/// Largest number of consecutive invalid bytes that are shown one by one.
+/// Largest number of consecutive invalid bytes that the command shows one by one.
 const SHOWN: usize = 32;
 
 /// Decodes the standard input until it ends. Ends with exit code 2 if the input contains no frame.
@@ -72,8 +72,8 @@ fn hex(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// Returns the byte streams of an input with their names. If the input does not mark directions, it is one stream
-/// without a name.
+/// Returns the byte streams of an input with their names. If the input does not mark directions, the result is one
+/// stream without a name.
 fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let Some(text) =
         std::str::from_utf8(input).ok().filter(|t| t.chars().all(|c| !c.is_control() || c.is_whitespace()))
@@ -94,7 +94,7 @@ fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     Ok(vec![(String::new(), from_hex(text)?)])
 }
 
-/// Parses bytes in hex digits, with or without spaces, commas, colons and `0x`.
+/// Parses bytes as hex digits, with or without spaces, commas, colons and `0x`.
 fn from_hex(text: &str) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     for (number, line) in text.lines().enumerate() {

@@ -21,17 +21,17 @@ use crate::failure::output_lost;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
-/// Random seed of the demo. The seed is constant, so that every demo has the same numbers.
+/// Random seed of the demo. The seed is constant, so that every demo produces the same numbers.
 const SEED: u64 = 1;
-/// Recorded time before and after the motion.
+/// Time that is recorded before and after the motion.
 const MARGIN: Duration = Duration::from_millis(400);
-/// Longest wait until the drives are enabled; the first enable takes 4 s.
+/// Longest wait until the drives are enabled. The first enable takes 4 s.
 const BRING_UP: Duration = Duration::from_secs(30);
 
-/// Files of the demo, in the order of the output.
+/// Output files of the demo, in the order in which the command lists them.
 const NAMES: [&str; 4] = ["report.html", "recording.mcap", "recording.csv", "picture.svg"];
 
-/// Results of the run.
+/// Results of the run in the demo.
 struct Run {
     info: RecordingInfo,
     samples: Vec<Sample>,
@@ -105,7 +105,8 @@ pub(super) fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns a port to `world`. While a recording is active, the port stores a sample at each tick.
+/// Returns a port of the simulated controller in `world`. While a recording is active, the port stores a sample at each
+/// tick.
 fn observed(
     world: World,
     speed: SimSpeed,

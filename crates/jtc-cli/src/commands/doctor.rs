@@ -1,4 +1,4 @@
-//! `jtc doctor`: finds faults of the link, the bus and the set-up, and suggests the next command.
+//! `jtc doctor`: finds faults of the link, the joint bus and the set-up, and suggests the next command.
 
 use std::time::Duration;
 
@@ -12,18 +12,19 @@ use serde_json::json;
 use super::status;
 use crate::args::LinkArgs;
 
-/// Listening time at the requested rate, in which 50 statuses arrive.
+/// Listening time at the requested bit rate. In this time, 50 statuses arrive.
 const LISTEN: Duration = Duration::from_secs(2);
 /// Listening time at each of the other bit rates.
 const TRY: Duration = Duration::from_millis(300);
 
-/// Checks the link, the bus and the set-up. The exit code is 0 without problems, 3 without a link, and 1 for other problems.
+/// Checks the link, the joint bus and the set-up. The exit code is 0 without problems, 3 without a link, and 1 for other
+/// problems.
 pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
     let mut session = link.session()?;
     let mut seen = session.examine(LISTEN)?;
-    // The status has no separate bit for a drive that answers although its joint is declared absent (J-53).
+    // A drive may answer although its joint is declared absent (J-53). The status has no separate bit for this error.
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
     seen.absent = match &seen.status {
         Some(_) if external => absent(session.absent().unwrap_or_default()),
@@ -75,7 +76,8 @@ fn no_link(seen: &Observation) -> bool {
 fn other_rate(name: &str, own: u32, out: &Output) -> Option<u32> {
     RATES.into_iter().filter(|r| *r != own).find(|rate| {
         out.note(format!("no frame in the received bytes; trying {rate} Bd"));
-        // The port is opened without a socket for Stops, because a Stop at a wrong rate would not reach the controller.
+        // The command opens the port without a socket for Stops, because a Stop at a wrong bit rate would not reach the
+        // controller.
         let port = SerialPort::open_without_door(name, *rate).ok();
         port.and_then(|p| Session::new(p).examine(TRY).ok()).is_some_and(|seen| seen.statuses > 0)
     })

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::{DynamicsArgs, DynamicsKind};
 
-/// Evaluates each line of numbers until the end of stdin.
+/// Computes a result for each line of numbers until the end of stdin.
 pub(super) fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
@@ -32,7 +32,7 @@ pub(super) fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure>
         let written = if out.is_json() {
             writeln!(stdout, "{}", json!({ key(args.what): result }))
         } else {
-            // A number with 17 significant digits (one before the decimal point, 16 after it) reproduces exactly the same f64.
+            // Seventeen significant digits (one before the decimal point, 16 after it) reproduce exactly the same f64.
             let words: Vec<String> = result.iter().map(|v| format!("{v:.16e}")).collect();
             writeln!(stdout, "{}", words.join(" "))
         };
@@ -66,7 +66,7 @@ fn numbers(line: &str, what: DynamicsKind) -> Result<Vec<f64>, String> {
                 .ok_or_else(|| format!("\"{w}\" is not a finite number"))
         })
         .collect::<Result<Vec<f64>, String>>()?;
-    // A mass matrix needs only positions, but lines in the format of the other calculations are also accepted.
+    // A mass matrix needs only positions, but the command also accepts lines in the format of the other calculations.
     if values.len() == need || (what == DynamicsKind::Mass && values.len() == 3 * JOINTS) {
         Ok(values)
     } else {

@@ -1,4 +1,4 @@
-//! `jtc example`: example files.
+//! `jtc example`: writes example files.
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::example::{EXAMPLES, Example};
@@ -25,7 +25,7 @@ pub(super) fn example(args: &ExampleArgs, out: &Output) -> Result<(), Failure> {
     };
     let dir = args.dir.as_deref().unwrap_or(".".as_ref());
     std::fs::create_dir_all(dir).map_err(|e| Failure::usage(format!("{}: {e}", dir.display())))?;
-    // Without a directory argument, the suggested command contains only the name of the file.
+    // Without a directory argument, the suggested command contains only the name of the example file.
     let path = if args.dir.is_some() { dir.join(example.file) } else { example.file.into() };
     OutputFile::open(&path, args.overwrite.overwrite, &[])?.write(example.text())?;
     let next = example.next.replace("{}", &typed(&path));

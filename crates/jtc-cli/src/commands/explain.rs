@@ -1,4 +1,4 @@
-//! `jtc explain`: prints one page about a code or about fault files.
+//! `jtc explain`: prints the page about a code or about fault files.
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::explain::{Page, find, pages};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::args::ExplainArgs;
 
-/// Prints the matching pages, or the list of all pages.
+/// Prints the pages that match the words of the user, or the list of all pages.
 pub(super) fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let code = &args.code.join(" ");
     if code.is_empty() {

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use crate::args::{FirmwareCommand, FlashArgs, ImageArgs, LinkArgs};
 use crate::ask::confirm;
 
-/// `jtc firmware …`
+/// Runs a `jtc firmware` command.
 pub(super) fn firmware(command: &FirmwareCommand, out: &Output) -> Result<(), Failure> {
     match command {
         FirmwareCommand::List => list(out),
@@ -76,7 +76,8 @@ fn drive_json(drive: &Drive) -> Value {
     })
 }
 
-/// Returns the image that the user has specified. Without it, returns the installed image for `board`.
+/// Returns the image that the user has specified. If the user has not specified an image, returns the installed image
+/// for `board`.
 fn image(
     args: &ImageArgs,
     board: impl FnOnce(&Catalogue) -> Result<String, Failure>,
@@ -122,8 +123,9 @@ fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure>
     }
 }
 
-/// Returns the port that is checked in addition to the ports of the USB device of the drive. The result is the port that the user has
-/// specified. Otherwise, if the board must report its firmware and its port is unknown, the result is the only port of the computer.
+/// Returns the port that is checked in addition to the ports of the drive's USB device. The result is the port that the user has
+/// specified, if any. Otherwise, the result is the only port of the computer, but only if the board must report its firmware and the
+/// port of the board is unknown.
 fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
     match &link.port {
         Some(url) if url.contains("://") => {
@@ -143,8 +145,7 @@ fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<Str
     }
 }
 
-/// Returns the only port of the computer. Ports that other programs have opened are included, because the board may be connected to such a
-/// port.
+/// Returns the only port of the computer. Ports that other programs have opened count, because the board may be connected to such a port.
 fn only_port() -> Result<String, Failure> {
     let there = |port: &PortInfo| matches!(port.problem, None | Some(PortError::Busy { .. }));
     let mut paths: Vec<String> = ports()?.into_iter().filter(there).map(|port| port.path).collect();
@@ -191,7 +192,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let permissions = Permissions { assume_board: args.assume_board, accept_supply: args.accept_supply };
     may_flash(&image, &drive, &before, permissions)?;
     let line = lines.proving().map(|(port, same_device)| (port.to_owned(), same_device));
-    // Only the ports of this board are considered, because another board may already run the image.
+    // The command considers only the ports of this board, because another board may already run the image.
     if let Some(program) =
         before.own_info().find_map(|info| compare(&image, info).ok()).filter(|_| !args.again)
     {
@@ -207,7 +208,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     if let Some(question) = &question {
         confirm(question, "--yes")?;
     }
-    // The state is read again, because the user may have confirmed after several minutes.
+    // The command reads the state of the board again, because the user may have confirmed after several minutes.
     let now = lines.look()?;
     may_flash(&image, &drive, &now, permissions)?;
     if let Some(other) = now.to_confirm(&image).filter(|now| !args.yes && question.as_ref() != Some(now)) {
@@ -221,8 +222,8 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
     let mut lines = Some(lines);
     let written = write_image(&drive, &image, &mut |bytes| {
-        // The ports are closed as soon as copying has begun, because the ST-LINK may remove its serial port from USB together with its
-        // drive. If the port were still open at that time, it would appear again under another name.
+        // The command closes the ports as soon as copying has begun, because the ST-LINK may remove its serial port from USB together
+        // with its drive. If the serial port were still open at that time, it would appear again under another name.
         drop(lines.take());
         bar.set_position(bytes as u64);
     });
@@ -254,7 +255,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A serial port, and `true` if it belongs to the drive's USB device.
+/// Name of a serial port, and `true` if the port belongs to the USB device of the drive.
 type Line = (String, Option<bool>);
 
 fn result(

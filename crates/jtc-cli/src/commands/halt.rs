@@ -1,5 +1,5 @@
-//! Commands `jtc stop` and `jtc traj pause`. The command goes directly to the controller, through an agent, or through the program of this
-//! user that has opened the port.
+//! Commands `jtc stop` and `jtc traj pause`. The command sends its request directly to the controller, through an agent, or through a
+//! program of this user that has opened the port.
 
 use std::cell::Cell;
 use std::panic::resume_unwind;
@@ -22,11 +22,12 @@ use crate::progress::Progress;
 
 /// Longest time for which a program does not accept Stops after it has opened the port, or before it closes the port.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// Like [`CHANGES_HANDS`], for a port for which a program of this user has accepted Stops. The program may be waiting for the end of another Stop.
+/// Like [`CHANGES_HANDS`], for a port for which a program of this user has accepted Stops. This program may be waiting for the end of
+/// an earlier Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Largest number of programs that may open the port one after another during one Stop.
 const OWNERS: usize = 16;
-/// Time after which a Stop or the end of teaching is sent again if the statuses do not show its effect.
+/// Time after which the command sends a Stop or the end of teaching again if the statuses do not show its effect.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Longest wait until a stopped arm is at rest.
 const REST: Duration = Duration::from_secs(5);
@@ -34,7 +35,7 @@ const REST: Duration = Duration::from_secs(5);
 /// Error code if the arm does not come to rest after a confirmed Stop.
 const STILL_MOVING: &str = "still-moving";
 
-/// Stops the arm, and waits until it is at rest.
+/// Stops the arm, and waits until the arm is at rest.
 pub(super) fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arms = arms(link);
     let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
@@ -66,7 +67,7 @@ pub(super) fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
     let accepted = ends.iter().flatten().any(|one| one.accepted);
     let mut value = json!({ "command": "stop", "accepted": accepted, "arms": arms, "not_asked": not_asked });
-    // An arm that still moves is the most urgent failure, so it is listed first.
+    // An arm that still moves is the most urgent failure, so the command lists it first.
     failed.sort_by_key(|failure| failure.code != STILL_MOVING);
     if let Some(failure) = failed.first() {
         value["error"] = error_object(failure);
@@ -81,11 +82,11 @@ fn failed_json(failure: &Failure) -> Value {
     json!({ "error": error_object(failure) })
 }
 
-/// Lists the USB ports to which no Stop is sent.
+/// Lists the USB ports to which the command sends no Stop.
 fn not_asked(arms: &[Arm]) -> Vec<String> {
     let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
     if asked.is_empty() {
-        // The computer has only this port, so no other port must be listed.
+        // The computer has only one port, so the command must not list another port.
         return Vec::new();
     }
     let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
@@ -100,7 +101,7 @@ pub(super) fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             let mut session = *session;
             progress.watch(&mut session);
             session.pause().map_err(|error| match error {
-                // The controller refuses the Pause if no motion is in progress.
+                // The controller rejects the Pause if no motion is in progress.
                 Error::Link(LinkError::Refused { .. }) => error.into(),
                 error => unconfirmed(error).told(Halt::Pause),
             })?;
@@ -127,8 +128,8 @@ pub(super) fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the arms that the command stops. If the user has specified a port, the result is the arm at that port. Otherwise the result is
-/// the arms of all agents and programs of this user. If no agent or program runs, it is the arm at the only port.
+/// Returns the arms that the command stops. If the user has specified a port, the result is the arm at that port. Otherwise the result
+/// contains the arms of all agents and programs of this user. If no agent or program runs, the result is the arm at the only port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
         return vec![Arm::Of { link: link.clone(), port: None }];
@@ -149,8 +150,8 @@ fn arms(link: &LinkArgs) -> Vec<Arm> {
     arms
 }
 
-/// Returns the arms of programs that have a socket for Stops. The socket of a killed program is included, because its arm may still be
-/// moving.
+/// Returns the arms of programs that have a socket for Stops. The result includes the socket of a killed program, because the arm of
+/// this program may still be moving.
 #[cfg(unix)]
 fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
     let (alive, stale): (Vec<_>, Vec<_>) =
@@ -174,7 +175,7 @@ fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
 
 /// Arm that the command stops.
 enum Arm {
-    /// Arm at a port, or arm of an agent that has opened this port.
+    /// Arm at a port, or arm of an agent that has opened the port.
     Of { link: LinkArgs, port: Option<String> },
     /// Arm of the program that listens, or has listened, at this socket.
     #[cfg(unix)]
@@ -182,7 +183,7 @@ enum Arm {
 }
 
 impl Arm {
-    /// Returns the port, if it is known.
+    /// Returns the port of the arm, if the port is known.
     fn port(&self) -> Option<&str> {
         match self {
             Self::Of { port, .. } => port.as_deref(),
@@ -200,7 +201,7 @@ impl Arm {
     }
 }
 
-/// Result for an arm that is at rest.
+/// Result of a Stop for an arm that is at rest.
 struct Stopped {
     /// `true` if the controller accepted the Stop.
     accepted: bool,
@@ -243,13 +244,13 @@ fn holder_json(answer: &Answer) -> Value {
     json!({ "program": answer.program, "pid": answer.pid, "port": answer.port })
 }
 
-/// Progress of a Stop or Pause.
+/// Progress of a Stop or Pause request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Sent {
     Nothing,
-    /// The controller may have received the command.
+    /// The controller may have received the request.
     Unconfirmed,
-    /// The controller has received the command.
+    /// The controller has received the request.
     Confirmed,
 }
 
@@ -271,12 +272,12 @@ impl NotHalted {
         Self { sent, failure: failure.into() }
     }
 
-    /// Raises the progress of this result to the progress that the Stop reached in an earlier program.
+    /// Returns this failure with at least the progress `sent`, which the Stop had reached in an earlier program.
     fn at_least(self, sent: Sent) -> Self {
         Self { sent: self.sent.max(sent), ..self }
     }
 
-    /// Adds to the failure the progress of the Stop or Pause, and a sure method to stop the arm.
+    /// Adds to the failure the progress of the Stop or Pause, and a reliable method to stop the arm.
     fn told(self, halt: Halt) -> Failure {
         let name = if halt == Halt::Stop { "Stop" } else { "Pause" };
         if self.failure.code == STILL_MOVING {
@@ -306,7 +307,7 @@ impl NotHalted {
     }
 }
 
-/// Link to an arm.
+/// Connection to an arm that the command stops or pauses.
 #[expect(clippy::large_enum_variant, reason = "there is one for each arm, for a moment")]
 enum Reached {
     /// Separate connection to the serial line.
@@ -315,8 +316,8 @@ enum Reached {
     Holder(Answer, Option<End>),
 }
 
-/// Opens the serial line, or sends the request to the program that has opened the port. `own` is true if a program of this user had the
-/// port open just before.
+/// Opens the serial line, or sends the request to the program that has opened the port. `own` is `true` if a program of this user had
+/// opened the port shortly before.
 fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
@@ -359,7 +360,8 @@ fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalte
     Ok(None)
 }
 
-/// Sends the request to the program that listens at this socket. If the program does not answer, it may still have sent the frame.
+/// Sends the request to the program that listens at this socket. If this program does not answer, it may still have sent the
+/// frame.
 #[cfg(unix)]
 fn ask_at(socket: &std::path::Path, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     halt::ask(socket, what, &who()).map_err(|error| NotHalted::after(Sent::Unconfirmed, error))
@@ -370,7 +372,8 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
-/// Stops one arm. The stopped program may end before the arm is at rest. The port is then free, or another program has opened the port.
+/// Stops one arm, and waits until the arm is at rest. The program that has executed the Stop may end before the arm is at rest.
+/// After that, the port is free, or another program has opened the port.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
@@ -381,7 +384,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             }
             Reached::Holder(answer, end) => (answer, end),
         };
-        // The link uses the port and the rate at which the controller has answered.
+        // The command uses the port and the bit rate at which the controller has answered.
         let link = LinkArgs { port: Some(answer.port.clone()), baud: answer.baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
@@ -410,8 +413,8 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
                     return Ok(Reached::Holder(answer, end));
                 }
-                // The program has ended, so the port is free or another program has opened the port. Another possible cause is that the
-                // program is busy with other clients.
+                // The program has ended, so the port is free or another program has opened the port. Alternatively, the program is busy
+                // with other clients.
                 if link.port.is_some() {
                     return reach(link, Halt::Stop, true);
                 }
@@ -426,14 +429,14 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     }
 }
 
-/// Stops the arm through a separate connection. If the controller refuses the Stop, no motion is in progress.
+/// Stops the arm through a separate connection. If the controller rejects the Stop, no motion is in progress.
 fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,
     holder: Option<Answer>,
 ) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
-    // A motion in the statuses before the confirmation of the Stop is also recorded.
+    // The command also records a motion that the statuses show before the confirmation of the Stop.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
     let seen = Rc::clone(&moved);
     session.observe(move |_, status| {
@@ -446,7 +449,7 @@ fn directly(
         Err(error) => return Err(unconfirmed(error)),
     };
     let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
-    // An arm in teaching is compliant. After a Stop, the arm holds its position.
+    // An arm in teaching is compliant. After a Stop, the arm must hold its position.
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {
@@ -491,7 +494,7 @@ fn still_moving(end: &End) -> Failure {
     Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(end.next_step())
 }
 
-/// Returns the failure for a frame that was sent without confirmation, or that an agent refused.
+/// Returns the failure for a frame that the controller did not confirm, or that an agent rejected.
 fn unconfirmed(error: Error) -> NotHalted {
     let sent = match error {
         Error::Link(LinkError::Denied { .. }) => Sent::Nothing,

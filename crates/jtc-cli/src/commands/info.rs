@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::args::LinkArgs;
 use crate::ask::confirm;
 
-/// Time within which the drives change their state.
+/// Longest time that the drives need to change their state.
 const DISABLED: Duration = Duration::from_secs(5);
 
 /// Prints the identity of the controller.
@@ -39,7 +39,7 @@ pub(super) fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats a hash in the form that all outputs use.
+/// Formats a hash in the form that the outputs of all commands use.
 pub(super) fn hash(hash: u64) -> String {
     format!("{hash:016x}")
 }
@@ -98,7 +98,7 @@ fn as_text(info: &Info) -> String {
     )
 }
 
-/// Describes the flight recorder, and the next step if it has stopped.
+/// Describes the state of the flight recorder, and the next step if the recorder has stopped.
 fn recorder(state: LogState) -> String {
     match state {
         LogState::Error | LogState::Reset => {
@@ -162,7 +162,7 @@ fn without_extensions(s: &Status) -> String {
     )
 }
 
-/// Switches off the torque of an arm that is held at rest.
+/// Switches off the torque of an arm that the controller holds at rest.
 pub(super) fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     if !yes {

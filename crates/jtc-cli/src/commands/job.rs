@@ -1,4 +1,4 @@
-//! Trajectory from a file at the requested speed, with the arm and the result of the trajectory check.
+//! Trajectory from a file at the requested speed, with its arm and the result of the trajectory check.
 
 use std::path::Path;
 
@@ -16,10 +16,10 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::CheckArgs;
 
-/// Number of speeds that are checked between a speed that passes and a speed that fails the check.
+/// Number of speeds that the command checks between a speed that passes and a speed that fails the trajectory check.
 const TRIES: usize = 4;
 
-/// Formats a path as the user can type it in a shell.
+/// Formats a path in the form in which the user can type it in a shell.
 pub(super) fn typed(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
@@ -42,39 +42,41 @@ fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
     Ok(arm)
 }
 
-/// A trajectory at the requested speed, and the arm for its check.
+/// A trajectory at the requested speed, and the arm for the trajectory check.
 pub(super) struct Job {
-    /// Loaded file and the data derived from it.
+    /// Loaded trajectory file and the data derived from the file.
     pub loaded: Loaded,
     /// Trajectory at the requested speed.
     pub trajectory: Trajectory,
-    /// Arm with masses, friction and names.
+    /// Arm with masses, friction and joint names.
     pub arm: Arm,
     /// Limits and settings that the command uses.
     pub config: Config,
-    /// Configuration of the controller, if it was read.
+    /// Configuration of the controller, if the command has read it.
     pub device: Config,
-    /// Identity of the controller and hash of its arm, if the controller reports them and they were read.
+    /// Identity of the controller and hash of its arm. `None` if the controller does not report these values, or if the
+    /// command has not read them.
     pub identity: Option<(DeviceIdentity, u64)>,
     /// Command-line words for the file and the arm, as the user typed them.
     pub words: String,
-    /// Trajectory that runs after this trajectory, and the number of its runs.
+    /// Trajectory that runs after the trajectory of this job, and the number of its runs.
     pub later: Option<(Trajectory, u32)>,
     /// Speed in percent of the speed in the file.
     speed: f64,
-    /// `true` if no file was read, so that the motion is planned when the position of the arm is known.
+    /// `true` if the command did not read a file. The command then plans the motion when it knows the position of the
+    /// arm.
     made: bool,
 }
 
 impl Job {
-    /// Reads the files. Prints notes and warnings on stderr.
+    /// Reads the trajectory file and the arm file. Prints notes and warnings on stderr.
     pub(super) fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let arm = arm_of(args, out)?;
         let loaded = Loaded::load(file, Some(&arm.joint_names))?;
         Self::with(arm, loaded, file, args, out)
     }
 
-    /// Like [`Self::load`], with a trajectory that was already read.
+    /// Like [`Self::load`], with a trajectory that the command has already read.
     pub(super) fn of(loaded: Loaded, file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         Self::with(arm_of(args, out)?, loaded, file, args, out)
     }
@@ -108,7 +110,8 @@ impl Job {
         })
     }
 
-    /// Creates a job without a file. [`Job::take`] later sets the motion of this job. `words` is the command as the user typed it.
+    /// Creates a job without a trajectory file. [`Job::take`] later sets the motion of this job. `words` is the command as the
+    /// user typed it.
     pub(super) fn made(arm: Arm, words: String, out: &Output) -> Self {
         named_arm::note_warnings(&arm, out);
         let loaded = Loaded {
@@ -140,8 +143,8 @@ impl Job {
         self.trajectory = trajectory;
     }
 
-    /// Plans the path of a measured motion again within the limits, if the motion violates the limits with its measured times. The check
-    /// reports the errors that remain.
+    /// Plans the path of a measured motion again within the limits, if the motion violates the limits with its measured times. The
+    /// trajectory check reports the errors that remain.
     pub(super) fn plan_anew(&mut self, out: &Output) {
         let verdict = self.verdict(&self.trajectory, None, UploadOptions::default());
         let Some(why) = verdict.refusals().next() else { return };
@@ -159,7 +162,8 @@ impl Job {
         self.trajectory = at_speed;
     }
 
-    /// Returns the hint for a verdict. The hint contains the names that the user typed and the [passing speed](Self::passing_speed).
+    /// Returns the hint for the verdict of a trajectory check. The hint contains the names that the user typed and the [passing
+    /// speed](Self::passing_speed).
     pub(super) fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
         if self.made {
             return format!(
@@ -193,21 +197,21 @@ impl Job {
         verdict.hint_with(&self.words, self.speed, passing_speed)
     }
 
-    /// Returns `true` if the trajectory passes the check with its values read as degrees.
+    /// Returns `true` if the trajectory passes the check when its values are read as degrees.
     fn passes_as_degrees(&self) -> bool {
         let degrees = self.loaded.clone().in_degrees().map(|loaded| loaded.trajectory);
         let at_speed = degrees.ok().and_then(|t| plan::at_speed(&t, self.speed).ok());
         at_speed.is_some_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
     }
 
-    /// Returns the highest speed in whole percent that passes the check. Returns `None` if no speed passes, or if the speed is not the
-    /// problem.
+    /// Returns the highest speed in whole percent that passes the check. Returns `None` if no speed passes, or if the problem does not
+    /// depend on the speed.
     pub(super) fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
         let passes = |percent: f64| {
             let slower = plan::at_speed(&self.loaded.trajectory, percent);
             slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
         };
-        // The estimate can be too low. If a torque limit is exceeded, the estimate can also be too high.
+        // The estimated speed can be too low. If a torque limit is exceeded, the estimate can also be too high.
         let mut good = verdict.slower(self.speed)?;
         let mut bad = self.speed;
         while !passes(good) {
@@ -227,7 +231,7 @@ impl Job {
         Some(good)
     }
 
-    /// Prints the verdict of a failed check, and returns the failure with exit code 4.
+    /// Prints the verdict of a failed trajectory check, and returns the failure with exit code 4.
     pub(super) fn refuse(&self, verdict: &Verdict, out: &Output) -> Failure {
         let passing_speed = self.passing_speed(verdict);
         let hint = self.hint(verdict, passing_speed);
@@ -245,7 +249,7 @@ impl Job {
         Failure::shown(ErrorKind::Refused)
     }
 
-    /// Adds the name of the file to a failure of this job, if the hint does not contain the name.
+    /// Adds the name of the trajectory file to a failure of this job, if the hint does not contain the name.
     pub(super) fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };
@@ -254,7 +258,8 @@ impl Job {
         Failure { next, ..failure }
     }
 
-    /// Returns the parts of the torque that are missing in the check because the arm file does not contain their parameters.
+    /// Returns the parts of the torque that are missing in the check, because the arm file does not contain the parameters
+    /// of these parts.
     pub(super) fn left_out(&self) -> Vec<&'static str> {
         let arm = &self.arm;
         let rotors = (0..JOINTS).any(|j| !arm.rotors_given[j] && self.config.joints[j].rotor_inertia == 0.0);
@@ -262,7 +267,7 @@ impl Job {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Describes the parts that are missing in the torques, and how the user can add these parts. Returns `None` if no part is missing.
+    /// Describes the missing parts of the torque, and how the user can add these parts. Returns `None` if no part is missing.
     pub(super) fn without(&self) -> Option<String> {
         let parts = self.left_out();
         (!parts.is_empty()).then(|| {
@@ -275,19 +280,20 @@ impl Job {
         })
     }
 
-    /// Prints the missing parts of the torque, as a note.
+    /// Prints a note about the missing parts of the torque.
     pub(super) fn note_what_is_left_out(&self, out: &Output) {
         if let Some(words) = self.without() {
             out.note(format!("note: {words}"));
         }
     }
 
-    /// Returns a planner for the arm of this job, with the limits of the job. `friction` is the friction of this arm.
+    /// Returns a planner for the arm of this job, with the limits of this job. `friction` is the friction of this arm.
     pub(super) fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
         Planner { model: Some(&self.arm.model), friction, ..Planner::new(&self.config) }
     }
 
-    /// Checks the limits at and between the points, the torque from the arm model, and the start pose if one is specified.
+    /// Checks the limits at and between the points, the torque from the arm model, and the start pose if the caller
+    /// specifies one.
     pub(super) fn verdict(
         &self,
         trajectory: &Trajectory,

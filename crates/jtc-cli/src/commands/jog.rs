@@ -1,4 +1,4 @@
-//! `jtc jog`: moves single joints with keys or at a specified velocity.
+//! `jtc jog`: moves one joint at a time, with keys or at a specified velocity.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::link::LinkPort;
 use jtc_host::session::BRING_UP;
 
 /// Time for which one key press moves the joint. A terminal repeats a pressed key after half a second, and then at intervals that are
-/// shorter than this time.
+/// shorter than this constant.
 const HELD: Duration = Duration::from_millis(150);
 /// Joint velocities that the user can select with keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
@@ -59,12 +59,13 @@ pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
         (Some(joint), Some(rate)) => one(&mut session, joint, rate, over),
         _ => with_keys(&mut session, out, over),
     };
-    // The arm is stopped at once after every end of the jog, without waiting for the timeout of the controller.
+    // The command stops the arm at once after every end of the jog, without waiting for the timeout of the controller.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // An error that has released the arm causes all other failures, and may be the only failure, so it is reported first.
+    // If an error has switched off the torque, this error causes all other failures, and may be the only failure.
+    // Therefore the command reports this error first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
-        // The controller refuses a jog during a held stop.
+        // The controller rejects a jog during a held stop.
         (_, Err(failure)) if failure.code == "held-stop" => return Err(failure),
         (jogged, rested) => jogged.and(rested)?,
     };
@@ -98,8 +99,8 @@ fn one(
     session.jog_while(&velocity, over).map_err(refused)
 }
 
-/// Returns the index of the initial velocity. For the slowest joint, this velocity is at most the share of the velocity limit that a move
-/// uses by default.
+/// Returns the index of the initial velocity. The velocity is limited to a share of the velocity limit of the slowest joint. A move uses
+/// the same share by default.
 fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     let share = 1e-2 * session.move_speed(None)?.percent;
     let arm = if session.has_extensions() { session.device_arm()? } else { Arm::avena() };
@@ -112,16 +113,16 @@ fn rate_within(most: f64) -> usize {
     RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
 }
 
-/// State of the joint that the keys move, with its velocity setting and present motion.
+/// State of the joint that the keys move, with its selected velocity and its present motion.
 struct Held {
     joint: Joint,
     rate: usize,
-    /// Direction of motion, and the time of the last key press for this direction.
+    /// Direction of the motion, and the time of the last key press for this direction.
     moving: Option<(f64, Duration)>,
 }
 
 impl Held {
-    /// Handles a key; returns `false` if the key ends the jog.
+    /// Handles a key press. Returns `false` if the key ends the jog.
     fn press(&mut self, key: Key, now: Duration) -> bool {
         match key {
             Key::Char('q' | 'Q') | Key::Escape => return false,
@@ -188,7 +189,7 @@ fn with_keys(
     Ok(())
 }
 
-/// Returns the failure of a refused jog, with its reason.
+/// Returns the failure of a jog that the controller rejected, with the reason.
 fn refused(error: Error) -> Failure {
     let failure = Failure::of(&error);
     match &error {
@@ -207,7 +208,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// Checks that the controller has not released the arm.
+/// Returns an error if the controller is in the state Error and no longer holds the arm.
 fn without_error(status: Option<Status>) -> Result<(), Failure> {
     match status {
         Some(status) if status.state == ControllerState::Error => {

@@ -26,7 +26,7 @@ pub(super) fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-/// Output files, opened before any other step.
+/// Output files of the command. The command opens these files before any other step.
 struct Files {
     recording: Option<OutputFile>,
     report: Option<OutputFile>,
@@ -95,7 +95,8 @@ impl Read {
         })
     }
 
-    /// Describes the replayed part in one line. Adds a line for each reason why a part is missing.
+    /// Describes the replayed part of the log in one line. Adds a line for each reason why a part of the log is
+    /// missing.
     fn extent(&self) -> Vec<String> {
         let replayed = &self.0.replayed;
         let verdict = match &replayed.difference {
@@ -157,7 +158,7 @@ impl Read {
         lines.join("\n")
     }
 
-    /// Returns the events as a table for the report page.
+    /// Returns the events of the log as a table for the report page.
     fn facts(&self) -> Vec<Facts> {
         let rows =
             self.0.story.events.iter().map(|event| (format!("{:.3} s", event.time_s), event.text.clone()));

@@ -1,4 +1,4 @@
-//! `jtc clear`, `gripper`, `recover`: short commands that change the controller's state.
+//! `jtc clear`, `gripper`, `recover`: short commands that change the state of the controller.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,16 +17,16 @@ use crate::limits;
 use crate::operator::ended_at_once;
 use crate::progress::Progress;
 
-/// Time within which a request to clear errors takes effect.
+/// Time after which a request to clear errors has taken effect.
 const EFFECT: Duration = Duration::from_millis(300);
 
-/// Clears errors, and reports the remaining errors.
+/// Clears errors, and reports the errors that remain.
 pub(super) fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     if args.occurred {
         session.clear_occurred()?;
     }
-    // The remaining errors are reported below.
+    // The command reports the errors that remain after this request.
     session.clear_if_possible(true, ALL_NODES)?;
     let end = session.now() + EFFECT;
     let mut s = session.next_status()?;
@@ -44,7 +44,7 @@ pub(super) fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     if s.errors == 0 { Ok(()) } else { Err(Failure::shown(ErrorKind::Device)) }
 }
 
-/// Switches the pump.
+/// Switches the vacuum pump of the gripper.
 pub(super) fn gripper(args: &GripperArgs, out: &Output) -> Result<(), Failure> {
     let on = args.pump == Switch::On;
     args.link.session()?.gripper(on)?;
@@ -111,8 +111,8 @@ pub(super) fn recover(args: &RecoverArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the failure of a recovery. The hint does not suggest `jtc recover` again, because the user must find the cause of the error
-/// first.
+/// Returns the failure of a recovery. The hint does not suggest `jtc recover` again, because the user must first find the cause of the
+/// error.
 fn not_itself(e: Error) -> Failure {
     let failure = Failure::of(&e);
     let recovers = [Action::Recover, Action::RecoverWithArm, Action::RecoverWithDefaults];

@@ -1,4 +1,5 @@
-//! `jtc monitor`: live view of the controller. On a terminal the command shows a full view, otherwise it prints one line per status.
+//! `jtc monitor`: live view of the controller. On a terminal, the command shows a full view. Without a terminal, the command prints
+//! one line per status.
 
 mod joints;
 mod view;
@@ -15,12 +16,12 @@ use crate::args::MonitorArgs;
 use crate::link::LinkPort;
 use view::View;
 
-/// Shortest interval between two updates of the view. At any rate of statuses, 25 updates per second are enough.
+/// Shortest interval between two updates of the view. For any rate of statuses, 25 updates per second are sufficient.
 const PICTURE: Duration = Duration::from_millis(40);
-/// Time without a status after which the last values are shown as outdated.
+/// Time without a status after which the view shows the last values as outdated.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// Shows statuses until `q`, Ctrl-C, or until the requested number of statuses is reached.
+/// Shows statuses until the user types `q` or Ctrl-C, or until the requested number of statuses has arrived.
 pub(super) fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
@@ -109,7 +110,7 @@ fn live(
     Ok(())
 }
 
-/// Stops the motion on its path and returns the result.
+/// Stops the motion on its path and returns the result as text.
 fn stop_motion(session: &mut Session<LinkPort>) -> String {
     match session.stop() {
         Ok(()) => "stopping on the path".into(),

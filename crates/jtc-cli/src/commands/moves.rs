@@ -11,7 +11,7 @@ use super::plan::note_low_margin;
 use super::run::{Course, perform};
 use crate::args::{MoveArgs, Target};
 
-/// Plans the move once the position of the arm is known, and executes the move.
+/// Plans the move when the position of the arm is known, and executes the move.
 pub(super) fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     if let Some(percent) = args.speed.filter(|percent| !(1.0..=100.0).contains(percent)) {
         return Err(Failure::nothing_sent(PlanError::Speed { percent, most: 100.0 }));
@@ -63,7 +63,7 @@ pub(super) fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, load, Some(&mut make), out)
 }
 
-/// Returns the target of the move.
+/// Returns the target of the move from the options of the command.
 fn target(args: &MoveArgs, arm: &Arm) -> Result<kinematics::Target, Failure> {
     let joints = match (&args.to, args.to_flange) {
         (Some(Target::Joints(q)), _) if args.deg => q.map(f64::to_radians),
@@ -85,7 +85,7 @@ fn coldest(status: &jtc_wire::Status) -> f64 {
     measured.fold(COLD, f64::min)
 }
 
-/// Returns the failure of an impossible move.
+/// Returns the failure for a move that is not possible.
 fn refused(error: &PlanError, name: &str) -> Failure {
     let message = format!("no move to {name}: {}", error.of_move());
     let failure = Failure { message, ..Failure::of(error) };

@@ -20,7 +20,8 @@ pub(super) fn note_warnings(arm: &Arm, out: &Output) {
     }
 }
 
-/// Returns the arm file option in the form in which the user can add it to a command. Returns an empty text for the built-in arm.
+/// Returns the arm file option in the form in which the user can add the option to a command. Returns an empty text for the
+/// built-in arm.
 pub(super) fn typed_option(path: Option<&Path>) -> String {
     path.map_or(String::new(), |path| format!(" --arm {}", typed(path)))
 }

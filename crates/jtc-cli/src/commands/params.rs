@@ -64,8 +64,8 @@ fn push(
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = labels::missing_parameters(status.jtc_init);
-    // The listed parameters were not sent, but the controller has values for them. The controller has received these values earlier from an
-    // unknown source.
+    // The command has not sent the listed parameters, but the controller has values for them. The controller has received these values
+    // earlier from an unknown source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
@@ -104,13 +104,14 @@ fn push(
     Ok(())
 }
 
-/// Waits for the result of the trial of new gains on an arm under torque. Returns `true` if the controller has tested the gains.
+/// Waits for the result of the controller's trial of new gains on an arm with torque. Returns `true` if the controller has
+/// tested the gains.
 pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
     Ok(session.await_trial(|| out.note("the controller tries the gains for 2 s"))?)
 }
 
-/// Refuses gains with which the arm would be unstable. The check uses the arm of the files. Without it, the check uses the arm of the
-/// controller.
+/// Rejects gains that would make the arm unstable. The check uses the arm in the files. If the files contain no arm, the check
+/// uses the arm of the controller.
 fn check_gains(
     read: &ParameterFile,
     set: &ParameterSet,
@@ -119,7 +120,7 @@ fn check_gains(
     let Some(pid) = set.pid else { return Ok(()) };
     let arm = match &read.arm {
         Some(arm) => Some(arm.clone()),
-        // If the arm cannot be read yet, its drives do not produce torque yet.
+        // If the controller cannot report its arm yet, its drives do not produce torque yet.
         None if session.info()?.is_some() => session.device_arm().ok(),
         None => None,
     };
@@ -219,7 +220,7 @@ fn as_text(set: &ParameterSet) -> String {
     text
 }
 
-/// Loads the files. Values of later files replace values of earlier files. Prints warnings on stderr.
+/// Loads the parameter files. Values of later files replace values of earlier files. Prints warnings on stderr.
 fn load(files: &[PathBuf], out: &Output) -> Result<ParameterFile, Failure> {
     let read = ParameterFile::load_all(files)?;
     for warning in &read.warnings {

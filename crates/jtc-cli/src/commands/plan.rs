@@ -1,4 +1,4 @@
-//! `jtc plan`: plans a trajectory through waypoints that is as fast as the limits allow.
+//! `jtc plan`: plans the fastest trajectory through waypoints that the limits allow.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use super::job::{stem, typed};
 use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
-/// Message if a blend is specified but the path has no corners to round.
+/// Message if the user specifies a blend but the path has no corners that the planner could round.
 const NO_LINES: &str = "--blend-m has no effect: it rounds corners between lines and arcs, and this motion \
     has no lines or arcs; use --line, or a column `leg`";
 
@@ -33,7 +33,7 @@ pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     named_arm::note_warnings(&arm, out);
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
-    // The motion is planned before any file is opened, so that no file is created if a line is impossible.
+    // The command plans the motion before it opens any file, so that it does not create a file if a line is impossible.
     let blend = if args.deg { args.blend.to_radians() } else { args.blend };
     let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
     let way = WaypointPath::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
@@ -78,7 +78,7 @@ pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Describes the deviation of the flange from the straight line between two poses.
+/// Describes the distance of the flange from the straight line between two poses.
 fn off_the_line(aside: Aside) -> String {
     let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
     format!(
@@ -88,7 +88,8 @@ fn off_the_line(aside: Aside) -> String {
     )
 }
 
-/// Checks that the output has the file name extension of CSV. With the extension of another format, most commands could not read the file.
+/// Checks that the output file has the file name extension of CSV. With the extension of another format, most commands could not read the
+/// file.
 fn readable(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if ["mcap", "yaml", "yml", "json", "toml", "urdf", "xml", "html"].contains(&ending.as_str()) {
@@ -107,12 +108,12 @@ fn readable(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Adds to an error the line numbers of its waypoints in the file.
+/// Adds the line numbers of the waypoints in the file to an error.
 fn located(error: &PlanError, file: &WaypointFile) -> Failure {
     Failure { message: file.located(error), ..Failure::of(error) }
 }
 
-/// Like [`located`], but also for waypoints for which no path exists.
+/// Like [`located`], but also for waypoints between which no path exists.
 fn unplanned(error: &WaypointError, file: &WaypointFile) -> Failure {
     match error {
         WaypointError::Route(e) => located(e, file),
@@ -166,8 +167,8 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
     });
 }
 
-/// Returns the time for which each limit of a joint is the limiting constraint. Returns a dash if the joint is never the limiting
-/// constraint.
+/// Returns the time for which each limit of a joint is the limiting constraint of the motion. Returns a dash if no limit of the
+/// joint is ever the limiting constraint.
 fn binds(binding: &[Bound], joint: Joint) -> String {
     let mut limits: Vec<(&str, f64)> = Vec::new();
     for bound in binding.iter().filter(|bound| bound.joint == joint) {
@@ -182,7 +183,7 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
     if words.is_empty() { "-".into() } else { words.join(", ") }
 }
 
-/// Returns the smallest torque margin of a motion as a line. Returns an empty text if no margin was computed.
+/// Returns the smallest torque margin of a motion as a line of text. Returns an empty text if no margin was computed.
 pub(super) fn margin_line(margin: Option<TorqueMargin>) -> String {
     margin.map_or(String::new(), |margin| format!("{margin}\n"))
 }
@@ -194,7 +195,7 @@ pub(super) fn note_low_margin(margin: Option<TorqueMargin>, out: &Output) {
     }
 }
 
-/// Returns the requested margin and the remaining margin as a text.
+/// Describes the torque margin that the user requested, and the torque margin of the planned motion.
 fn margin_words(planned: &Planned, percent: f64) -> String {
     let asked = format!("{percent} % of each limit");
     match planned.verdict.margin {

@@ -25,7 +25,7 @@ pub(super) fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output) -> Result<(), Failure> {
-    // The name and the file are checked before a request to the controller, because these checks do not need the controller.
+    // The command checks the name and the file before it sends a request, because these checks do not need the controller.
     let arm = Arm::load(file)?;
     if arm.poses.contains_key(name) && !overwrite {
         let path = file.to_owned();
@@ -35,7 +35,7 @@ fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output)
     save_pose(file, name, &position, overwrite)?;
     let arm = Arm::load(file)?;
     let saved = arm.poses.get(name).copied().unwrap_or(position);
-    // A pose outside the limits is still saved, because the limits may be wrong.
+    // The command still saves a pose outside the limits, because the limits may be wrong.
     if let Err(outside) = arm.pose(name) {
         out.note(format!("warning: {outside}: the arm cannot move there"));
     }

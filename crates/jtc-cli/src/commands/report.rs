@@ -13,7 +13,7 @@ use super::run_report;
 use crate::args::ReportArgs;
 use cli_kit::OutputFile;
 
-/// Writes the report page and prints the results per joint.
+/// Writes the report page and prints the results of each joint.
 pub(super) fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let page = args.out.clone().unwrap_or_else(|| args.file.with_extension("html"));
     let picture = page.with_extension("svg");
@@ -36,7 +36,7 @@ pub(super) fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let info = match (arm, recording.info) {
         (Some(arm), _) => run_report::info(&arm, &args.file.display().to_string(), &name, 0),
         (None, Some(info)) => info,
-        // A CSV file does not contain limits.
+        // A CSV recording does not contain the limits of the arm.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
     let failure = digest.failure(&info, &recording.ending);

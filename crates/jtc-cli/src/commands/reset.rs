@@ -11,9 +11,10 @@ use crate::ask::confirm;
 
 /// Bit mask of all joints and the gripper.
 const ALL: u8 = 0x7F;
-/// The gripper's bit.
+/// Bit of the gripper in the bit mask.
 const GRIPPER: u8 = 1 << 6;
-/// Resets the specified nodes. If the arm is held, the user must confirm the reset. Refuses to reset a joint while the arm moves.
+/// Resets the specified nodes. If the controller holds the arm, the user must confirm the reset. Rejects a reset of a joint while
+/// the arm moves.
 pub(super) fn reset(args: &ResetArgs, out: &Output) -> Result<(), Failure> {
     let nodes = nodes(args)?;
     let reset = labels::node_names(nodes);
@@ -44,7 +45,8 @@ fn nodes(args: &ResetArgs) -> Result<u8, Failure> {
     Ok(nodes)
 }
 
-/// Returns the failure if the argument is a bit mask. In older versions the argument was a bit mask, in which 3 meant joints 1 and 2.
+/// Returns the failure if the argument is a bit mask. In older versions the argument was a bit mask, and the value 3 meant joints 1
+/// and 2.
 fn of_mask(text: &str) -> Failure {
     let value = match text.strip_prefix("0x").or(text.strip_prefix("0X")) {
         Some(hex) => u8::from_str_radix(hex, 16).ok(),

@@ -1,4 +1,5 @@
-//! `jtc traj resume`: resumes a motion after a pause. Checks the remainder of the motion first, if the trajectory is known.
+//! `jtc traj resume`: resumes a motion after a pause. If the trajectory is known, the command first checks the remainder of
+//! the motion.
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::error::MotionError;
@@ -20,7 +21,7 @@ pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = session.fresh_status()?;
-    // In any other state, the session refuses the request and reports the error.
+    // In any other state, the session rejects the request and reports the error.
     if status.trajectory == TrajectoryState::Pause {
         match &mut job {
             Some(job) => check_rest(job, args.check.arm.is_none(), &mut session, &status)?,
@@ -33,7 +34,7 @@ pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks the remainder of the trajectory after the pause with the limits and the payload of the controller.
+/// Checks the remainder of the trajectory after the pause, with the limits and the payload of the controller.
 fn check_rest(
     job: &mut Job,
     arm_of_device: bool,
@@ -67,7 +68,8 @@ fn check_rest(
     })
 }
 
-/// Prints that the remainder is not checked. The program did not load the motion, and a controller cannot return its trajectory.
+/// Prints that the command does not check the remainder of the motion. The program did not load the motion, and a controller
+/// cannot return its trajectory.
 fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {

@@ -1,4 +1,4 @@
-//! `jtc traj run`, and the steps that all motion commands share (check, upload, execute, follow, report).
+//! `jtc traj run`, and the steps that all motion commands share (check, upload, execute, wait, report).
 
 mod approach;
 mod conclude;
@@ -25,36 +25,36 @@ use conclude::conclude;
 use outputs::Outputs;
 use terminal::{Terminal, cancelled};
 
-/// Settings of a motion, for all commands that execute a motion.
+/// Settings of a motion that all motion commands use.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// Options for the link, for output files, and for accepted risks.
+    /// Options for the link, for output files, and for risks that the user accepts.
     pub execute: ExecuteArgs,
-    /// Name in recordings.
+    /// Name of the motion in recordings.
     pub name: String,
-    /// Name of the trajectory to whose start an approach moves, as the user typed it.
+    /// Name of the trajectory, as the user typed it. An approach moves to the start of this trajectory.
     pub words: String,
-    /// Files that the command reads. Output files must not replace them.
+    /// Files that the command reads. Output files must not replace these input files.
     pub inputs: Vec<PathBuf>,
-    /// `true` if the user has specified an arm file. In this case, the file must match the arm of the controller.
+    /// `true` if the user has specified an arm file. In this case, the arm file must match the arm of the controller.
     pub arm_named: bool,
-    /// `true` if the command first moves the arm to the first point when it is elsewhere.
+    /// `true` if the command first moves the arm to the first point of the trajectory, unless the arm is already there.
     pub approach: bool,
-    /// Speed of a move or an approach in %, if the user has specified it.
+    /// Speed of a move or an approach in %, if the user has specified the speed.
     pub speed: Option<f64>,
-    /// Name of the speed option; empty if the command has no such option.
+    /// Name of the speed option. Empty if the command has no speed option.
     pub speed_option: &'static str,
     pub points_per_segment: Option<usize>,
     /// Number of runs of the motion.
     pub repeat: u32,
 }
 
-/// Function that creates the trajectory of a job. The function is called when the position of the arm and the speed of a move on this
-/// controller are known.
+/// Function that creates the trajectory of a job. The command calls the function when it knows the position of the arm and the speed
+/// of a move on this controller.
 pub(super) type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {
-    /// Returns the settings for a trajectory file.
+    /// Returns the settings for the run of a trajectory file.
     pub(super) fn of(args: &RunArgs) -> Self {
         Self {
             execute: args.execute.clone(),
@@ -85,7 +85,8 @@ pub(super) fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
 }
 
-/// Runs a job. The motion is the unchanged trajectory of a file, or it is planned when the position of the arm is known.
+/// Runs the motion of a job. This motion is the unchanged trajectory of a file, or the command plans it when it knows
+/// the position of the arm.
 pub(super) fn perform(
     course: &Course,
     load: impl FnOnce(&Output) -> Result<Job, Failure>,
@@ -94,14 +95,15 @@ pub(super) fn perform(
 ) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     if let Some(path) = &course.execute.files.record {
-        Format::of(path)?; // a wrong ending is reported before anything moves
+        Format::of(path)?; // the command reports a wrong file name extension before the arm moves
     }
     let mut job = load(out)?;
     drive(course, &mut job, make, &progress, out).map_err(|failure| job.named(failure))
 }
 
-/// Checks that the controller's arm matches the arm of the job (J-55). If the user has specified an arm file, a difference is refused.
-/// Otherwise, the job uses the arm of the controller. After the check, the job uses the settings of the controller.
+/// Checks that the arm of the controller matches the arm of the job (J-55). If the user has specified an arm file, the function
+/// rejects a difference. Otherwise, the job uses the arm of the controller. After the check, the job uses the settings of the
+/// controller.
 fn match_device(
     session: &mut Session<LinkPort>,
     job: &mut Job,
@@ -127,8 +129,8 @@ fn match_device(
             }
         }
     }
-    // If there are no differences, these settings are the settings of the arm file. Rotor values that the file does not contain come from
-    // the controller.
+    // If the two arms do not differ, these settings are the settings of the arm file. Rotor values that the arm file does not contain
+    // come from the controller.
     job.config = job.arm.config_on_device(&job.device);
     if job.device.payload.is_there() {
         out.note(format!(
@@ -140,7 +142,8 @@ fn match_device(
     Ok(())
 }
 
-/// Checks a motion that is known before the connection to the controller. A repeated motion must end at its start point.
+/// Checks a motion that the command knows before it connects to the controller. A repeated motion must end at its start
+/// point.
 fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {

@@ -7,7 +7,7 @@ use jtc_host::report::{RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 use jtc_wire::{Joint, Status, TrajectoryState};
 
-/// Returns the description that a recording of this arm contains.
+/// Returns the description of the arm and the motion that a recording contains.
 pub(super) fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
     RecordingInfo {
         source: source.to_owned(),
@@ -17,7 +17,7 @@ pub(super) fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64
     }
 }
 
-/// Returns the text of the first failure, if a failure occurred, and the results.
+/// Returns the text of the first failure, if a failure occurred, and the results of each joint.
 pub(super) fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
     let Some(failure) = failure else { return figures(summary) };
     let rows: Vec<Vec<String>> = failure.rows().into_iter().map(|row| row.to_vec()).collect();
@@ -62,14 +62,14 @@ fn figure(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".into(), |v| cli_kit::figure(v, digits))
 }
 
-/// Returns the result of an upload as an event.
+/// Returns the result of an upload as a JSON event.
 pub(super) fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
     let mut value = serde_json::to_value(upload).unwrap_or_default();
     value["phase"] = phase.into();
     value
 }
 
-/// Describes the link in one line.
+/// Describes the upload and the statistics of the link in one line.
 pub(super) fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
     let share = upload.line_share_percent().map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
     format!(
@@ -78,7 +78,8 @@ pub(super) fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String 
     )
 }
 
-/// Describes a motion in one line below the progress bar, with its state and the joint that is closest to a limit.
+/// Describes a motion in one line below the progress bar. The line contains the state and the joint that is closest to
+/// a limit.
 pub(super) fn motion_line(s: &Status) -> String {
     let what = match s.trajectory.known() {
         Some(TrajectoryState::Stop) => "stopped",

@@ -31,7 +31,7 @@ use crate::args::ServeArgs;
 /// Longest wait until a motion has stopped when the agent ends.
 const STOPPING: Duration = Duration::from_secs(5);
 
-/// Serves the port until SIGINT or SIGTERM. Stops a motion on its path before the agent ends.
+/// Serves the port until SIGINT or SIGTERM. Before the agent ends, it stops a motion on its path.
 pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let token_file = args.link.token_file.clone().or_else(default_token_file).ok_or_else(|| {
         Failure::usage("no folder for a token file: neither XDG_STATE_HOME nor HOME is set")
@@ -64,7 +64,7 @@ pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
     let log = Arc::new(Mutex::new(log));
     let left = if args.sim { None } else { keep_policies(&name, &log, out)? };
-    // In another directory, a relative name would refer to a different port.
+    // In another working directory, a relative name would refer to a different port.
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let witness = recordings.as_mut().and_then(Prepared::witness);
@@ -89,7 +89,7 @@ pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         token_file: std::path::absolute(&token_file)?,
         certificate: args.tls_cert.as_deref().map(std::path::absolute).transpose()?,
     };
-    // Without the registration, the user can still specify the address as an option of each command.
+    // Without the registration, the user can still specify the address of the agent as an option of each command.
     let registration = register(&registered).ok().flatten();
     if !listen.ip().is_loopback() && tls.is_none() {
         out.note(
@@ -127,7 +127,7 @@ pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let gone = line.lost();
     let rests = gone.is_none() && come_to_rest(&line, out);
     drop(recorder);
-    // The status is read again, because ending the recording may have taken several seconds.
+    // The agent reads the status again, because completing the recording may have taken several seconds.
     let rests = rests && line.with(|line, _| line.status().is_some_and(|(_, status)| !moves(status)));
     owner.end();
     if let Some(keeper) = keeper.filter(|_| rests) {
@@ -158,17 +158,17 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     Ok(Some(listener))
 }
 
-/// Returns `true` if the status shows that the arm moves or can be guided by hand.
+/// Returns `true` if the status shows that the arm moves, or that a user can guide the arm by hand.
 fn moves(status: &Status) -> bool {
     status.is_executing() || status.state == ControllerState::Teaching
 }
 
-/// Stops a motion, because no client can stop it after the end of the agent. Also ends Teaching, so that the controller holds the arm.
-/// Returns `true` if the controller reports that the arm is at rest and held.
+/// Stops a motion, because no client can stop the motion after the end of the agent. The function also ends Teaching, so that the
+/// controller holds the arm. Returns `true` if the controller reports that the arm is at rest and held.
 fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));
-    // Only statuses that arrive after this point are used.
+    // The agent uses only statuses that arrive after this point.
     let rests = || {
         line.with(|line, _| {
             line.is_idle() && line.status().is_some_and(|(at, status)| *at > began && !moves(status))
@@ -193,8 +193,8 @@ fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     })
 }
 
-/// Starts to store the client whose policy applies to a motion. The next agent uses this policy if this agent is killed. Also returns the
-/// policy that a killed agent has stored, which `act_on` applies.
+/// Starts to store the client whose policy applies to a motion. If this agent is killed, the next agent uses the stored policy. The
+/// function also returns the policy that a killed agent has stored; `act_on` applies this policy.
 fn keep_policies(
     port: &str,
     log: &Arc<Mutex<CommandLog>>,
@@ -207,7 +207,8 @@ fn keep_policies(
         );
         return Ok(None);
     };
-    // The port is stored under the name that the user has specified, because a device may get another number after it is reconnected.
+    // The agent stores the port under the name that the user has specified, because a device may get another number after it is
+    // reconnected.
     let port = std::path::absolute(port).map_or(port.to_owned(), |path| path.display().to_string());
     Ok(Some(Keeper::begin(&state.join("openjtc"), &port, notices(log, out, "warning"))?))
 }
@@ -222,7 +223,7 @@ fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog
     keeper
 }
 
-/// Writes notices about recordings and policies to the command log. Notices for users are also printed.
+/// Writes notices about recordings and policies to the command log. The agent also prints notices for users.
 fn notices(log: &Arc<Mutex<CommandLog>>, out: &Output, kind: &'static str) -> Box<dyn FnMut(Notice) + Send> {
     let (log, out) = (log.clone(), *out);
     Box::new(move |notice| {
@@ -241,7 +242,7 @@ fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + u
     }
 }
 
-/// Returns the port, and the arm that is used if the controller cannot report its arm.
+/// Returns the port, and the arm that the agent uses if the controller cannot report its arm.
 fn port(args: &ServeArgs, out: &Output) -> Result<(Box<dyn Port + Send>, Arm), Failure> {
     if !args.sim {
         let arm = named_arm::load(args.arm.as_deref())?;

@@ -4,8 +4,8 @@ use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
 
-/// Notice about the simulated brakes, which hold the arm while the drives produce no torque. The next constants are notices about an arm on
-/// a stand and about an arm without support.
+/// Notice about the simulated brakes, which hold the arm while the drives produce no torque. The next two constants are notices about an
+/// arm on a stand and about an arm without support.
 #[cfg(unix)]
 const BRAKES: &str =
     "note: simulated holding brakes hold the arm after an error; the known drives have no brakes";
@@ -33,7 +33,7 @@ pub(super) fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     use cli_kit::Stop;
 
     if let Some(path) = &args.record {
-        Format::of(path)?; // a wrong ending is reported before anything runs
+        Format::of(path)?; // the command reports a wrong file name extension before the simulation starts
     }
     let stop = Stop::listen()?;
     let kept = args.store.as_deref().map(kept).transpose()?.flatten();
@@ -89,7 +89,7 @@ pub(super) fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the image of the stored arm from the file, if the file exists.
+/// Returns the image of the stored arm from the file. Returns `None` if the file does not exist.
 #[cfg(unix)]
 fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
     let unreadable = |what: String| {
@@ -108,7 +108,7 @@ fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
     let text =
         std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    // Files of hand motions are in the directory of the fault file that refers to them.
+    // Files of hand motions are in the same directory as the fault file that refers to them.
     let load = |file: &str| crate::serve::hand(&path.with_file_name(file));
     jtc_sim::FaultPlan::from_toml_with(&text, load)
         .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))

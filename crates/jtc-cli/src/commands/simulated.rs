@@ -8,9 +8,9 @@ use jtc_sim::SimConfig;
 
 use super::named_arm;
 
-/// Returns the specified arm or the built-in arm, and the simulated world of this arm. Prints missing parameters of the arm file on stderr.
-/// `kept` is the image of the arm that the controller has stored. Without this image, the controller has stored the specified arm if the
-/// arm file is complete.
+/// Returns the specified arm or the built-in arm, and the simulated world of this arm. Prints the names of missing parameters of the arm
+/// file on stderr. `kept` is the image of the arm that the controller has stored. Without this image, the controller has stored the
+/// specified arm if the arm file is complete.
 pub(super) fn simulated(
     path: Option<&Path>,
     kept: Option<Vec<u8>>,
@@ -32,7 +32,7 @@ pub(super) fn simulated(
     };
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored.is_some() {
-        // Like a board, the controller reads its arm from memory and receives it in frames.
+        // Like a board, the controller reads its arm from the stored image, and receives a new arm in frames.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
     }
     Ok((arm, config))

@@ -1,4 +1,4 @@
-//! `jtc status`, and a status as text and as JSON for all commands that show a status.
+//! `jtc status`, and the text and JSON of a status for all commands that show a status.
 
 use cli_kit::{Failure, Output, figure, table};
 use host_kit::FrontEnd;
@@ -110,7 +110,7 @@ pub(super) fn gripper_state(s: &Status) -> &'static str {
     }
 }
 
-/// Formats a status as text, with the cause of a held stop if the controller reports it.
+/// Formats a status as text. The text contains the cause of a held stop if the controller reports the cause.
 fn text(s: &Status, reactions: Option<&Reactions>) -> String {
     let stop = reactions.filter(|_| s.is_held_stop()).and_then(|reactions| reactions.stop.as_ref());
     let mut text = format!(
@@ -188,7 +188,7 @@ mod tests {
         assert!(told.contains("next: remove what pushes the joint"), "{told}");
         let untold = text(&s, None);
         assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
-        // A held stop is not shown after its errors were cleared.
+        // The text does not contain a held stop after the errors of the stop were cleared.
         assert!(!text(&Status { errors: 0, ..s }, Some(&reactions)).contains("held stop"));
     }
 

@@ -20,13 +20,13 @@ use crate::operator::ended_at_once;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
 
-/// Default of the largest deviation between waypoints and motion, rad.
+/// Default of the largest deviation between the waypoints and the motion, rad.
 const TOLERANCE: f64 = 0.01;
 
 /// Runs a `jtc teach` command.
 pub(super) fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
-        // The events begin here, so that an error at opening a file is also reported as an event.
+        // The event stream begins here, so that the command also reports an error at opening a file as an event.
         out.stream()?;
     }
     match command {
@@ -83,13 +83,13 @@ fn record(
     progress.watch(&mut session);
     let status = session.fresh_status()?;
     if stop.asked() {
-        // The user no longer guides the arm, so Teaching would release an arm without support.
+        // The user no longer guides the arm, so an arm in Teaching would have no support.
         let message = "cancelled before teaching was switched on".into();
         return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
     }
     let was_on = status.state == ControllerState::Teaching;
-    // The flag is set before the request, because the controller may accept the request even if its confirmation is
-    // lost.
+    // The command sets the flag before the request, because the controller may accept the request even if its
+    // confirmation is lost.
     teaching.store(true, Ordering::Relaxed);
     if !was_on {
         session.teach(true)?;
@@ -117,7 +117,7 @@ fn record(
         // The controller holds the arm, and the user can release it.
         teaching.store(false, Ordering::Relaxed);
     }
-    // The recording is completed first, even if the link is lost.
+    // The command completes the recording first, even if the link is lost.
     let written = lost.map_or_else(|| finish(taught, thin, out), Err);
     recorded.map_err(still_teaching)?;
     if !was_on {
@@ -128,7 +128,7 @@ fn record(
 }
 
 /// Handles Ctrl-C and other signals. The first signal requests the end of the command. The second signal ends the command at once and
-/// reports the state at that moment.
+/// prints the state at that moment.
 fn stop_at_once_with(
     out: Output,
     teaching: Arc<AtomicBool>,

@@ -1,4 +1,5 @@
-//! `jtc traj check`, `info`, `speed`: commands for trajectories in files, and for the trajectory that is executed.
+//! `jtc traj check`, `info`, `speed`: commands for trajectories in files, and for the trajectory that the controller
+//! executes.
 
 use std::path::Path;
 
@@ -51,7 +52,7 @@ fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
     run::perform(&run::Course::of(args), load, None, out)
 }
 
-/// Shows or sets the speed override.
+/// Shows or sets the speed override of the motion.
 fn speed(percent: Option<f64>, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(percent) = percent
         && !(5.0..=100.0).contains(&percent)
@@ -99,7 +100,7 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        // If the check fails, the command prints the problems and not the margin.
+        // If the check fails, the command prints the problems but not the torque margin.
         let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
         format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.plain(FrontEnd::Command))
     });

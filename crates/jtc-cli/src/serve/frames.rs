@@ -1,21 +1,22 @@
-//! Splits the controller's bytes into complete statuses, so that a host that connects later never receives an incomplete status.
+//! Splits the bytes of the controller into complete statuses, so that a host that connects later never receives an incomplete
+//! status.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use jtc_wire::{FRAME_MAX, HEADER, STATUS_LEN};
 
-/// First bytes of each status.
+/// First bytes of each status frame.
 const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8];
 
 /// Duration of the silence that ends a frame (J-03).
 pub(super) const GAP: Duration = Duration::from_millis(5);
-/// Smallest size of the first part if the operating system splits a long write to a terminal, bytes.
+/// Smallest size in bytes of the first part of a long write to a terminal, if the operating system splits the write.
 const PIECE: usize = 2048;
 /// Transmission time of a byte on a serial line at 115,200 Bd.
 const BYTE: Duration = Duration::from_micros(87);
 
-/// Received bytes, and the complete frames.
+/// Bytes of an incomplete frame, and the complete frames.
 #[derive(Default)]
 pub(super) struct Frames {
     partial: Vec<u8>,
@@ -23,7 +24,8 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Adds received bytes. Bytes that are not a status (from a disturbed line) are passed on unchanged.
+    /// Adds bytes that the controller has sent. The function passes on bytes that are not a status (from a disturbed
+    /// line) unchanged.
     pub(super) fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let n = self.partial.len();
@@ -54,16 +56,17 @@ impl Frames {
         self.whole.is_empty()
     }
 
-    /// Removes and returns the oldest frame.
+    /// Removes and returns the oldest complete frame.
     pub(super) fn pop(&mut self) -> Option<Vec<u8>> {
         self.whole.pop_front()
     }
 }
 
-/// Tracker of the bytes of the host, which determines if a frame is incomplete and since when its next byte is missing.
+/// Tracker of the bytes that the host sends. The tracker determines if a frame is incomplete, and since when its next
+/// byte is missing.
 ///
-/// With `--speed max`, and while the simulator catches up after a delay, virtual time passes faster than the host's time. A gap between two
-/// parts of a frame must then not become longer than it was for the host.
+/// With `--speed max`, and while the simulator catches up after a delay, virtual time passes faster than the time of the host. A gap
+/// between two parts of a frame must not become longer in virtual time than it was for the host.
 ///
 /// A busy operating system can suspend a host within one write for longer than the silence that ends a frame. On a real serial line, the
 /// adapter would still be sending the bytes in its buffer. In a long frame, the silence therefore begins only after a real serial line
@@ -74,14 +77,14 @@ pub(super) struct Incoming {
     come: usize,
     /// Number of missing bytes of the current frame.
     missing: usize,
-    /// `true` if the received bytes continue a frame.
+    /// `true` if the bytes that were received last continue a frame.
     continued: bool,
-    /// Time at which the last byte was sent on the simulated line. For a long frame, the value is the time on a real serial line.
+    /// Time at which the simulated line sent the last byte. For a long frame, the value is the time on a real serial line.
     heard: Instant,
 }
 
 impl Incoming {
-    /// Creates the state before the first byte.
+    /// Creates the tracker before the first byte of the host.
     pub(super) fn new(now: Instant) -> Self {
         Self { head: Vec::new(), come: 0, missing: 0, continued: false, heard: now }
     }
@@ -116,7 +119,7 @@ impl Incoming {
         };
     }
 
-    /// Records that bytes are being sent on the simulated line at `now`.
+    /// Records that the simulated line is sending bytes at `now`.
     pub(super) fn carries(&mut self, now: Instant) {
         self.heard = self.heard.max(now);
     }
@@ -127,7 +130,7 @@ impl Incoming {
     }
 
     /// Returns how long the host has been silent within a frame, including the moment at which the silence ends. Returns `None` outside a
-    /// frame, or after a silence that is too long for the frame to be completed.
+    /// frame, or after a silence that is too long for the host to complete the frame.
     pub(super) fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);
@@ -205,7 +208,7 @@ mod tests {
         let mut incoming = Incoming::new(start);
         let mut frame = vec![0; 9006];
         frame[..4].copy_from_slice(&[HEADER, 0x04, 0x23, 0x2E]);
-        // The host is suspended after it has sent 2,048 bytes, which take 178 ms on a serial line.
+        // The operating system suspends the host after it has sent 2,048 bytes, which take 178 ms on a serial line.
         incoming.push(&frame[..2048], start);
         assert_eq!(incoming.silence(start), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
@@ -216,7 +219,8 @@ mod tests {
         incoming.carries(later(171));
         assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
-        // If the host does not send the remaining bytes, the later time counts as silence. For a short frame, the simulator does not wait.
+        // If the host does not send the remaining bytes, the time after the transmission counts as silence. For a short frame, the
+        // simulator does not wait.
         incoming.push(&frame[..2048], later(170));
         assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
         incoming.push(&frame[..2047], later(600));

@@ -13,19 +13,19 @@ use rustix::io::Errno;
 use rustix::pty::OpenptFlags;
 use rustix::termios::{LocalModes, OptionalActions, OutputModes, QueueSelector};
 
-/// Reason why the pseudo-terminal cannot be used.
+/// Reason why the simulator cannot use the pseudo-terminal.
 #[derive(Debug)]
 pub(crate) enum PtyError {
-    /// Existing file at the path that must not be replaced.
+    /// A file exists at the path, and the simulator must not replace this file.
     Taken {
-        /// The requested path.
+        /// Path that the user requested.
         path: PathBuf,
         /// Kind of the existing file.
         what: &'static str,
     },
-    /// Operation that the operating system refused.
+    /// The operating system rejected an operation.
     Io {
-        /// Failed operation.
+        /// Operation that failed.
         what: &'static str,
         /// Error of the operating system.
         source: io::Error,
@@ -57,8 +57,8 @@ pub(crate) struct Pty {
 }
 
 impl Pty {
-    /// Creates a pseudo-terminal in raw mode, with `link` as a symbolic link to it. Replaces a link that an earlier simulator has created,
-    /// but does not replace other files.
+    /// Creates a pseudo-terminal in raw mode, with `link` as a symbolic link to the terminal. Replaces a link that an earlier simulator
+    /// has created, but does not replace other files.
     pub(crate) fn open(link: Option<&Path>) -> Result<Self, PtyError> {
         if let Some(link) = link {
             check_free(link)?;
@@ -69,14 +69,14 @@ impl Pty {
         Ok(pty)
     }
 
-    /// Returns the path that a host opens.
+    /// Returns the path of the pseudo-terminal that a host opens.
     pub(crate) fn name(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.slave)
     }
 
     fn put_link(&self) -> Result<(), PtyError> {
         let Some(link) = &self.link else { return Ok(()) };
-        // Renaming the new link replaces the old link, so that a link always exists.
+        // Renaming the new link replaces the old link in one step, so that a link always exists.
         let name = link.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let new = link.with_file_name(format!(".{name}.{}", std::process::id()));
         let _ = fs::remove_file(&new);
@@ -85,7 +85,7 @@ impl Pty {
             .map_err(|source| PtyError::Io { what: "symbolic link", source })
     }
 
-    /// Reads the available bytes. Returns 0 if no bytes are available, or if no host has opened the port.
+    /// Reads the available bytes of the host. Returns 0 if no bytes are available, or if no host has opened the port.
     pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),
@@ -104,17 +104,17 @@ impl Pty {
         }
     }
 
-    /// Returns `true` if a host has opened the port.
+    /// Returns `true` if a host has opened the pseudo-terminal.
     pub(crate) fn host_is_there(&self) -> Result<bool, PtyError> {
         Ok(!self.poll(PollFlags::IN, Duration::ZERO)?.contains(PollFlags::HUP))
     }
 
-    /// Waits for bytes of the host.
+    /// Waits until the host has sent bytes, or until the timeout.
     pub(crate) fn wait_input(&self, timeout: Duration) -> Result<(), PtyError> {
         self.wait(PollFlags::IN, timeout)
     }
 
-    /// Waits until bytes to the host can be written.
+    /// Waits until the terminal accepts bytes for the host, or until the timeout.
     pub(crate) fn wait_room(&self, timeout: Duration) -> Result<(), PtyError> {
         self.wait(PollFlags::OUT, timeout)
     }
@@ -138,8 +138,8 @@ impl Pty {
         }
     }
 
-    /// Discards the bytes that a disconnected host did not read. If a killed host has left the port locked, a new pseudo-terminal replaces
-    /// the old pseudo-terminal under the same link.
+    /// Discards the bytes that a disconnected host did not read. If a killed host has left the pseudo-terminal locked, a new
+    /// pseudo-terminal replaces the old one under the same link.
     pub(crate) fn renew(&mut self) -> Result<(), PtyError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
         match rustix::fs::open(&self.slave, flags, Mode::empty()) {
@@ -178,7 +178,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     rustix::pty::unlockpt(&master).map_err(fails("unlock the pseudo-terminal"))?;
     let name = rustix::pty::ptsname(&master, Vec::new()).map_err(fails("name of the pseudo-terminal"))?;
     let slave = PathBuf::from(name.to_string_lossy().into_owned());
-    // The host side is opened once, so that it is in raw mode before a host connects. After that, a missing host is reported as a hang-up.
+    // This code opens the host side once, so that it is in raw mode before a host connects. After that, the system reports a missing host
+    // as a hang-up.
     let open = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let first = rustix::fs::open(&slave, open, Mode::empty()).map_err(fails("open the host's end"))?;
     raw(&first).map_err(fails("raw mode"))?;
@@ -203,8 +204,8 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
     }
 }
 
-/// Returns `true` if a program uses this pseudo-terminal as a serial port. The pseudo-terminal is then open and in raw mode, unlike the
-/// terminal of a shell. A terminal that a host has locked is also in use.
+/// Returns `true` if a program uses this pseudo-terminal as a serial port. In this case, the pseudo-terminal is open and in raw mode,
+/// unlike the terminal of a shell. A terminal that a host has locked is also in use.
 fn serves(terminal: &Path) -> bool {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
     match rustix::fs::open(terminal, flags, Mode::empty()) {

@@ -1,4 +1,4 @@
-//! Events that a user types, or a script writes, on the simulator's standard input.
+//! Events that a user types, or a script writes, on the standard input of the simulator.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
@@ -10,10 +10,10 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// Interval at which the program checks if it is the foreground program of its terminal.
 const LOOK: Duration = Duration::from_millis(200);
-/// Longest line.
+/// Largest length of a line, bytes.
 const LINE_MAX: usize = 4096;
 
-/// Reader of the lines of the standard input.
+/// Reader of the lines on the standard input.
 pub(crate) struct Typed {
     lines: Receiver<String>,
 }
@@ -26,8 +26,8 @@ impl Typed {
         Self { lines }
     }
 
-    /// Applies the lines that were typed since the last call to `world`. Invalid lines are reported on stderr and have no effect on the
-    /// arm.
+    /// Applies the lines that the user typed since the last call to `world`. The function reports invalid lines on stderr; these lines
+    /// have no effect on the arm.
     pub(crate) fn act(&self, world: &mut World) {
         while let Ok(line) = self.lines.try_recv() {
             match TypedEvent::parse(&line).map_err(|e| e.to_string()) {
@@ -60,10 +60,10 @@ pub(crate) fn hand(path: &Path) -> Result<HandPath, String> {
     HandPath::new(points, step_s).ok_or_else(|| format!("hand: {}: the file has no points", path.display()))
 }
 
-/// Passes the lines of the standard input to `take` until it returns `false` or the input ends.
+/// Passes the lines of the standard input to `take` until `take` returns `false` or the input ends.
 ///
-/// The system stops a program in the background that reads from its terminal (SIGTTIN). The thread therefore reads only when input is
-/// available and no other program is in the foreground.
+/// The operating system stops a program in the background that reads from its terminal (SIGTTIN). Therefore the thread reads only
+/// when input is available and no other program is in the foreground.
 fn read(mut take: impl FnMut(String) -> bool) {
     let stdin = rustix::stdio::stdin();
     let (mut line, mut buffer) = (Vec::new(), [0; 512]);
@@ -92,7 +92,7 @@ fn read(mut take: impl FnMut(String) -> bool) {
             }
         }
     }
-    // The last line may end without a line feed.
+    // The last line of the input may end without a line feed.
     take(text(&mut line));
 }
 

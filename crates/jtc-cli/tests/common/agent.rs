@@ -1,4 +1,4 @@
-//! Agent (`jtc serve`) with separate directories for tokens and other files.
+//! Agent (`jtc serve`) of a test, with separate directories for tokens and other files.
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -31,7 +31,7 @@ pub(crate) fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> 
     (child, ready)
 }
 
-/// Running agent, which is stopped at the end of the test.
+/// Agent that runs during a test, and is stopped at the end of the test.
 pub(crate) struct Agent {
     pub child: Child,
     pub url: String,
@@ -39,30 +39,30 @@ pub(crate) struct Agent {
 }
 
 impl Agent {
-    /// Starts an agent, and waits until it is ready.
+    /// Starts an agent, and waits until the agent is ready.
     pub(crate) fn start(options: &[&str]) -> Self {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
-    /// Like `start`, in a directory that may contain files of another agent.
+    /// Like `start`, in a directory that may contain files of an earlier agent.
     pub(crate) fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let (child, ready) = serve(&dir, options);
         Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
     }
 
-    /// Returns a `jtc` command for this port, or for the agent's address.
+    /// Returns a `jtc` command for this port, or for the address of the agent.
     pub(crate) fn command(&self, words: &[&str], port: &str) -> Command {
         let mut command = command_in(&self.dir);
         command.args(words).args(["--port", port]);
         command
     }
 
-    /// Runs `jtc` through the agent.
+    /// Runs `jtc` with these arguments through the agent.
     pub(crate) fn jtc(&self, words: &[&str]) -> CommandOutput {
         run(self.command(words, &self.url), &[], "")
     }
 
-    /// Creates a file with a motion that takes `tenths` tenths of a second.
+    /// Creates a trajectory file whose motion takes `tenths` tenths of a second.
     pub(crate) fn motion(&self, tenths: i32) -> String {
         let file = self.dir.path().join("motion.csv");
         std::fs::write(&file, slow_motion(tenths)).expect("a file");

@@ -1,4 +1,4 @@
-//! Runs the `jtc` command like a user, and a simulated controller for this command.
+//! Runs the `jtc` command in the same way as a user, and a simulated controller for this command.
 
 pub(crate) mod agent;
 
@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use cli_kit::testing::{CommandOutput, program, run};
 use serde_json::Value;
 
-/// Returns a `jtc` command without environment variables.
+/// Returns a `jtc` command without the environment variables of `jtc`.
 pub(crate) fn command() -> Command {
     program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
@@ -19,7 +19,7 @@ pub(crate) fn jtc(words: &[&str]) -> CommandOutput {
     jtc_with(words, "")
 }
 
-/// Runs `jtc` with this text on its stdin.
+/// Runs `jtc` with these arguments and with this text on its stdin.
 pub(crate) fn jtc_with(words: &[&str], stdin: &str) -> CommandOutput {
     run(command(), words, stdin)
 }
@@ -43,13 +43,13 @@ impl Dir {
         self.path(name)
     }
 
-    /// Returns `true` if the file exists.
+    /// Returns `true` if a file of this name exists in the directory.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.0.path().join(name).exists()
     }
 }
 
-/// Simulated controller on a pseudo-terminal, which is stopped at the end of the test.
+/// Simulated controller on a pseudo-terminal. The simulator is stopped at the end of the test.
 pub(crate) struct Sim {
     child: Child,
     stderr: BufReader<std::process::ChildStderr>,
@@ -58,7 +58,7 @@ pub(crate) struct Sim {
 }
 
 impl Sim {
-    /// Starts a simulator and waits until it is ready.
+    /// Starts a simulator and waits until the simulator is ready.
     pub(crate) fn start(options: &[&str]) -> Self {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
@@ -105,14 +105,14 @@ impl Sim {
         self
     }
 
-    /// Returns a `jtc` command for the simulator's port.
+    /// Returns a `jtc` command for the port of the simulator.
     pub(crate) fn command(&self, words: &[&str]) -> Command {
         let mut command = command();
         command.args(words).args(["--port", self.port.to_str().unwrap()]);
         command
     }
 
-    /// Runs `jtc` at the simulator's port.
+    /// Runs `jtc` with these arguments at the port of the simulator.
     pub(crate) fn jtc(&self, words: &[&str]) -> CommandOutput {
         run(self.command(words), &[], "")
     }
@@ -166,7 +166,7 @@ impl Drop for Sim {
     }
 }
 
-/// Returns the position of the simulated arm, rad.
+/// Returns the joint positions of the simulated arm, rad.
 pub(crate) fn place(sim: &Sim) -> Vec<f64> {
     let status = sim.json(&["status"], 0);
     status["joints"].as_array().unwrap().iter().map(|joint| joint["position_rad"].as_f64().unwrap()).collect()
@@ -184,7 +184,7 @@ pub(crate) fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::proc
     moving_after(sim, words, "", seconds)
 }
 
-/// Like [`moving_while`], for the motion that begins after an output line with this text.
+/// Like [`moving_while`], for the motion that begins after the command has printed a line with this text.
 pub(crate) fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std::process::Child {
     let mut child = sim
         .command(&[&["--json"], words].concat())
@@ -210,7 +210,8 @@ pub(crate) fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) 
     child
 }
 
-/// Returns a smooth trajectory file that moves `amplitude` rad from the zero pose and back in 1.2 s.
+/// Returns a smooth trajectory file. The motion moves all joints by at most `amplitude` rad from the zero pose and
+/// back, in 1.2 s.
 pub(crate) fn motion(amplitude: f64) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=120 {
@@ -221,7 +222,7 @@ pub(crate) fn motion(amplitude: f64) -> String {
     text
 }
 
-/// Returns a slow motion of all joints, up to 0.2 rad and back, in `tenths` tenths of a second.
+/// Returns a slow motion of all joints, up to 0.2 rad and back. The motion takes `tenths` tenths of a second.
 pub(crate) fn slow_motion(tenths: i32) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=tenths {

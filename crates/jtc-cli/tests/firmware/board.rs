@@ -20,7 +20,8 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 /// Number of program bytes in an image of [`super::image`].
 const PROGRAM: usize = 0x1000;
 
-/// Returns the program data that a board with this image in flash reports. The checksum is computed bit by bit, as in its definition.
+/// Returns the program data that a board with this image in flash reports. The function computes the checksum bit by bit, from its
+/// definition.
 pub(super) fn program_of(image: &[u8]) -> Program {
     let mut register = u32::MAX;
     for byte in &image[..PROGRAM] {
@@ -32,16 +33,16 @@ pub(super) fn program_of(image: &[u8]) -> Program {
     Program { bytes: PROGRAM as u32, crc32: !register }
 }
 
-/// Processor and ST-LINK of a board. The processor and the ST-LINK stop when this value is dropped.
+/// Processor and ST-LINK of a simulated board. The processor and the ST-LINK stop when this value is dropped.
 pub(super) struct Board {
-    /// Its serial port.
+    /// Serial port of the simulated board.
     pub port: String,
     flashed: Arc<Mutex<Flashed>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// State of the processor.
+/// State of the simulated processor.
 struct Flashed {
     status: Status,
     program: Option<Program>,
@@ -51,8 +52,8 @@ struct Flashed {
 }
 
 impl Board {
-    /// Creates a board whose arm is without torque. The folder `drive` is the USB drive of the board and accepts an image of `length`
-    /// bytes.
+    /// Creates a simulated board whose arm has no torque. The folder `drive` is the USB drive of the board and accepts an image of
+    /// `length` bytes.
     pub(super) fn new(board: &str, drive: &Path, length: usize) -> Self {
         let (master, port) = pseudo_terminal();
         let mut status = Status { state: ControllerState::Init.into(), ..Status::default() };
@@ -76,7 +77,7 @@ impl Board {
         Self { port, flashed, stop, thread: Some(thread) }
     }
 
-    /// Changes the status that the board sends after this call.
+    /// Changes the status that the simulated board sends after this call.
     pub(super) fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.flashed.lock().unwrap().status);
     }
@@ -105,7 +106,7 @@ impl Running {
         let few_ms = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
         let _ = poll(&mut ends, Some(&few_ms));
         if ends[0].revents().contains(PollFlags::HUP) {
-            // No program has opened the port.
+            // No program has opened the port of the board, so the thread waits.
             thread::sleep(Duration::from_millis(5));
         } else {
             self.serve();
@@ -116,7 +117,7 @@ impl Running {
         }
     }
 
-    /// Sends a status every 40 ms, and answers requests.
+    /// Sends a status every 40 ms, and answers requests of the command.
     fn serve(&mut self) {
         let mut request = [0; 256];
         let asked = matches!(rustix::io::read(&self.master, &mut request), Ok(1..));
@@ -145,7 +146,8 @@ impl Running {
     fn take(&self, file: &Path) {
         let bytes = fs::read(file).unwrap();
         fs::remove_dir_all(&self.drive).unwrap();
-        // The delay is longer than the time for which the command waits for a status before it checks the drive again.
+        // The delay is longer than the time for which the command waits for a status before it checks the USB drive
+        // again.
         thread::sleep(Duration::from_millis(1_800));
         let mut flashed = self.flashed.lock().unwrap();
         (flashed.program, flashed.started, flashed.before_ms) = (Some(program_of(&bytes)), Instant::now(), 0);

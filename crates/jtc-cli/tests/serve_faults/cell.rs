@@ -11,7 +11,7 @@ use test_kit::patience::Patience;
 use crate::common::agent::{self, command_in};
 use crate::common::{Sim, slow_motion};
 
-/// Agent and simulated controller.
+/// Agent and simulated controller of a test.
 pub(super) struct Cell {
     pub sim: Option<Sim>,
     pub agent: Child,
@@ -43,7 +43,7 @@ impl Cell {
         cell
     }
 
-    /// Starts a run through the agent. The policy applies when the program of the run is disconnected.
+    /// Starts a run through the agent. The policy applies if the program of the run disconnects.
     pub(super) fn run(&self, policy: &str) -> Child {
         self.jtc(&["--json", "traj", "run", &self.motion, "--when-gone", policy, "--port", &self.url])
             .stdout(Stdio::piped())
@@ -58,7 +58,7 @@ impl Cell {
         command
     }
 
-    /// Returns the status of the controller, which it requests through the agent.
+    /// Returns the status of the controller, which the function requests through the agent.
     pub(super) fn status(&self) -> Value {
         self.status_at(&self.url)
     }
@@ -89,13 +89,13 @@ impl Cell {
         self.agent.wait().expect("it ends");
     }
 
-    /// Starts another agent in place of the last agent.
+    /// Starts another agent at the same port as the previous agent.
     pub(super) fn next_agent(&mut self) {
         let port = &self.sim.as_ref().expect("it is there").port;
         (self.agent, self.url) = serve(&self.dir, port, &self.baud);
     }
 
-    /// Starts `jtc --json` through the agent with these arguments, and waits for this event.
+    /// Starts `jtc --json` through the agent with these arguments, and waits until the command prints this event.
     pub(super) fn at(&self, words: &[&str], event: &str) -> Program {
         let words = [&["--json"], words, &["--port", &self.url]].concat();
         let mut jtc = self.jtc(&words);
@@ -123,12 +123,12 @@ impl Cell {
     /// Returns the log lines of agents about the policy of a killed agent.
     pub(super) fn found(&self) -> Vec<Value> {
         let text = std::fs::read_to_string(self.dir.path().join("commands.jsonl")).expect("a log");
-        // The last line of the log may be incomplete, so invalid lines are skipped.
+        // The last line of the log may be incomplete, so the function skips invalid lines.
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         lines.filter(|line| line["what"].as_str().is_some_and(|what| what.starts_with("policy-"))).collect()
     }
 
-    /// Returns the file with the policy for a motion, if it exists.
+    /// Returns the path of the file with the policy for a motion, if the file exists.
     pub(super) fn left(&self) -> Option<PathBuf> {
         let files = std::fs::read_dir(self.dir.path().join("state/openjtc")).expect("it is there");
         let mut paths = files.map(|file| file.expect("a file").path());
@@ -163,14 +163,14 @@ fn serve(dir: &tempfile::TempDir, port: &Path, baud: &str) -> (Child, String) {
     (child, ready["url"].as_str().expect("an address").to_owned())
 }
 
-/// A running command.
+/// A `jtc` command that the test has started.
 pub(super) struct Program {
     child: Child,
     err: BufReader<ChildStderr>,
 }
 
 impl Program {
-    /// Waits for this event.
+    /// Waits until the command prints this event.
     pub(super) fn until(&mut self, event: &str) {
         let (mut line, mut all) = (String::new(), String::new());
         while !line.contains(&format!("\"event\":\"{event}\"")) {
@@ -180,14 +180,14 @@ impl Program {
         }
     }
 
-    /// Kills the program.
+    /// Kills the command.
     pub(super) fn kill(mut self) {
         assert!(self.child.try_wait().expect("a child").is_none(), "it is at work");
         self.child.kill().expect("it runs");
         self.child.wait().expect("it ends");
     }
 
-    /// Waits until the program ends and reports the lost link.
+    /// Waits until the command ends, and checks that it reports the lost link.
     pub(super) fn ends_without_link(self) -> String {
         let Self { child, err } = self;
         let ended = child.wait_with_output().expect("it ends");
@@ -198,7 +198,7 @@ impl Program {
     }
 }
 
-/// Returns `false` for a message without a status. On a very busy computer, a status may not arrive in time.
+/// Returns `true` if the message contains a status. On a very busy computer, a status may not arrive in time.
 fn is_status(value: &Value) -> bool {
     value["state"].is_string()
 }

@@ -1,4 +1,4 @@
-//! Tests of the arm when a program, the agent or the controller is killed, in each phase of a job.
+//! Tests of the arm if a program, the agent or the controller is killed, in each phase of a job.
 #![cfg(unix)]
 
 mod cell;
@@ -21,7 +21,7 @@ fn a_program_that_is_killed_leaves_its_motion_to_its_policy() {
         run.wait().expect("it ends");
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
-        // The next client receives the lease at once.
+        // The agent gives the lease to the next client at once.
         let gripper = cell.jtc(&["gripper", "on", "--port", &cell.url]).output().expect("it ran");
         assert!(gripper.status.success(), "{}", String::from_utf8_lossy(&gripper.stderr));
     }
@@ -56,7 +56,8 @@ fn an_agent_that_is_killed_leaves_the_motion_to_the_controller_and_says_so_to_it
     let report: Value = serde_json::from_slice(&ended.stdout).expect("an object");
     let message = report["error"]["message"].as_str().unwrap_or_default().to_owned();
     assert!(message.contains("MAY BE MOVING"), "{report}");
-    // The controller has received the whole motion and completes it. The status shows this to every client.
+    // The controller has received the complete motion and executes it to the end. The status shows the motion to every
+    // client.
     let port = cell.sim.as_ref().expect("it is there").port.to_str().expect("a name").to_owned();
     let baud = |words: &[&str]| {
         let mut command = cell.jtc(words);

@@ -1,14 +1,15 @@
-//! Tests of phases other than upload and motion, and of programs that use only HTTP.
+//! Tests of job phases other than upload and motion, and of programs that use only HTTP.
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
 use super::cell::{Cell, trajectory};
 
-/// Time after the check at which the upload of the long motion is in progress. The upload takes five seconds.
+/// Time after the trajectory check at which the upload of the long motion is in progress. The upload takes five
+/// seconds.
 pub(super) const IN_UPLOAD: Duration = Duration::from_millis(700);
-/// Waiting time that is slightly longer than the hold-off after a Pause of a client or a policy. During the hold-off no other client can
-/// begin a motion.
+/// Waiting time that is slightly longer than the hold-off after a Pause of a client or a policy. During the hold-off, no other client
+/// can begin a motion.
 const CALM: Duration = Duration::from_millis(3100);
 /// Observation time during which the arm must stay at rest.
 pub(super) const REST: Duration = Duration::from_millis(500);
@@ -21,13 +22,13 @@ pub(super) fn is_taught(status: &Value) -> bool {
     state(status) == "Teaching"
 }
 
-/// Returns `true` if all drives are enabled, which takes some seconds after the start.
+/// Returns `true` if all drives are enabled. After the start, enabling takes some seconds.
 pub(super) fn is_held(status: &Value) -> bool {
     let enabled = |joint: &Value| joint["state"] == "OperationEnable";
     state(status) == "HoldPos" && status["joints"].as_array().is_some_and(|joints| joints.iter().all(enabled))
 }
 
-/// Returns a motion of 1600 points.
+/// Returns a trajectory file with 1600 points.
 pub(super) fn long_motion(cell: &Cell) -> String {
     let text: String = (0..1600)
         .map(|i| {
@@ -48,13 +49,13 @@ pub(super) fn pause(cell: &Cell) {
     cell.until("Pause", |status| trajectory(status) == "Pause" && is_held(status));
 }
 
-/// Switches off the torque and removes the parameters, so that `recover` must execute all its steps.
+/// Switches off the torque and removes the parameters, so that `recover` must execute all of its steps.
 fn disable(cell: &Cell) {
     cell.done(&["disable", "--yes"]);
     cell.until("Init", |status| state(status) == "Init");
 }
 
-/// Recovers the arm from any state, as a user would do after a fault.
+/// Recovers the arm from any state, in the same way as a user after a fault.
 fn recover(cell: &Cell) {
     cell.done(&["recover", "--defaults"]);
     cell.until("a held arm", is_held);
@@ -125,7 +126,7 @@ fn a_command_that_is_killed_leaves_what_it_has_begun_to_its_policy_or_as_it_is()
     recover(&cell);
 }
 
-/// Time without a request after which the lease lapses.
+/// Time without a request after which the lease expires.
 const LASTS: Duration = Duration::from_millis(1500);
 
 /// HTTP client that sends nothing after its last request.
@@ -152,7 +153,7 @@ impl<'a> Silent<'a> {
         answer
     }
 
-    /// Sends the last request of the program, which starts a job.
+    /// Sends the last request of this client. The request starts a job.
     fn begins(self, request: &str, body: Value) -> Job<'a> {
         let last = self.cell.http().api("GET /api/status", None, None).1["last_event"].as_u64();
         let job = self.ask(request, body)["number"].as_u64().expect("a number");
@@ -160,7 +161,7 @@ impl<'a> Silent<'a> {
     }
 }
 
-/// Job whose client sends no more requests.
+/// Job whose client does not send any more requests.
 struct Job<'a> {
     cell: &'a Cell,
     job: u64,
@@ -191,13 +192,13 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
         assert_eq!(kept.0, 200, "{}", kept.1);
     }
 
-    // The client has seen the start of the check or of the upload. The speed of this computer determines if the client has seen the check
-    // or the upload.
+    // The client has received the start of the trajectory check or the start of the upload. The speed of this computer determines which
+    // of these starts the client has received.
     let job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");
     assert!(is_held(&cell.rests(CALM)), "{ended}");
-    // The motion continues in the same way as with a connected client.
+    // The motion continues in the same way as if the client were still connected.
     let mut job = Silent::come(&cell, "continue").begins("POST /api/runs", json!({ "trajectory": 8 }));
     job.reports("executing");
     pause(&cell);

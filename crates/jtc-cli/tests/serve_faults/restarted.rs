@@ -1,5 +1,5 @@
-//! Tests of a new agent after the previous agent was killed. The new agent first applies the policy of the lease holder to an arm that
-//! still moves.
+//! Tests of a new agent after the previous agent was killed. If the arm still moves, the new agent first applies the policy of the
+//! lease holder.
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -8,7 +8,8 @@ use test_kit::patience::{Patience, until};
 use super::cell::{Cell, moves, trajectory};
 use super::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
-/// Checks that the file contains the policy and the cause of the motion, before the agent is killed. A separate thread writes this file.
+/// Checks that the file contains the policy and the cause of the motion. The test kills the agent after this check, because a separate
+/// thread of the agent writes the file.
 fn is_left(cell: &Cell, policy: &str, what: &str) {
     let mut patience = Patience::begin();
     loop {
@@ -25,17 +26,17 @@ fn is_gone(cell: &Cell) {
     until("the end of the file: nothing moves", || cell.left().is_none());
 }
 
-/// Starts another agent, and returns its report about the policy.
+/// Kills the agent, starts another agent, and returns the report of the new agent about the policy.
 fn next(cell: &mut Cell) -> Value {
     cell.kill_agent();
     follow(cell)
 }
 
-/// Like [`next`], after the previous agent was killed.
+/// Like [`next`], after the test has killed the previous agent.
 fn follow(cell: &mut Cell) -> Value {
     let before = cell.found().len();
     cell.next_agent();
-    // A separate thread writes the log.
+    // A separate thread of the agent writes the log.
     until("what the next agent finds", || cell.found().len() > before);
     let found = cell.found();
     assert_eq!(found.len(), before + 1, "{found:?}");
@@ -65,7 +66,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             (&json!(policy), &json!("motion"), &json!(true))
         );
         assert!(found["by"].as_str().is_some_and(|by| by.contains("jtc traj")), "{found}");
-        // The agent sent the request before it served a client.
+        // The agent has sent the request before it served any client.
         let taken = [
             ("continue", "the motion continues"),
             ("pause", "a Pause was sent"),
@@ -81,7 +82,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
         if policy == "pause" {
-            // The motion can be resumed, so the policy is also stored for the agent that follows this agent.
+            // The motion can be resumed, so the agent also stores the policy for its successor.
             is_left(&cell, policy, "motion");
             let found = next(&mut cell);
             assert_eq!(done(&found), "the motion stays paused");

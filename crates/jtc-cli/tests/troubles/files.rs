@@ -1,12 +1,12 @@
-//! Files of the cases, each with one error.
+//! Files for the cases in docs/troubles.md, each with one error.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes all files.
+/// Writes all files of the cases.
 pub(super) fn write(dir: &Path) {
     let save = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
-    // Motion of all joints in 6 s, forward and back.
+    // Motion of all joints in 6 s, forward and back to the start.
     let motion = |scale: f64, step_s: f64, offset: f64| {
         let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
         for i in 0..=60 {
@@ -45,7 +45,7 @@ pub(super) fn write(dir: &Path) {
     save("gripper.urdf", &urdf(6, "revolute", gripper));
 }
 
-/// Returns the description of a robot with `joints` equal links in a vertical chain.
+/// Returns a robot description with `joints` equal links in a vertical chain.
 fn urdf(joints: usize, kind: &str, more: &str) -> String {
     let inertia = "<inertial><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial>";
     let mut text = format!("<robot name=\"robot\"><link name=\"link0\">{inertia}</link>\n");

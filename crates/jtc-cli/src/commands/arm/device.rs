@@ -81,7 +81,8 @@ fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }
 
-/// Returns the failure if the controller refused a setting. The hint says that the controller accepts settings only in Init and Error.
+/// Returns the failure if the controller rejected a setting. The hint says that the controller accepts settings only in Init and
+/// Error.
 fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {
@@ -123,7 +124,7 @@ fn without_extensions(
     Ok(())
 }
 
-/// Reads the arm of the controller and writes it to a file.
+/// Reads the arm of the controller and writes the arm to a file.
 pub(super) fn pull(
     file: &Path,
     overwrite: OverwriteArgs,
@@ -141,7 +142,7 @@ pub(super) fn pull(
     Ok(())
 }
 
-/// Lists the differences between the arm file and the controller's arm.
+/// Lists the differences between the arm file and the arm of the controller.
 pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arm = Arm::load(file)?;
     let mut session = link.session()?;

@@ -41,7 +41,8 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Lists the changes of the import, grouped by kind. If several joints have the same change, they are listed in one line.
+/// Lists the changes of the import, grouped by kind. If several joints have the same change, one line lists all of these
+/// joints.
 fn changes(warnings: &[Warning]) -> String {
     let mut kinds: BTreeMap<Change, Vec<(&str, Vec<&str>)>> = BTreeMap::new();
     for w in warnings {
@@ -55,7 +56,7 @@ fn changes(warnings: &[Warning]) -> String {
     for (change, lines) in kinds {
         text += &format!("{}\n", change.heading());
         for (problem, places) in lines {
-            // The word "joint" is printed only once, as in "joint a, b, c".
+            // The list contains the word "joint" only once, as in "joint a, b, c".
             let rest = |place: &&str| place.strip_prefix("joint ").unwrap_or(place).to_owned();
             let more: Vec<String> = places[1..].iter().map(rest).collect();
             let all = [vec![places[0].to_owned()], more].concat();
@@ -65,7 +66,7 @@ fn changes(warnings: &[Warning]) -> String {
     text
 }
 
-/// Formats the proposed values as a table with a row for each value and a column for each joint.
+/// Formats the proposed values as a table, with a row for each value and a column for each joint.
 fn as_table(values: &[ArmValue]) -> String {
     let mut rows: Vec<(&ArmValue, [String; 6])> = Vec::new();
     for v in values {

@@ -5,7 +5,7 @@ use jtc_host::arm::{Arm, ArmValue, Source};
 use jtc_wire::Joint;
 use serde_json::json;
 
-/// Degrees in a radian.
+/// Number of degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// Prints the parameters of the arm. `name` is the file or the controller from which the arm was read.
@@ -52,7 +52,7 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
     Ok(())
 }
 
-/// Converts the value to degrees if it is an angle or an angular rate.
+/// Converts a value to degrees if the value is an angle or an angular rate.
 fn in_degrees(v: &mut ArmValue) {
     let unit = match v.unit {
         "rad" => "°",
@@ -68,7 +68,7 @@ fn in_degrees(v: &mut ArmValue) {
 
 /// Formats a number with five significant digits, without trailing zeros.
 pub(super) fn number(value: f64) -> String {
-    // Rounding errors of rotated frames are shown as 0.
+    // The table shows rounding errors of rotated frames as 0.
     if value.abs() < 1e-11 {
         return "0".into();
     }
@@ -104,7 +104,7 @@ fn gravity(values: &[ArmValue]) -> String {
     format!("gravity: {own} m/s² in the frame of the base, default {default}, from: {from}\n")
 }
 
-/// Formats each joint parameter as a row.
+/// Formats each joint parameter of the arm as a table row.
 fn by_joint(values: &[ArmValue]) -> String {
     let of_joints = |v: &&ArmValue| v.joint.is_some() && v.link.is_none();
     let mut names: Vec<&str> = Vec::new();
@@ -129,7 +129,7 @@ fn by_joint(values: &[ArmValue]) -> String {
     table(&["", ">1 ", ">2 ", ">3 ", ">4 ", ">5 ", ">6 ", "unit", "range", ">default", "from"], &rows)
 }
 
-/// Returns the source of the values in a row.
+/// Returns the source of the values in a table row.
 fn source(all: &[&ArmValue]) -> String {
     let mut sources: Vec<&str> = all.iter().map(|v| v.from.name()).collect();
     sources.dedup();
@@ -155,7 +155,7 @@ fn of_controller(values: &[ArmValue]) -> String {
     table(&["", ">value", "unit", "range", ">default", "from"], &rows)
 }
 
-/// Formats each pose as a row.
+/// Formats each pose of the arm as a table row.
 pub(crate) fn poses(arm: &Arm, deg: bool) -> String {
     let row = |(name, position): (&String, &[f64; 6])| {
         let cells = position.iter().map(|v| number(if deg { v * DEGREES } else { *v }));

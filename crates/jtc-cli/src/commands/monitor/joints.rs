@@ -11,7 +11,7 @@ use ratatui::widgets::{Cell, Row, Table};
 
 use super::super::status::{gripper_answers, gripper_state, joint_state};
 
-/// Colours of the joints, which are equal to those of the report.
+/// Colours of the joints, which are also the colours of the joints in the report.
 pub(super) const COLOURS: [Color; 6] = [
     Color::Rgb(122, 165, 255),
     Color::Rgb(255, 157, 87),
@@ -21,7 +21,7 @@ pub(super) const COLOURS: [Color; 6] = [
     Color::Rgb(227, 200, 76),
 ];
 
-/// Column with its heading, its width, and the smallest width of the view at which it is shown.
+/// Column of the table: its heading, its width, and the smallest width of the view at which the column is shown.
 type Column = (&'static str, u16, u16);
 
 const COLUMNS: [Column; 7] = [
@@ -36,7 +36,7 @@ const COLUMNS: [Column; 7] = [
 /// Number of characters before the error texts of a joint.
 const WITH_WORDS: u16 = 56;
 
-/// Returns the number of rows of the table.
+/// Returns the number of rows of the joint table.
 pub(super) fn count(s: &Status) -> usize {
     s.joints.len() + usize::from(s.gripper.is_some())
 }
@@ -47,7 +47,8 @@ fn is_broken(s: &Status, j: usize) -> bool {
     joint.state.is_fault() || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0
 }
 
-/// Returns as many error texts as fit into the width, and the number of omitted texts. The head of the view shows all texts.
+/// Returns as many error texts as fit into the width, and the number of omitted texts. The head of the view shows all error
+/// texts.
 fn fitting(words: &[&str], width: usize) -> String {
     for count in (1..=words.len()).rev() {
         let more = words.len() - count;
@@ -59,8 +60,8 @@ fn fitting(words: &[&str], width: usize) -> String {
     if words.is_empty() { String::new() } else { format!("{} above", words.len()) }
 }
 
-/// Returns all rows. Joints with unknown values come first, then joints with an error. The values of a silent joint are unknown, because
-/// the last received values are outdated. If no statuses arrive, the values of all joints are unknown.
+/// Returns all rows of the table. Joints with unknown values come first, then joints with an error. The values of a silent joint are
+/// unknown, because the last received values are outdated. If no statuses arrive, the values of all joints are unknown.
 fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     let room = usize::from(width.saturating_sub(WITH_WORDS));
     let known = |j: usize| !silent && is_measured(s, j);
@@ -127,7 +128,7 @@ fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     joints.chain(gripper).map(drawn).map(|(cells, style)| Row::new(cells).style(style)).collect()
 }
 
-/// Returns the table for the width of the view, starting at row `first`.
+/// Returns the joint table for the width of the view, starting at row `first`.
 pub(super) fn table(s: &Status, silent: bool, width: u16, framed: bool, first: usize) -> Table<'static> {
     let shown = |c: &&Column| width >= c.2;
     let mut widths: Vec<Constraint> = COLUMNS.iter().filter(shown).map(|c| Constraint::Length(c.1)).collect();
@@ -136,7 +137,7 @@ pub(super) fn table(s: &Status, silent: bool, width: u16, framed: bool, first: u
     }
     let head = Row::new(COLUMNS.iter().filter(shown).map(|c| {
         let width = usize::from(c.1);
-        // The heading of a column of numbers is aligned to the right, like the numbers.
+        // The heading of a column with numbers is aligned to the right, like the numbers.
         if c.0 == "state" { c.0.to_owned() } else { format!("{:>width$}", c.0) }
     }));
     let table = Table::new(rows(s, silent, width).into_iter().skip(first), widths).header(head.dark_gray());

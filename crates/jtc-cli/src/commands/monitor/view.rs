@@ -1,6 +1,6 @@
 //! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. The view shows errors and the next command first. The first rows of
-//! the table are the joints without measured values. Text that does not fit can be scrolled, and the keys are always visible. The position
-//! curves fill the remaining space.
+//! the table are the joints without measured values. The user can scroll to text that does not fit, and the keys are always visible. The
+//! position curves fill the remaining space of the view.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -18,30 +18,30 @@ use ratatui::widgets::{Paragraph, Sparkline};
 
 use super::joints::{self, COLOURS};
 
-/// Number of values that the curves show, which is 8 s of statuses.
+/// Number of values that the position curves show, which is 8 s of statuses.
 const HISTORY: usize = 200;
-/// Smallest height of the view, in rows, at which a row shows a link without faults.
+/// Smallest height of the view, in rows, at which the view has a row for a link without faults.
 const LINK: u16 = 16;
-/// Smallest height of the curves.
+/// Smallest height of the position curves, in rows.
 const CURVES: u16 = 6;
-/// Smallest number of table rows, including the heading, for any number of errors.
+/// Smallest number of rows of the joint table, including the heading, for any number of errors.
 const LEAST_ROWS: u16 = 3;
-/// Key help. A terminal that is too small shows only the first key.
+/// Help text for the keys of the view. A terminal that is too small shows only the first key.
 const KEYS: &str = "s stops   q ends";
 
-/// State of the view.
+/// State of the monitor view.
 pub(super) struct View {
     port: String,
     last: Option<Status>,
     /// Time since the last status.
     pub silent: Option<Duration>,
-    /// Statuses per second.
+    /// Number of received statuses per second.
     pub rate: f64,
     /// Number of received bytes that do not belong to a valid frame.
     pub bad_bytes: u64,
     /// Result of the last pressed key, which is shown until the next key is pressed.
     pub reply: String,
-    /// Scroll positions of the causes and the joints.
+    /// Scroll position of the causes and the joints.
     pub scroll: Scroll,
     /// Last positions of each joint. The value is NaN if the joint was not measured.
     position: [VecDeque<f64>; 6],
@@ -49,7 +49,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Creates the view of a controller at this port, before the first status.
+    /// Creates the view for the controller at this port, before the first status.
     pub(super) fn new(port: String) -> Self {
         Self {
             port,
@@ -64,7 +64,7 @@ impl View {
         }
     }
 
-    /// Takes a status.
+    /// Adds a status to the view.
     pub(super) fn push(&mut self, s: Status) {
         for (j, joint) in s.joints.iter().enumerate() {
             let known = |value: f32| if is_measured(&s, j) { f64::from(value) } else { f64::NAN };
@@ -80,14 +80,14 @@ impl View {
         self.last = Some(s);
     }
 
-    /// Returns the failure of the port, with the known state of the motion.
+    /// Returns the failure of a lost port, with the known state of the motion.
     pub(super) fn lost(&self, failure: Failure) -> Failure {
         let moving = self.last.is_some_and(|s| s.is_executing());
         let message = format!("{}{}", failure.message, if moving { "; THE ARM MAY BE MOVING" } else { "" });
         Failure { message, ..failure }
     }
 
-    /// Draws all parts of the view that fit.
+    /// Draws all parts of the view for which the terminal has enough space.
     pub(super) fn draw(&mut self, frame: &mut Frame<'_>) {
         if too_small(frame, KEYS) {
             return;
@@ -124,7 +124,8 @@ impl View {
         frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
     }
 
-    /// Draws the joints, and the causes that do not fit into the head. Rows that do not fit can be scrolled.
+    /// Draws the joints, and the causes that do not fit into the head of the view. The user can scroll to rows that do
+    /// not fit.
     fn rows(&mut self, frame: &mut Frame<'_>, area: Rect, rest: Vec<Line<'static>>, framed: bool) {
         let Some(s) = &self.last else { return };
         let (edge, heads) = (if framed { 2 } else { 0 }, 1);
@@ -136,13 +137,13 @@ impl View {
             Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
         frame.render_widget(Paragraph::new(above), causes);
         let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
-        // A table heading without a row is useless.
+        // The view does not draw a table heading without a row.
         if table.height > heads + edge {
             frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
         }
     }
 
-    /// Returns the lines with the state, the position on the trajectory, and the link.
+    /// Returns the lines with the state of the controller, the position on the trajectory, and the link.
     fn head(&self, width: u16, link: bool) -> Vec<Line<'static>> {
         let Some(s) = &self.last else { return vec![Line::from(self.port.clone()).dark_gray()] };
         if self.silent.is_some() {
@@ -162,7 +163,7 @@ impl View {
         lines
     }
 
-    /// Returns the errors and the next step.
+    /// Returns the errors and the next step of the user.
     fn trouble(&self) -> Trouble {
         let reply = self.reply.clone();
         let (causes, warnings, next) = match (&self.last, self.silent) {
@@ -222,7 +223,7 @@ fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16, silent: bool
     // The range has a minimum, so that the curve of a joint at rest is not scaled up to full height.
     let span = (high - low).max(0.01);
     let height = |v: &f64| v.is_finite().then(|| ((v - low) / span * 100.0) as u64 + 1);
-    // Only the newest values that fit next to the frame are drawn.
+    // The view draws only the newest values, as many as fit inside the frame.
     let old = history.len().saturating_sub(usize::from(width.saturating_sub(4)));
     let heights: Vec<Option<u64>> = history.iter().skip(old).map(height).collect();
     let last = history.back().filter(|v| v.is_finite() && !silent);

@@ -8,7 +8,7 @@ use super::*;
 /// Terminal sizes, smallest first.
 const SIZES: [(u16, u16); 6] = [(40, 12), (60, 20), (80, 24), (90, 28), (120, 40), (200, 60)];
 
-/// Returns the status of a held arm whose joint 3 does not answer.
+/// Returns the status of an arm that the controller holds and whose joint 3 does not answer.
 fn silent() -> Status {
     let mut s = Status {
         state: ControllerState::Error.into(),
@@ -38,7 +38,7 @@ fn drawn(view: &mut View, (width, height): (u16, u16)) -> Vec<String> {
     cells.chunks(width.into()).map(|row| row.iter().map(|c| c.symbol()).collect()).collect()
 }
 
-/// Returns all rows that a view shows while it is scrolled to its end.
+/// Returns all rows that the view shows while the test scrolls the view to its end.
 fn scrolled(view: &mut View, size: (u16, u16)) -> Vec<String> {
     let mut all = drawn(view, size);
     loop {
@@ -51,7 +51,7 @@ fn scrolled(view: &mut View, size: (u16, u16)) -> Vec<String> {
     }
 }
 
-/// Joins rows without their borders, so that the test can find wrapped texts.
+/// Joins the rows of the view without their borders, so that the test can find wrapped texts.
 fn joined(rows: &[String]) -> String {
     let words: Vec<&str> = rows.iter().flat_map(|row| row.split_whitespace()).filter(|w| *w != "│").collect();
     words.join(" ")
@@ -81,7 +81,8 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
     }
 }
 
-/// For any number of errors, the view shows the first cause and the next command completely, and the user can scroll to the remaining rows.
+/// For any number of errors, the view shows the first cause and the next command completely. The user can scroll to rows that do not
+/// fit.
 #[test]
 fn no_cause_is_cut_and_none_vanishes() {
     let mut s = Status {
@@ -116,7 +117,7 @@ fn no_cause_is_cut_and_none_vanishes() {
     }
 }
 
-/// A joint with a fault is the first row of the table. Texts that fit are shown completely, and a number shows how many texts are omitted.
+/// A joint with a fault is the first row of the table. The table shows error texts that fit completely, and the number of omitted texts.
 #[test]
 fn a_joint_with_a_fault_leads_the_table() {
     let mut s = Status { state: ControllerState::Error.into(), errors: 0x98, ..Status::default() };
@@ -157,7 +158,7 @@ fn every_cause_is_explained() {
     }
 }
 
-/// Values from before the silence are not shown as present values.
+/// If statuses stop arriving, the view does not show the last values as present values.
 #[test]
 fn a_silent_controller_shows_no_old_value() {
     for size in SIZES {
@@ -196,7 +197,7 @@ fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
     }
 }
 
-/// For a gripper that does not answer, no pump state is shown.
+/// If the gripper does not answer, the view does not show a pump state.
 #[test]
 fn a_silent_gripper_looks_so() {
     let mut s =

@@ -31,7 +31,7 @@ pub(super) fn not_possible(error: ApproachError, course: &Course, out: &Output) 
     Failure::shown(failure.kind)
 }
 
-/// Returns the failure for a refused path to the first point. The trajectory itself is valid.
+/// Returns the failure if the check rejects the path to the first point. In this case, the trajectory itself is valid.
 fn refused(why: &str, file: &str) -> Failure {
     let message = format!("the straight path from the arm to the first point of {file} is refused: {why}");
     let hint = format!(
@@ -46,7 +46,7 @@ fn refused(why: &str, file: &str) -> Failure {
 mod tests {
     use super::*;
 
-    /// The file itself passes its check, but the path to its first point is refused.
+    /// The trajectory file itself passes its check, but the check rejects the path to the first point of the file.
     #[test]
     fn a_refused_approach_does_not_send_people_to_correct_their_file() {
         let failure = refused("joint 2: no stop in time", "'my motion.csv'");

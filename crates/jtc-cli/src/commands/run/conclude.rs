@@ -1,4 +1,4 @@
-//! End of a run, with the output files, the results and the exit code.
+//! Actions at the end of a run. The module writes the output files, prints the results and selects the exit code.
 
 use std::collections::VecDeque;
 
@@ -16,16 +16,16 @@ use super::super::run_report;
 use super::terminal::{Reel, Taken};
 use crate::link::LinkPort;
 
-/// Largest number of motions whose results are kept, so that many runs do not fill the memory of a PC.
+/// Largest number of motions whose results stay in memory, so that many runs do not fill the memory of a PC.
 const KEPT: usize = 1000;
 
-/// A finished motion.
+/// A motion that has ended.
 pub(super) struct Done {
     pub phase: Phase,
     pub summary: Summary,
 }
 
-/// Finished motions, with their number and the results of the last motions.
+/// Number of motions that have ended, and the results of the last of these motions.
 #[derive(Default)]
 pub(super) struct Finished {
     kept: VecDeque<Done>,
@@ -46,7 +46,7 @@ impl Finished {
     }
 }
 
-/// Returns the outcome of a motion in one word.
+/// Returns the outcome of a motion as one word.
 fn word(outcome: &Result<Outcome, Error>) -> &'static str {
     match outcome {
         Ok(Outcome::Finished(_)) => "finished",
@@ -85,7 +85,7 @@ pub(super) fn conclude(
     info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
-    // A lost file is reported even if the run failed. The failure of the run is reported first.
+    // The command reports a lost file even if the run failed. The command reports the failure of the run first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
@@ -153,7 +153,7 @@ fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     before.chain([last]).map(value).collect()
 }
 
-/// Returns a line for each motion whose results are kept, with the values of its worst joint.
+/// Returns a line for each motion whose results are in memory, with the values of the worst joint of the motion.
 fn each_run(runs: &[Value], left_out: usize) -> String {
     let row = |run: &Value| {
         let worst = |key: &str, scale: f64, digits: usize| {
@@ -183,7 +183,7 @@ mod tests {
 
     use super::*;
 
-    /// After 100,000 runs, only the results of the last thousand are in memory, with their run numbers.
+    /// After 100,000 runs, only the results of the last thousand runs are in memory, with their run numbers.
     #[test]
     fn figures_of_the_last_motions_are_kept() {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);

@@ -10,7 +10,7 @@ use super::Course;
 use crate::failure::output_lost;
 use crate::tape::Tape;
 
-/// Output files of a run, which are opened before the run.
+/// Output files of a run, which the command opens before the run.
 pub(super) struct Outputs {
     record: Option<OutputFile>,
     report: Option<OutputFile>,
@@ -34,8 +34,8 @@ impl Outputs {
         self.record.as_mut().map(|file| Tape::begin(file, info, "the motion continues", out)).transpose()
     }
 
-    /// Completes all output files. An error in one file does not affect the other file. Returns the names of the complete files, and the
-    /// failures of the other files.
+    /// Completes all output files. If the command cannot write one output file, it still completes the other output file. Returns the
+    /// names of the complete files, and the failures for the incomplete files.
     pub(super) fn write(self, tape: Option<Tape>, input: &ReportInput<'_>) -> (Vec<String>, Vec<Failure>) {
         let record = tape.map(|tape| (tape.name().to_owned(), tape.finish(&input.info.ending)));
         let report =

@@ -1,4 +1,4 @@
-//! A run at the terminal, with progress bars, keys, events for programs and the recording.
+//! A run at the terminal, with progress bars, keys, JSON events and the recording.
 
 use std::cell::RefCell;
 use std::mem::take;
@@ -26,14 +26,14 @@ use crate::link::LinkPort;
 use crate::operator::Operator;
 use crate::tape::Tape;
 
-/// Recording of a run.
+/// Recording of a run, with its start time.
 pub(super) struct Reel {
     pub info: RecordingInfo,
     pub tape: Option<Tape>,
-    /// Start of the first motion of the recording, on the clock of the session.
+    /// Start of the first motion in the recording, on the clock of the session.
     start: Duration,
-    /// Earliest time of the next sample, s, which is directly after the last sample. If a simulator is faster than real time, its clock is
-    /// ahead of the clock of the computer.
+    /// Earliest time of the next sample, s. The earliest time is directly after the last sample. If a simulator is faster than real
+    /// time, its clock is ahead of the clock of the computer.
     until_s: f64,
 }
 
@@ -45,9 +45,9 @@ impl Reel {
 
 /// Recording and results of a run.
 pub(super) struct Taken {
-    /// Motions before the last motion.
+    /// Motions that ended before the last motion.
     pub done: Finished,
-    /// Samples of the last motion, oldest first, on the clock of the whole run.
+    /// Samples of the last motion, oldest first, on the clock of the complete run.
     pub samples: Vec<Sample>,
     pub reel: Reel,
     pub outputs: Outputs,
@@ -58,16 +58,16 @@ pub(super) struct Terminal<'a, 'o> {
     course: &'a Course,
     job: &'a Job,
     order: &'a Order<'a>,
-    /// Speed of an approach.
+    /// Speed of an approach to the first point.
     move_speed: MoveSpeed,
     outputs: Outputs,
     operator: &'a mut Operator<'o>,
     /// Recording of the run, which begins with the first motion.
     reel: Option<Reel>,
     done: Finished,
-    /// Progress bar of the upload or of the motion.
+    /// Progress bar of the upload or of the present motion.
     bar: Option<ProgressBar>,
-    /// Samples of the current motion. The clock of these samples starts `offset_s` after the clock of the run.
+    /// Samples of the present motion. The clock of these samples starts `offset_s` after the clock of the run.
     samples: Rc<RefCell<Vec<Sample>>>,
     offset_s: f64,
     /// Samples of the motion that has ended.
@@ -110,7 +110,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
         Taken { done, samples, reel, outputs }
     }
 
-    /// Begins the recording at the first motion. Returns the sink for the samples of the motion.
+    /// Begins the recording at the first motion of the run. Returns the sink for the samples of the motion.
     fn record(&mut self, phase: Phase, source: String, now: Duration) -> Result<Option<SampleSink>, Failure> {
         let reel = match &mut self.reel {
             Some(reel) => reel,
@@ -139,7 +139,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
         self.done.push(Done { phase, summary: Summary::of(&reel.info, &self.last) });
     }
 
-    /// Returns the failure of a motion that did not pass the check.
+    /// Returns the failure of a motion that did not pass the trajectory check.
     fn not_checked(&self, error: CheckError) -> Failure {
         match error {
             CheckError::Refused(verdict) => self.job.refuse(&verdict, self.operator.out),
@@ -247,7 +247,8 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
         }
         if leg.phase == Phase::Approach && leg.is_finished() {
             self.keep_figures(leg.phase);
-            // The recording must contain only the motion, so it is restarted before the first run.
+            // The recording must contain only the motion of the runs, so the command restarts the recording before the
+            // first run.
             if self.runs == 0
                 && let Some(tape) = take(&mut self.reel).and_then(|reel| reel.tape)
             {
@@ -264,13 +265,13 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
     }
 }
 
-/// Returns the failure if the user ended the command before it moved the arm. `during` is the name of the current step.
+/// Returns the failure if the user ended the command before the arm moved. `during` is the name of the current step.
 pub(super) fn cancelled(during: &str) -> Failure {
     let message = format!("cancelled during the {during}; the motion was not started");
     Failure { message, ..Failure::of(&Error::Cancelled) }
 }
 
-/// Returns the failure if an output file cannot be written and the arm has not moved yet.
+/// Returns the failure if the command cannot write an output file and the arm has not moved yet.
 fn not_started(failure: Failure) -> Failure {
     Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
         .next("free disk space or choose another place, then run again")

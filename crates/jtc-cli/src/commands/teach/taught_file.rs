@@ -1,4 +1,5 @@
-//! Trajectory file of a hand-guided motion. The file is written during teaching, so that it is complete even if the program is killed.
+//! Trajectory file of a hand-guided motion. The command writes the file during teaching, so that the file is valid even if the program
+//! is killed.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -11,28 +12,28 @@ use crate::failure::recording_interrupted;
 
 /// Largest movement at which the arm counts as at rest, rad.
 const STILL: f64 = 0.002;
-/// Interval of the controller's statuses, s. The rows of the file have this interval. The clock of the host is used only to detect lost
-/// statuses.
+/// Interval of the statuses of the controller, s. The rows of the file have the same interval. The command uses the clock of the host
+/// only to detect lost statuses.
 const GRID_S: f64 = 0.04;
-/// Smallest number of rows of a motion.
+/// Smallest number of rows in the file of a motion.
 const LEAST: usize = 3;
 const HEADER: &str = "t,q1,q2,q3,q4,q5,q6\n";
 
-/// Row of the file with one pose.
+/// Row of the trajectory file with one pose.
 struct Row {
     position: [f64; 6],
-    /// Length of the file including this row, bytes.
+    /// Length of the file up to the end of this row, bytes.
     end: usize,
 }
 
-/// File with the rows of the motion, one pose at rest before the motion, and one pose at rest after the motion.
+/// File with the rows of the motion, one row at rest before the motion, and one row at rest after the motion.
 pub(super) struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// First pose of the present time at rest, and the number of the last grid interval at rest.
+    /// First pose of the present time at rest, and the number of the last grid interval of this time.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,
@@ -53,7 +54,7 @@ impl TaughtFile {
         }
     }
 
-    /// Returns the name of the file that is shown to the user.
+    /// Returns the name of the file for messages to the user.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -63,7 +64,7 @@ impl TaughtFile {
         self.file.is_some()
     }
 
-    /// Adds the pose at a time (s). If the arm has moved, the pose is written to the file before the function returns.
+    /// Adds the pose at a time (s). If the arm has moved, the function writes the pose to the file before it returns.
     pub(super) fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
         let slot = (time_s / GRID_S).round() as i64;
         if slot <= self.last_slot {
@@ -110,8 +111,8 @@ impl TaughtFile {
         moving.map_or(0, |i| i + 2).min(self.rows.len())
     }
 
-    /// Removes the final time at rest, and describes the contents of the file. Returns `None` if the arm was not moved, so that no row was
-    /// written. If a tolerance (rad) is specified, waypoints replace the motion.
+    /// Removes the rows of the final time at rest, and describes the contents of the file. Returns `None` if the arm did not move, so that
+    /// the file has no row. If a tolerance (rad) is specified, waypoints replace the motion.
     pub(super) fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
         let kept = self.in_motion();
         let Self { name, file, mut text, mut rows, .. } = self;
@@ -186,7 +187,8 @@ mod tests {
         );
     }
 
-    /// At every speed, a straight path is reduced to its two end points. The old motion is removed from the file.
+    /// At every speed, the command reduces a straight path to its two end points. The command also removes the old
+    /// motion from the file.
     #[test]
     fn a_motion_by_hand_becomes_waypoints() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,8 +1,8 @@
 //! Measurements of a board's program on the emulated chip: instruction counts, interrupt latencies and stack use.
 //!
 //! `cargo run --release --example figures -- ELF [--cycles]` prints identical lines on every computer. `--cycles` adds
-//! an estimate for one control step, from llvm-mca's model of the Cortex-M7. The estimate depends on the version of
-//! LLVM.
+//! an estimate of the clock cycles of one control step, computed by llvm-mca with its model of the Cortex-M7. The
+//! estimate depends on the version of LLVM.
 #[path = "figures/cycles.rs"]
 mod cycles;
 #[path = "../tests/rig/mod.rs"]
@@ -34,9 +34,9 @@ const HANDLERS: [(&str, usize); 8] = [
 /// Longest time from the tick's timer event to the first instruction of the tick, ns.
 const LATENCY_MAX: u64 = 1_000;
 
-/// Time during which every instruction is checked, ms.
+/// Time during which the measurement checks after every instruction if interrupts are masked, ms.
 const MASK_MS: u64 = 150;
-/// Number of stack bytes that must never be used.
+/// Number of stack bytes that the program must never use.
 const STACK_SPARE: u32 = 4_096;
 
 fn main() -> ExitCode {
@@ -106,8 +106,8 @@ fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     Ok((top, 0x2000_0000))
 }
 
-/// Prints the instruction count, the latency and the stack use of each handler. Instructions of handlers that
-/// interrupt it are not counted.
+/// Prints the instruction count, the latency and the stack use of each handler. The count of a handler does not include
+/// the instructions of other handlers that interrupt it.
 fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     for (name, number) in HANDLERS {
         let (count, latency) = (observers.handlers[number], observers.latencies[number]);
@@ -127,8 +127,8 @@ fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Prints the stack use of each context, including the exception frames. Each context can be interrupted by handlers of
-/// a higher priority.
+/// Prints the stack use of each context, including the exception frames. Handlers of a higher priority can interrupt
+/// each context.
 fn stacks(observers: &Observers, (top, bottom): (u32, u32)) -> Result<(), Box<dyn Error>> {
     let size = top - bottom;
     let mut sum = top - observers.lowest_sp[0];

@@ -1,5 +1,5 @@
-//! The board with its firmware and its environment: a simulated arm with drives and gripper on the joint bus, and a
-//! host on each serial line.
+//! The board with its firmware and its environment. The environment consists of a simulated arm with drives and gripper
+//! on the joint bus, and of a host on each serial line.
 use std::cell::{Ref, RefCell};
 use std::rc::Rc;
 
@@ -20,26 +20,27 @@ const SAFETY: (Pin, Pin) = (Pin('D', 3), Pin('D', 4));
 /// A serial port of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Port {
-    /// Serial port at the host connector.
+    /// USART2, which is the serial port at the host connector.
     Usart2,
-    /// Virtual serial port of the ST-LINK.
+    /// USART3, which is the virtual serial port of the ST-LINK.
     Usart3,
 }
 
 /// Settings of a [`Board`].
 #[derive(Clone, Debug)]
 pub struct BoardConfig {
-    /// Arm, drives and gripper. The settings of the simulator's own controller and serial line are not used.
+    /// Settings of the simulated arm, drives and gripper. The settings of the simulator's own controller and serial
+    /// line are not used.
     pub sim: SimConfig,
     /// `true` if no other node is on the joint bus.
     pub no_bus: bool,
-    /// Bit rate of both hosts' serial lines, bit/s.
+    /// Bit rate of the serial lines of both hosts, bit/s.
     pub baud: u32,
     /// Pins of the safety input and the safety output.
     pub safety_pins: (Pin, Pin),
     /// Seed of the initial contents of RAM.
     pub seed: u64,
-    /// Initial contents of flash bank 2; the program's data in bank 2 overwrite them.
+    /// Initial contents of flash bank 2; data of the firmware for bank 2 overwrite these contents.
     pub bank2: Bank2,
 }
 
@@ -83,7 +84,7 @@ impl CanPeers for Nodes {
 
 /// The machine and the plant, which advance one millisecond at a time.
 pub struct Board {
-    /// The machine.
+    /// The emulated machine.
     pub machine: Machine,
     plant: Rc<RefCell<Plant>>,
     faults: Vec<FaultKind>,
@@ -108,13 +109,13 @@ impl Board {
         Self { machine, plant, faults: Vec::new(), safety: config.safety_pins, ms: 0 }
     }
 
-    /// Returns the time since power-on, ms.
+    /// Returns the virtual time since power-on, ms.
     pub fn now_ms(&self) -> u64 {
         self.ms
     }
 
-    /// Advances the board and its environment by one millisecond. The machine and the bus advance first, and then the
-    /// drives and the arm.
+    /// Advances the board and its environment by one millisecond. The machine and the joint bus advance first, and then
+    /// the drives and the arm.
     pub fn step(&mut self) {
         self.ms += 1;
         self.machine.run_until(self.ms * MILLISECOND);
@@ -122,7 +123,7 @@ impl Board {
         self.plant.borrow_mut().step(safety);
     }
 
-    /// Runs `ms` milliseconds.
+    /// Runs the board and its environment for `ms` milliseconds.
     pub fn run_ms(&mut self, ms: u64) {
         for _ in 0..ms {
             self.step();
@@ -134,15 +135,15 @@ impl Board {
         self.plant.borrow()
     }
 
-    /// Starts a simulated fault of a node, the arm, the safety input or the bus. Faults (`FaultKind`) of the
-    /// simulator's own serial line and tick have no effect here.
+    /// Starts a simulated fault of a node, the arm, the safety input or the joint bus. Faults (`FaultKind`) of the
+    /// simulator's own serial line and tick have no effect on this board.
     pub fn inject(&mut self, kind: FaultKind) {
         self.plant.borrow_mut().begin(kind);
         self.faults.push(kind);
         self.apply_faults();
     }
 
-    /// Ends a fault.
+    /// Ends a simulated fault.
     pub fn heal(&mut self, kind: FaultKind) {
         self.faults.retain(|&k| k != kind);
         self.apply_faults();
@@ -181,17 +182,17 @@ impl Board {
         }
     }
 
-    /// Sets the rate of the host at a port, bit/s.
+    /// Sets the bit rate of the host at a port, bit/s.
     pub fn set_baud(&mut self, port: Port, baud: u32) {
         self.machine.chip().usarts[Self::index(port)].host_baud = baud;
     }
 
-    /// Returns the rate that the firmware has set at a port, bit/s; 0 if no rate is set.
+    /// Returns the bit rate that the firmware has set at a port, bit/s; 0 if no rate is set.
     pub fn firmware_baud(&self, port: Port) -> u32 {
         self.machine.uc.get_data().usarts[Self::index(port)].baud()
     }
 
-    /// Sends bytes from the host after the bytes that already wait for transmission.
+    /// Sends bytes from the host, after the host bytes that already wait for transmission.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         let chip = self.machine.chip();
         let now = chip.now();
@@ -203,7 +204,7 @@ impl Board {
         self.machine.uc.get_data().usarts[Self::index(port)].host_pending()
     }
 
-    /// Returns the bytes that the host has received since the last call, with their times.
+    /// Returns the bytes that the host has received since the last call, with their arrival times.
     pub fn read_timed(&mut self, port: Port) -> Vec<WireByte> {
         self.machine.chip().usarts[Self::index(port)].take_output().collect()
     }

@@ -1,4 +1,4 @@
-//! The chip around the core: address map, clocks and interrupt lines of the peripherals, and virtual time.
+//! The chip around the core: the address map, clocks and interrupt lines of the peripherals, and virtual time.
 mod access;
 mod map;
 
@@ -31,81 +31,81 @@ const USART_LINES: [usize; 2] = [38, 39];
 /// Interrupt lines of FDCAN1.
 const FDCAN_LINES: [usize; 2] = [19, 21];
 
-/// Accesses to a register that the emulator does not model.
+/// Counts of accesses to a register that the emulator does not model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Access {
-    /// Reads.
+    /// Number of reads of the register.
     pub reads: u32,
-    /// Writes.
+    /// Number of writes to the register.
     pub writes: u32,
     /// Address of the last instruction that accessed the register.
     pub pc: u32,
-    /// Value written last.
+    /// Value that was written last.
     pub value: u32,
 }
 
 /// State of the core that is used by the hook that runs before every instruction.
 #[derive(Default)]
 pub struct Core {
-    /// Instructions executed.
+    /// Number of instructions that the core has executed.
     pub instructions: u64,
-    /// Instruction count at which the hook makes further checks.
+    /// Instruction count at which the hook does further checks.
     pub look_at: u64,
     /// Instruction count before which the machine must stop.
     pub stop_at: u64,
-    /// Address of the last instruction that was started.
+    /// Address of the last instruction that the core started.
     pub pc: u32,
     /// Addresses of the instructions in the last IT block.
     pub it_block: Range<u32>,
-    /// `true` if a stop was requested.
+    /// `true` if a stop of the machine was requested.
     pub stopping: bool,
     /// `true` if the main loop must handle a change before the next instruction.
     pub attention: bool,
-    /// `true` if a pending exception is blocked only by masks.
+    /// `true` if only the mask registers block a pending exception.
     pub masked: bool,
     /// `true` if the previous instruction may have lowered the stack pointer.
     pub check_sp: bool,
-    /// Event register.
+    /// Event register of the core, which WFE tests.
     pub event: bool,
     /// Number of an exception that an instruction raised.
     pub raised: Option<u32>,
     /// Address of an access that failed.
     pub fault_address: u32,
-    /// Address of an access that the bus or the protection unit rejected.
+    /// Address of an access that the memory bus or the protection unit rejected.
     pub refused: Option<u32>,
-    /// Active exceptions, the innermost last.
+    /// Active exceptions; the innermost exception is the last element.
     pub contexts: Vec<usize>,
 }
 
-/// The chip.
+/// The chip around the core, with its peripherals.
 pub struct Chip {
-    /// Core.
+    /// State of the core.
     pub core: Core,
     /// Class of each instruction in memory.
     pub code: Code,
-    /// Interrupts.
+    /// Interrupt controller.
     pub nvic: Nvic,
     /// Registers of the core.
     pub scs: Scs,
-    /// Clocks and resets.
+    /// Clock and reset control.
     pub rcc: Rcc,
-    /// Pins.
+    /// Pins of the chip.
     pub gpio: Gpio,
     /// Edge detection of pins.
     pub exti: Exti,
-    /// DMA1, DMA2.
+    /// DMA controllers DMA1 and DMA2.
     pub dma: Dma,
-    /// TIM2..TIM7.
+    /// Timers TIM2 to TIM7.
     pub timers: [Timer; 6],
-    /// USART2, USART3.
+    /// Serial ports USART2 and USART3.
     pub usarts: [Usart; 2],
-    /// FDCAN1 and the bus.
+    /// FDCAN1 and the joint bus.
     pub fdcan: Fdcan,
     /// Bank 2 of the flash.
     pub flash: Flash,
-    /// Watchdog.
+    /// Independent watchdog.
     pub iwdg: Iwdg,
-    /// Observers.
+    /// Observers that measure the running firmware.
     pub observers: Observers,
     plain: Plain,
     /// Accesses to registers that the emulator does not model, by address.
@@ -158,7 +158,7 @@ impl Chip {
         self.base_time + (self.core.instructions - self.base_instructions) * self.cycle
     }
 
-    /// Returns the number of core clock cycles, including sleep.
+    /// Returns the number of core clock cycles since power-on, including sleep.
     pub fn cycles(&self) -> u64 {
         self.base_cycles + (self.core.instructions - self.base_instructions)
     }
@@ -183,7 +183,7 @@ impl Chip {
         }
     }
 
-    /// Applies new frequencies.
+    /// Applies the clock frequencies that the registers now configure.
     fn update_clocks(&mut self) {
         let clocks = self.rcc.clocks();
         let now = self.now();
@@ -202,7 +202,7 @@ impl Chip {
         }
     }
 
-    /// Resets everything except memory, with these reset flags.
+    /// Resets the core and all peripherals, but not the memory, and sets these reset flags.
     pub fn reset(&mut self, flags: u32) {
         let now = self.now();
         self.rcc.reset(flags);
@@ -226,7 +226,7 @@ impl Chip {
         self.update_clocks();
     }
 
-    /// Drives a pin from outside; with `None`, the pin is not connected. EXTI detects the edges.
+    /// Drives a pin from outside the chip; with `None`, the pin is not connected. EXTI detects the edges of the pin.
     pub fn drive_pin(&mut self, pin: Pin, level: Option<bool>) {
         let Some(port) = Gpio::port(pin) else { return };
         let before = self.gpio.levels(port);
@@ -243,7 +243,7 @@ impl Chip {
         }
     }
 
-    /// Executes all events that are due, and updates the interrupt lines.
+    /// Executes all events of the peripherals that are due, and updates the interrupt lines.
     pub fn advance(&mut self, memory: &mut dyn Memory) {
         let now = self.now();
         for timer in &mut self.timers {
@@ -286,7 +286,8 @@ impl Chip {
         timers.chain(usarts).chain(others).min().unwrap_or(NEVER)
     }
 
-    /// Returns supply and voltage scale, which are the PWR register CR3 and the VOS code of D3CR.
+    /// Returns the state of the power supply: the PWR register CR3, and the VOS code of D3CR, which is the voltage
+    /// scale.
     pub fn supply(&self) -> (u32, u32) {
         (self.plain.read(PWR + 0x0C), self.plain.read(PWR + 0x18) >> 14 & 3)
     }

@@ -1,10 +1,11 @@
-//! Virtual time. In its unit, the grain, the period of every clock on the board is a whole number.
+//! Virtual time of the emulator. The unit of virtual time is the grain. In grains, the period of every clock on the
+//! board is a whole number.
 
 /// Point in virtual time or duration, in grains; 1 s = [`SECOND`] grains.
 pub type Time = u64;
 
-/// Grains per second: the least common multiple of 64, 85, 400 and 480 MHz, so that rounding does not cause drift
-/// between core clock, CAN bits and timer ticks.
+/// Grains per second: the least common multiple of 64, 85, 400 and 480 MHz. With this unit, rounding does not cause
+/// drift between core clock, CAN bits and timer ticks.
 pub const SECOND: Time = 81_600_000_000;
 /// Grains per millisecond.
 pub const MILLISECOND: Time = SECOND / 1_000;
@@ -28,7 +29,7 @@ pub fn to_ns(time: Time) -> u64 {
     (u128::from(time) * 1_000_000_000 / u128::from(SECOND)) as u64
 }
 
-/// Converts nanoseconds to a time, rounded down to the grain.
+/// Converts nanoseconds to a time, rounded down to a whole grain.
 pub fn from_ns(ns: u64) -> Time {
     (u128::from(ns) * u128::from(SECOND) / 1_000_000_000) as u64
 }

@@ -1,26 +1,27 @@
-//! Properties of instructions that the machine must know before it executes an instruction; stored for each address.
+//! Properties of instructions that the machine must know before it executes an instruction. The module stores these
+//! properties for each address.
 //!
-//! Unicorn executes `SEV` without effect, does not report changes of the stack pointer, and skips the instructions of
-//! an IT block whose condition is false. When an address is executed for the first time, the machine therefore
-//! recognises these instructions by their first half-word.
+//! Unicorn executes `SEV` without effect and does not report changes of the stack pointer. Unicorn also skips the
+//! instructions of an IT block whose condition is false. When the machine executes an address for the first time, it
+//! therefore recognises these instructions by their first half-word.
 
-/// The address has not been checked yet.
+/// Class of an address that has not been checked yet.
 pub const UNKNOWN: u16 = 0;
-/// An instruction without special handling.
+/// Class of an instruction without special handling.
 pub const PLAIN: u16 = 1;
 /// Instruction that sets the event register.
 pub const SEV: u16 = 2;
 /// Instruction that may lower the stack pointer.
 pub const LOWERS_SP: u16 = 4;
-/// An observer watches this address.
+/// Mark of an address that an observer watches.
 pub const WATCHED: u16 = 8;
-/// Instruction that begins an IT block. All instructions of the block are counted with the first one, because the core
-/// fetches and issues every instruction regardless of its condition.
+/// Instruction that begins an IT block. The machine counts all instructions of the block together with this
+/// instruction, because the core fetches and issues every instruction regardless of its condition.
 pub const IT: u16 = 16;
 /// Instruction inside an IT block.
 pub const MEMBER: u16 = 32;
-/// Bit positions of two numbers in the class of an IT instruction: the instructions in the block, and the
-/// half-words of these instructions.
+/// Bit positions of two numbers in the class of an IT instruction: the number of instructions in the block, and the
+/// number of half-words of these instructions.
 const MEMBERS: u32 = 8;
 const HALF_WORDS: u32 = 12;
 
@@ -28,7 +29,7 @@ const FLASH: u32 = 0x0800_0000;
 const FLASH_SIZE: u32 = 0x20_0000;
 const ITCM_SIZE: u32 = 0x1_0000;
 
-/// Classes of the instructions in ITCM and flash. Instructions in other memory are classified each time.
+/// Classes of the instructions in ITCM and flash. The machine classifies instructions in other memory each time.
 pub struct Code {
     flash: Vec<u16>,
     itcm: Vec<u16>,
@@ -59,8 +60,7 @@ impl Code {
         self.itcm.get_mut(address as usize / 2)
     }
 
-    /// Stores the class of an address. Does not change the marks for observers and for instructions inside an IT
-    /// block.
+    /// Stores the class of an address. The marks for observers and for instructions inside an IT block do not change.
     pub fn learn(&mut self, address: u32, class: u16) {
         if let Some(place) = self.place(address) {
             *place = class | *place & (WATCHED | MEMBER);
@@ -78,7 +78,7 @@ impl Code {
         }
     }
 
-    /// Removes the classes of bytes that were written from outside. Returns `true` if the bytes may be code.
+    /// Removes the stored classes of bytes that `Machine::poke` has written. Returns `true` if the bytes may be code.
     pub fn forget(&mut self, address: u32, length: u32) -> bool {
         let mut code = false;
         for at in address..address.saturating_add(length) {
@@ -89,7 +89,7 @@ impl Code {
         code
     }
 
-    /// Removes the classes of ITCM, because its contents have changed or will change.
+    /// Removes the stored classes of instructions in ITCM, because the contents of ITCM have changed or will change.
     pub fn forget_itcm(&mut self) {
         for place in &mut self.itcm {
             *place &= WATCHED;
@@ -126,19 +126,20 @@ pub fn block(class: u16) -> (u32, u32) {
     (u32::from(class >> MEMBERS) & 7, 2 * (u32::from(class >> HALF_WORDS) & 15))
 }
 
-/// Returns the class of an IT instruction whose block has this number of instructions and bytes.
+/// Returns the class of an IT instruction whose block has this number of instructions and this number of bytes.
 pub fn begins_block(members: u32, bytes: u32) -> u16 {
     IT | ((members << MEMBERS) | ((bytes / 2) << HALF_WORDS)) as u16
 }
 
-/// Returns the number of instructions in the IT block that an instruction with this first half-word begins, or 0 if
-/// no IT block begins.
+/// Returns the number of instructions in the IT block that an instruction with this first half-word begins. Returns 0
+/// if the instruction does not begin an IT block.
 pub fn it_block(first: u16) -> u32 {
-    // The lowest set bit of the mask ends the block. If no bit is set, the instruction is a hint.
+    // The lowest set bit of the mask determines the end of the block. If no bit of the mask is set, the instruction is
+    // a hint.
     if first & 0xFF00 == 0xBF00 && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 }
 }
 
-/// Returns the length (in bytes) of the instruction with this first half-word.
+/// Returns the length of the instruction with this first half-word, in bytes.
 pub fn length(first: u16) -> u32 {
     if first >= 0xE800 { 4 } else { 2 }
 }

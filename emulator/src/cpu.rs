@@ -1,9 +1,10 @@
-//! The Cortex-M7 core. Unicorn executes the instructions; the loop in this module provides time, exceptions and sleep.
+//! Model of the Cortex-M7 core. Unicorn executes the instructions; the loop in this module models time, exceptions and
+//! sleep.
 //!
 //! Every instruction takes one cycle of the core clock. A hook runs before each instruction. The hook counts the
-//! instruction and stops the execution exactly when the next event is due. All instructions of an IT block are
-//! counted at its beginning, because the hardware also takes time for instructions whose condition is false. An IT
-//! block is never interrupted.
+//! instruction and stops the execution exactly when the next event is due. At the beginning of an IT block, the hook
+//! counts all instructions of the block, because the hardware also takes time for instructions whose condition is
+//! false. The execution never stops within an IT block.
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, uc_error};
 use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
 
@@ -31,19 +32,19 @@ mod raised {
 const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 impl Machine {
-    /// Creates a machine with this firmware in its flash, and switches the power on. `seed` determines the
-    /// initial contents of RAM.
+    /// Creates a machine with this firmware in its flash, and switches the power on. `seed` determines the initial
+    /// contents of RAM.
     ///
     /// # Panics
-    /// If Unicorn refuses its configuration, which no input can cause.
+    /// Panics if Unicorn rejects its configuration, which no input can cause.
     pub fn new(elf: Elf, seed: u64) -> Self {
         Self::with_bank2(elf, seed, Bank2::default())
     }
 
-    /// Like [`Machine::new`], with the previous contents of bank 2 of the flash.
+    /// Like [`Machine::new`], with these initial contents of flash bank 2.
     ///
     /// # Panics
-    /// Same as [`Machine::new`].
+    /// Panics under the same conditions as [`Machine::new`].
     pub fn with_bank2(elf: Elf, seed: u64, bank: Bank2) -> Self {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, Chip::default()).expect("Unicorn");
         uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M7 as i32).expect("the model of the core");
@@ -53,7 +54,7 @@ impl Machine {
         uc.get_data_mut().flash.bank = bank;
         let mut machine = Self { uc, elf, sleep: Sleep::Awake };
         for (address, bytes) in machine.elf.segments.clone() {
-            // Segments outside the memory of this board are ignored; the linker checks them.
+            // The machine ignores segments outside the memory of this board; the linker checks these segments.
             machine.poke(address, &bytes);
         }
         let reset = Reset { time: 0, cause: ResetCause::PowerOn, pc: 0 };
@@ -62,7 +63,7 @@ impl Machine {
         machine
     }
 
-    /// Runs the machine until a point in virtual time.
+    /// Runs the machine until `end`, a point in virtual time.
     pub fn run_until(&mut self, end: Time) {
         while self.now() < end {
             self.slice(end);
@@ -70,7 +71,7 @@ impl Machine {
         self.catch_up();
     }
 
-    /// Resets the machine by the reset pin or by SYSRESETREQ. RAM and the existing reset flags do not change.
+    /// Resets the machine as the reset pin or SYSRESETREQ does. RAM and the existing reset flags do not change.
     pub fn reset(&mut self, cause: ResetCause) {
         let flags = match cause {
             ResetCause::PowerOn => flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU,
@@ -152,7 +153,7 @@ impl Machine {
         self.execute();
     }
 
-    /// Ends a sleep if its wake-up condition is met.
+    /// Ends the sleep of the core if its wake-up condition is met.
     fn wake(&mut self, masks: Masks) {
         let chip = self.uc.get_data_mut();
         let pended = core::mem::take(&mut chip.nvic.pended);
@@ -247,7 +248,7 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
         uc.get_data_mut().core.raised = Some(number);
         let _ = uc.emu_stop();
     });
-    // A hook on all of the memory would slow down every store.
+    // A hook on the complete memory would slow down every store.
     let invalid = memory::FORBIDDEN.into_iter().all(|(first, last)| {
         let note = |uc: &mut Unicorn<'_, Chip>, _, address: u64, _, _| {
             uc.get_data_mut().core.fault_address = address as u32;
@@ -258,11 +259,11 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
     assert!(code.is_ok() && raised.is_ok() && invalid, "Unicorn takes hooks");
 }
 
-/// Handles an instruction that needs special treatment, before the instruction is executed.
+/// Handles an instruction that needs special treatment, before the core executes the instruction.
 fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     let chip = uc.get_data_mut();
     if chip.core.it_block.contains(&address) {
-        // The instruction was counted at the beginning of its IT block, and the execution must not stop within the
+        // This instruction was counted at the beginning of its IT block, and the execution must not stop within the
         // block.
         chip.core.pc = address;
         return;
@@ -278,7 +279,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
         let core = &mut uc.get_data_mut().core;
         core.stopping = true;
         core.look_at = 0;
-        // The previous instruction is complete. The execution may be stopped only at this point.
+        // The previous instruction is complete. The execution may stop only at this point.
         let _ = uc.emu_stop();
         return;
     }
@@ -334,7 +335,7 @@ fn half_word(uc: &Unicorn<'_, Chip>, address: u32) -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// Returns `true` if the current masks permit a pending exception.
+/// Returns `true` if the current mask registers permit a pending exception.
 fn unmasked(uc: &Unicorn<'_, Chip>) -> bool {
     let read = |register: RegisterARM| uc.reg_read(register).unwrap_or(0);
     let masks = Masks {

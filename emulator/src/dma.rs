@@ -1,7 +1,7 @@
 //! DMA1, DMA2 and DMAMUX1 (RM0399 chapters 15 to 18): single transfers between a peripheral and memory, in circular
 //! or normal mode, with half-transfer and transfer-complete flags.
 
-/// Number of streams of both controllers. Streams 0..8 belong to DMA1, streams 8..16 to DMA2.
+/// Number of streams of both DMA controllers. Streams 0..8 belong to DMA1, streams 8..16 to DMA2.
 pub const STREAMS: usize = 16;
 
 const EN: u32 = 1;
@@ -10,19 +10,19 @@ const TO_PERIPHERAL: u32 = 0x40;
 const CIRC: u32 = 0x100;
 const MINC: u32 = 0x400;
 
-/// Flags of a stream, as bit positions within the six bits of the stream in LISR or HISR.
+/// Flags of a DMA stream, as bit positions within the six bits of the stream in LISR or HISR.
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
 const TEIF: u32 = 1 << 3;
 
-/// Interrupt lines of the streams.
+/// Interrupt lines of the DMA streams.
 pub const LINES: [usize; STREAMS] = [11, 12, 13, 14, 15, 16, 17, 47, 56, 57, 58, 59, 60, 68, 69, 70];
 
 /// Memory that the DMA controllers access.
 pub trait Memory {
-    /// Reads bytes; returns `false` at an unmapped address.
+    /// Reads bytes from memory. Returns `false` at an unmapped address.
     fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool;
-    /// Writes bytes; returns `false` at an unmapped address.
+    /// Writes bytes to memory. Returns `false` at an unmapped address.
     fn write(&mut self, address: u32, bytes: &[u8]) -> bool;
 }
 
@@ -52,7 +52,7 @@ impl Stream {
         self.m0ar.wrapping_add((self.total - self.left) * self.size())
     }
 
-    /// Counts one transfer.
+    /// Counts one transfer of the stream.
     fn done(&mut self) {
         self.left -= 1;
         if self.left == self.total / 2 {
@@ -69,7 +69,7 @@ impl Stream {
     }
 }
 
-/// Both controllers and the request multiplexer.
+/// Both DMA controllers and the request multiplexer.
 #[derive(Default)]
 pub struct Dma {
     streams: [Stream; STREAMS],
@@ -83,14 +83,14 @@ fn reachable(address: u32) -> bool {
 }
 
 impl Dma {
-    /// Resets a controller, 0 or 1.
+    /// Resets DMA controller 0 or 1.
     pub fn reset(&mut self, controller: usize) {
         for stream in self.streams.iter_mut().skip(8 * controller).take(8) {
             *stream = Stream { request: stream.request, ..Stream::default() };
         }
     }
 
-    /// Reads a word of controller 0 or 1.
+    /// Reads a register of DMA controller 0 or 1.
     pub fn read(&self, controller: usize, offset: u32) -> u32 {
         let streams = &self.streams[8 * controller..8 * controller + 8];
         match offset {
@@ -113,7 +113,7 @@ impl Dma {
         }
     }
 
-    /// Writes a word of controller 0 or 1.
+    /// Writes a register of DMA controller 0 or 1.
     pub fn write(&mut self, controller: usize, offset: u32, value: u32) {
         let streams = &mut self.streams[8 * controller..8 * controller + 8];
         match offset {
@@ -129,7 +129,8 @@ impl Dma {
                 match (offset - 0x10) % 0x18 {
                     0x00 => {
                         if enabled && value & EN == 0 {
-                            // When a running stream is switched off, the transfer-complete flag is set.
+                            // If the program switches off a running stream, the transfer-complete flag of the stream is
+                            // set.
                             stream.flags |= TCIF;
                         }
                         stream.cr = value;
@@ -155,24 +156,24 @@ impl Dma {
         }
     }
 
-    /// Reads a word of DMAMUX1.
+    /// Reads a register of DMAMUX1.
     pub fn read_mux(&self, offset: u32) -> u32 {
         self.streams.get(offset as usize / 4).map_or(0, |s| s.request)
     }
 
-    /// Writes a word of DMAMUX1.
+    /// Writes a register of DMAMUX1.
     pub fn write_mux(&mut self, offset: u32, value: u32) {
         if let Some(stream) = self.streams.get_mut(offset as usize / 4) {
             stream.request = value;
         }
     }
 
-    /// Returns the running stream that serves a request line.
+    /// Returns the running DMA stream that serves a request line.
     pub fn serving(&self, request: u32) -> Option<usize> {
         self.streams.iter().position(|s| s.cr & EN != 0 && s.request & 0x7F == request)
     }
 
-    /// Returns the number of transfers until the next interrupt of the stream that is enabled.
+    /// Returns the number of transfers until the next enabled interrupt of the DMA stream.
     pub fn until_interrupt(&self, stream: usize) -> Option<u32> {
         let s = &self.streams[stream];
         let half = (s.cr & 8 != 0).then(|| s.left.checked_sub(s.total / 2)).flatten().filter(|&n| n > 0);
@@ -211,7 +212,7 @@ impl Dma {
         s.cr &= !EN;
     }
 
-    /// Returns the level of the interrupt line of a stream.
+    /// Returns the level of the interrupt line of a DMA stream.
     pub fn line(&self, stream: usize) -> bool {
         let s = &self.streams[stream];
         // The enable bits TEIE, HTIE and TCIE are in the same order as their flags.
@@ -219,7 +220,7 @@ impl Dma {
     }
 }
 
-/// Bit positions of the flags of four streams in a status register.
+/// Bit positions of the flags of four DMA streams in a status register.
 const SHIFTS: [u32; 4] = [0, 6, 16, 22];
 
 #[cfg(test)]

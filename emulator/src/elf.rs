@@ -1,27 +1,27 @@
-//! ELF file of the firmware, with symbols and with segments and their load addresses.
+//! The ELF file of the firmware, with its symbols and the load addresses of its segments.
 use std::collections::BTreeMap;
 use std::fmt;
 
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Object, ObjectSymbol, SymbolKind};
 
-/// Reason why an ELF file cannot be used.
+/// Reason why the emulator cannot use an ELF file.
 #[derive(Debug)]
 pub enum ElfError {
     /// The file is not an ELF file, or is damaged.
     Bad(object::Error),
     /// No symbol has this name.
     NoSymbol {
-        /// Requested name.
+        /// Name of the requested symbol.
         name: String,
-        /// Similar names.
+        /// Names of symbols that are similar to the requested name.
         near: Vec<String>,
     },
-    /// More than one symbol contains this text in its name.
+    /// The names of several symbols contain the requested text.
     Ambiguous {
-        /// Requested text.
+        /// Text that the caller searched for.
         name: String,
-        /// Names of the symbols that contain the text.
+        /// Names of the symbols that contain the requested text.
         found: Vec<String>,
     },
 }
@@ -48,18 +48,18 @@ impl From<object::Error> for ElfError {
     }
 }
 
-/// A symbol.
+/// A symbol of the ELF file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Symbol {
     /// Address of the symbol; the address of a function is without the Thumb bit.
     pub address: u32,
-    /// Size in bytes.
+    /// Size of the symbol in bytes.
     pub size: u32,
     /// `true` if the symbol is code.
     pub code: bool,
 }
 
-/// The parts of the file that are loaded into memory.
+/// The parts of the ELF file that are loaded into memory.
 #[derive(Clone, Debug, Default)]
 pub struct Elf {
     /// Load address and contents of each segment.
@@ -95,19 +95,19 @@ impl Elf {
         Ok(elf)
     }
 
-    /// Creates a firmware that contains only these bytes at an address.
+    /// Creates a firmware that contains only these bytes at this address.
     pub fn from_image(address: u32, bytes: Vec<u8>) -> Self {
         Self { segments: vec![(address, bytes)], symbols: BTreeMap::new() }
     }
 
-    /// Adds a symbol.
+    /// Adds a symbol to the firmware.
     pub fn with_symbol(mut self, name: &str, symbol: Symbol) -> Self {
         self.symbols.insert(name.to_owned(), symbol);
         self
     }
 
-    /// Finds a symbol by its full name, or by a part of the name that no other symbol contains. Rust names are spelled
-    /// as in the source, without the hash.
+    /// Finds a symbol by its full name, or by a part of the name that no other symbol contains. Rust names have the
+    /// same spelling as in the source, without the hash.
     pub fn symbol(&self, name: &str) -> Result<Symbol, ElfError> {
         if let Some(symbol) = self.symbols.get(name) {
             return Ok(*symbol);
@@ -127,7 +127,7 @@ impl Elf {
         }
     }
 
-    /// Returns all symbols by name.
+    /// Returns all symbols of the firmware by name.
     pub fn symbols(&self) -> &BTreeMap<String, Symbol> {
         &self.symbols
     }

@@ -1,5 +1,5 @@
-//! Entry to and return from exceptions (ARMv7-M B1.5.6 to B1.5.8). The hardware has two stack frames; this
-//! model always uses the larger frame, which includes the floating-point registers.
+//! Entry to and return from exceptions (ARMv7-M B1.5.6 to B1.5.8). The hardware has two kinds of stack frames. This
+//! model always uses the larger stack frame, which includes the floating-point registers.
 use unicorn_engine::RegisterARM::{self, *};
 
 use crate::machine::Machine;
@@ -7,17 +7,17 @@ use crate::observe::FaultKind;
 
 const BASIC: [RegisterARM; 6] = [R0, R1, R2, R3, R12, LR];
 const FLOATS: [RegisterARM; 8] = [D0, D1, D2, D3, D4, D5, D6, D7];
-/// Number of words in the frame.
+/// Number of words in the stack frame.
 const WORDS: usize = 26;
-/// Position of FPSCR in the frame.
+/// Position of FPSCR in the stack frame.
 const FPSCR_AT: usize = 24;
 
-/// Exception return values for a return to a handler, and for a return to a thread with an extended frame on the main
-/// stack.
+/// Exception return values: for a return to a handler, and for a return to a thread with an extended stack frame on the
+/// main stack.
 const TO_HANDLER: u32 = 0xFFFF_FFE1;
 const TO_THREAD: u32 = 0xFFFF_FFE9;
 
-/// Bit of the stacked xPSR that indicates a padding word.
+/// Bit of the stacked xPSR that indicates a padding word in the stack frame.
 const ALIGNED: u32 = 1 << 9;
 
 /// Enters the handler of an exception.
@@ -55,13 +55,13 @@ pub fn enter(machine: &mut Machine, exception: usize) {
     machine.set(PC, handler | 1);
     machine.chip().observers.note_sp(frame_at);
     if !stacked {
-        // The stack has overflowed its RAM.
+        // The stack has overflowed the RAM that contains it.
         machine.chip().core.fault_address = frame_at;
         machine.fault(FaultKind::BadAccess, handler);
     }
 }
 
-/// Handles the return from an exception, when a handler jumps to an exception return value.
+/// Handles the return from an exception, which occurs when a handler jumps to an exception return value.
 pub fn leave(machine: &mut Machine, to: u32) {
     let chip = machine.chip();
     let (now, instructions) = (chip.now(), chip.core.instructions);

@@ -1,16 +1,16 @@
-//! Extended interrupt and event controller (RM0399, EXTI and SYSCFG_EXTICR1..4), modelled only for pins. The edges of
-//! a pin set pending bits. A pending bit remains set until a 1 is written to it.
+//! Extended interrupt and event controller (RM0399, EXTI and SYSCFG_EXTICR1..4). This module models EXTI only for pins.
+//! The edges of a pin set pending bits. A pending bit remains set until the program writes a 1 to it.
 
-/// Number of lines that pins can use.
+/// Number of EXTI lines that pins can use.
 const LINES: usize = 16;
 
-/// Registers of lines 0..15, as core 1 sees them.
+/// Registers of EXTI lines 0..15 for core 1.
 #[derive(Clone, Debug, Default)]
 pub struct Exti {
     rtsr: u32,
     ftsr: u32,
-    /// Interrupt mask of core 1. In this model, a masked line does not set its pending bit, which is the stricter
-    /// interpretation of the manual.
+    /// Interrupt mask of core 1. In this model, a masked EXTI line does not set its pending bit, which is the stricter
+    /// of two interpretations of the manual.
     imr: u32,
     emr: u32,
     pending: u32,
@@ -37,25 +37,25 @@ impl Exti {
             0x04 => self.ftsr = value,
             0x80 => self.imr = value,
             0x84 => self.emr = value,
-            // Writing 1 clears.
+            // Writing 1 clears a pending bit.
             0x88 => self.pending &= !value,
             _ => {}
         }
     }
 
-    /// Reads SYSCFG_EXTICR1..4 (0..3).
+    /// Reads SYSCFG_EXTICR1..4; `n` is 0..3.
     pub fn source(&self, n: usize) -> u32 {
         self.exticr.get(n).copied().unwrap_or(0)
     }
 
-    /// Writes SYSCFG_EXTICR1..4 (0..3).
+    /// Writes SYSCFG_EXTICR1..4; `n` is 0..3.
     pub fn set_source(&mut self, n: usize, value: u32) {
         if let Some(register) = self.exticr.get_mut(n) {
             *register = value & 0xFFFF;
         }
     }
 
-    /// Latches the edges after the levels of the pins of a port (0 is A) have changed.
+    /// Latches the edges after the levels of the pins of a port have changed; port 0 is A.
     pub fn edges(&mut self, port: usize, before: u32, after: u32) {
         let falling = before & !after & self.ftsr;
         let rising = after & !before & self.rtsr;
@@ -75,7 +75,7 @@ mod tests {
     #[test]
     fn a_falling_edge_stays_pending_until_a_1_is_written() {
         let mut exti = Exti::default();
-        // Connects line 3 to port D.
+        // Connects EXTI line 3 to port D.
         exti.set_source(0, 3 << 12);
         exti.write(0x04, 1 << 3);
         exti.edges(3, 1 << 3, 0);

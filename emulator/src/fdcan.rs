@@ -14,7 +14,7 @@ use crate::clock::{NEVER, Time};
 use bus::NOMINAL_BIT;
 use pending::Pending;
 
-/// Bits of CCCR.
+/// Bits of register CCCR.
 mod cccr {
     pub const INIT: u32 = 1;
     pub const CCE: u32 = 2;
@@ -23,11 +23,11 @@ mod cccr {
     pub const DAR: u32 = 0x40;
     pub const FDOE: u32 = 0x100;
     pub const BRSE: u32 = 0x200;
-    /// Bits that can be changed only with INIT and CCE set.
+    /// Bits of CCCR that the program can change only with INIT and CCE set.
     pub const PROTECTED: u32 = 0xF3E0;
 }
 
-/// Bits of IR.
+/// Bits of register IR.
 mod ir {
     pub const RF0N: u32 = 1;
     pub const RF0F: u32 = 4;
@@ -43,7 +43,7 @@ mod ir {
     pub const PED: u32 = 1 << 28;
 }
 
-/// Codes of PSR.LEC.
+/// Error codes of PSR.LEC.
 mod lec {
     pub const NONE: u32 = 0;
     pub const ACK: u32 = 3;
@@ -55,10 +55,10 @@ mod lec {
 
 /// Duration of the recovery sequence after bus-off: 129 times 11 recessive bits.
 const RECOVERY: Time = 129 * 11 * NOMINAL_BIT;
-/// Duration of the recessive bits that a node must detect after INIT before it participates in bus traffic.
+/// Duration of the recessive bits that a node must detect after it leaves INIT, before it participates in bus traffic.
 const INTEGRATION: Time = 11 * NOMINAL_BIT;
 
-/// A receive FIFO.
+/// A receive FIFO of FDCAN1.
 #[derive(Clone, Copy, Default)]
 struct Fifo {
     config: u32,
@@ -68,38 +68,38 @@ struct Fifo {
     lost: bool,
 }
 
-/// State of the controller for observers.
+/// State of the CAN controller, for observers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FdcanState {
-    /// CCCR.
+    /// Value of register CCCR.
     pub cccr: u32,
-    /// NBTP.
+    /// Value of register NBTP.
     pub nbtp: u32,
-    /// DBTP.
+    /// Value of register DBTP.
     pub dbtp: u32,
-    /// TDCR.
+    /// Value of register TDCR.
     pub tdcr: u32,
     /// Transmit error counter.
     pub tec: u32,
     /// Receive error counter.
     pub rec: u32,
-    /// `true` if the controller is bus-off.
+    /// `true` if the CAN controller is bus-off.
     pub bus_off: bool,
-    /// `true` if the controller participates in bus traffic.
+    /// `true` if the CAN controller participates in bus traffic.
     pub online: bool,
     /// Nominal and data bit rate, bit/s.
     pub rates: (u32, u32),
-    /// Pending transmit requests, one bit per buffer.
+    /// Pending transmit requests, one bit per transmit buffer.
     pub pending: u32,
-    /// Number of frames lost because a FIFO was full.
+    /// Number of received frames that were lost because a FIFO was full.
     pub lost: u32,
 }
 
-/// The controller.
+/// The CAN controller FDCAN1.
 pub struct Fdcan {
-    /// The message RAM, at address 0x4000_AC00 for the core.
+    /// The message RAM, which the core accesses at address 0x4000_AC00.
     pub ram: MessageRam,
-    /// The bus.
+    /// The line of the joint bus.
     pub wire: Wire,
     kernel_hz: u64,
     cccr: u32,
@@ -127,14 +127,14 @@ pub struct Fdcan {
     txbtie: u32,
     txbcie: u32,
     plain: crate::plain::Plain,
-    /// Time from which the controller participates in bus traffic; `NEVER` in INIT.
+    /// Time from which the CAN controller participates in bus traffic; `NEVER` in INIT.
     online: Time,
     /// End of the recovery sequence after bus-off.
     recovers: Time,
     lost: u32,
-    /// Number of frames received and stored.
+    /// Number of frames that the CAN controller received and stored.
     pub stored: u64,
-    /// Number of frames that the filters rejected.
+    /// Number of received frames that the filters rejected.
     pub rejected: u64,
 }
 
@@ -190,12 +190,12 @@ impl Fdcan {
         (self.lost, self.stored, self.rejected) = (old.lost, old.stored, old.rejected);
     }
 
-    /// Sets the kernel clock.
+    /// Sets the kernel clock of FDCAN1.
     pub fn set_clock(&mut self, hz: u64) {
         self.kernel_hz = hz;
     }
 
-    /// Returns the nominal and data bit rates set by the registers, bit/s.
+    /// Returns the nominal and data bit rates that the registers set, bit/s.
     pub fn rates(&self) -> (u32, u32) {
         let rate =
             |prescaler: u32, quanta: u32| (self.kernel_hz / u64::from((prescaler + 1) * quanta)) as u32;
@@ -204,14 +204,14 @@ impl Fdcan {
         (nominal, data)
     }
 
-    /// Returns `true` if the controller's rates are within 1 % of the rates of the bus.
+    /// Returns `true` if the bit rates of the CAN controller are within 1 % of the bit rates of the bus.
     fn readable(&self) -> bool {
         let near = |rate: u32, of: u32| u64::from(rate.abs_diff(of)) * 100 <= u64::from(of);
         let (nominal, data) = self.rates();
         near(nominal, 1_000_000) && (self.cccr & cccr::BRSE == 0 || near(data, 5_000_000))
     }
 
-    /// Returns the state for observers.
+    /// Returns the state of the CAN controller for observers.
     pub fn state(&self) -> FdcanState {
         FdcanState {
             cccr: self.cccr,
@@ -232,19 +232,19 @@ impl Fdcan {
         self.psr & 0x80 != 0
     }
 
-    /// Returns the time from which the controller sends and receives. The time is `online`, or `NEVER` in INIT, clock
-    /// stop or bus-off.
+    /// Returns the time from which the CAN controller sends and receives. The time is `NEVER` in INIT, clock stop or
+    /// bus-off, otherwise `online`.
     fn takes_part(&self) -> Time {
         if self.bus_off() || self.cccr & (cccr::INIT | cccr::CSR) != 0 { NEVER } else { self.online }
     }
 
-    /// Returns the time of the controller's next event.
+    /// Returns the time of the next event of the CAN controller.
     pub fn next_event(&self) -> Time {
         let own = if self.wire.busy() { NEVER } else { self.tx.since().max(self.takes_part()) };
         self.wire.next_change().min(own).min(self.recovers)
     }
 
-    /// Executes all events up to `now`.
+    /// Executes all events of FDCAN1 and of the bus up to `now`.
     pub fn advance(&mut self, now: Time) {
         loop {
             if self.recovers <= now {
@@ -308,7 +308,7 @@ impl Fdcan {
         }
     }
 
-    /// Derives the error warning, error passive and bus-off states from the counters.
+    /// Derives the error warning, error passive and bus-off states from the error counters.
     fn update_status(&mut self) {
         let passive = self.tec >= 128 || self.rec >= 128;
         let warning = self.tec >= 96 || self.rec >= 96;
@@ -340,7 +340,7 @@ impl Fdcan {
         self.update_status();
     }
 
-    /// Returns the levels of interrupt lines 0 and 1.
+    /// Returns the levels of interrupt lines 0 and 1 of FDCAN1.
     pub fn lines(&self) -> [bool; 2] {
         let active = self.ir & self.ie;
         [active & !self.ils != 0 && self.ile & 1 != 0, active & self.ils != 0 && self.ile & 2 != 0]

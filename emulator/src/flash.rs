@@ -1,6 +1,6 @@
-//! Bank 2 of the embedded flash (RM0399 chapter 4). Erasing and programming take time, and a read during an operation
-//! stalls the core. After a loss of power during an operation, the contents are undefined. Bank 1 contains the program
-//! and remains locked.
+//! Bank 2 of the embedded flash (RM0399 chapter 4). Erasing and programming take time, and a read during a flash
+//! operation stalls the core. After a loss of power during a flash operation, the contents of the affected words are
+//! undefined. Bank 1 contains the program and remains locked.
 mod bank;
 
 use crate::clock::{MICROSECOND, SECOND, Time};
@@ -19,98 +19,100 @@ mod reg {
 }
 const SECOND_BANK: u32 = 0x100;
 
-/// Bits of CR.
+/// Bits of register CR.
 mod cr {
     pub const LOCK: u32 = 1 << 0;
     pub const PG: u32 = 1 << 1;
     pub const SER: u32 = 1 << 2;
     pub const START: u32 = 1 << 7;
     pub const EOPIE: u32 = 1 << 16;
-    /// Value after a reset: the bank is locked, and 64 bits are programmed at once.
+    /// Value of CR after a reset: the bank is locked, and 64 bits are programmed at once.
     pub const RESET: u32 = 0x31;
 }
 
-/// Bits of SR.
+/// Bits of register SR.
 pub mod sr {
-    /// An operation is running.
+    /// A flash operation is running.
     pub const BSY: u32 = 1 << 0;
-    /// Some bytes of a word were written, but not all.
+    /// Some bytes of a word were written, but not all bytes.
     pub const WBNE: u32 = 1 << 1;
-    /// An operation is running or waiting.
+    /// A flash operation is running or waiting.
     pub const QW: u32 = 1 << 2;
-    /// An operation has ended without an error (only set if its interrupt is enabled).
+    /// A flash operation has ended without an error. The flag is only set if its interrupt is enabled.
     pub const EOP: u32 = 1 << 16;
-    /// A write to a protected sector was attempted.
+    /// The program attempted a write to a protected sector.
     pub const WRPERR: u32 = 1 << 17;
-    /// A word was written while programming was not enabled.
+    /// The program wrote a word while programming was not enabled.
     pub const PGSERR: u32 = 1 << 18;
-    /// A byte was written twice.
+    /// The program wrote a byte twice.
     pub const STRBERR: u32 = 1 << 19;
-    /// Bytes of another word were written before the first word was complete.
+    /// The program wrote bytes of another word before the first word was complete.
     pub const INCERR: u32 = 1 << 21;
-    /// The operation failed.
+    /// The flash operation failed.
     pub const OPERR: u32 = 1 << 22;
-    /// A word has more wrong bits than can be corrected.
+    /// A word has more wrong bits than the flash can correct.
     pub const DBECCERR: u32 = 1 << 26;
 }
 
 /// Kind of a flash operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OperationKind {
-    /// Erasing a sector, which sets all its bits to 1.
+    /// Erasing of a sector, which sets all bits of the sector to 1.
     Erase {
         /// Number of the sector.
         sector: usize,
     },
-    /// Programming a word.
+    /// Programming of a word.
     Program {
         /// Address of the word.
         address: u32,
     },
 }
 
-/// An operation of the bank.
+/// An operation of flash bank 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operation {
-    /// Kind of the operation.
+    /// Kind of the flash operation.
     pub kind: OperationKind,
-    /// Start of the operation.
+    /// Start of the flash operation.
     pub start: Time,
-    /// End of the operation.
+    /// End of the flash operation.
     pub end: Time,
 }
 
-/// The flash interface.
+/// The flash interface of bank 2.
 pub struct Flash {
-    /// Contents of the bank.
+    /// Contents of flash bank 2.
     pub bank: Bank2,
     /// Time to erase a sector.
     pub erase_time: Time,
     /// Time to program a word.
     pub program_time: Time,
-    /// All operations, oldest first.
+    /// All flash operations, oldest first.
     pub operations: Vec<Operation>,
-    /// Reads and writes that waited for an operation, each with its time and the duration for which the core was
-    /// stalled.
+    /// Reads and writes that waited for a flash operation. Each entry contains the time of the access and the duration
+    /// for which the core was stalled.
     pub stalls: Vec<(Time, Time)>,
-    /// Number of accesses to the bank while the protection unit allowed the core to cache or prefetch it.
+    /// Number of accesses to the bank while the protection unit permitted the core to cache or prefetch the bank.
     pub ahead: u32,
-    /// Number of words that were programmed a second time without an erase operation.
+    /// Number of words that were programmed a second time without an erase operation in between.
     pub overwrites: u32,
-    /// Longest time during an operation in which the protection unit permitted reads of the bank.
+    /// Longest time during a flash operation in which the protection unit permitted reads of the bank.
     pub longest_open: Time,
-    /// Error bits of SR that the next operation sets when it ends.
+    /// Error bits of SR that the next flash operation sets when it ends.
     pub fail_next: u32,
     /// `true` if the program has unlocked bank 1.
     pub bank1_unlocked: bool,
-    /// Number of resets, used as the seed for the random contents after an interrupted operation.
+    /// Number of resets. The model uses this number as the seed for the random contents after an interrupted flash
+    /// operation.
     torn: u64,
     cr: u32,
     sr: u32,
-    /// Number of keys written. After more than two, unlocking is refused until a reset.
+    /// Number of correct keys that the program has written in sequence. After a wrong key, the value is `usize::MAX`,
+    /// and the flash rejects unlocking until a reset.
     keys: usize,
     running: Option<Operation>,
-    /// Word that is being written, as its index, its bytes, and a mask of the bytes written so far.
+    /// Word that the program is writing: its index, its bytes, and a mask of the bytes written so far.
     buffer: Option<(usize, [u8; WORD], u32)>,
     open_since: Option<Time>,
 }
@@ -119,7 +121,7 @@ impl Default for Flash {
     fn default() -> Self {
         Self {
             bank: Bank2::default(),
-            // Typical values of the data sheet for programming 32 bits at once.
+            // Typical values in the data sheet for programming 32 bits at once.
             erase_time: 2 * SECOND,
             program_time: 130 * MICROSECOND,
             operations: Vec::new(),
@@ -141,7 +143,7 @@ impl Default for Flash {
 }
 
 impl Flash {
-    /// Sets the registers to their values after a reset. A running operation is interrupted.
+    /// Sets the registers to their values after a reset. The reset interrupts a running flash operation.
     pub fn reset(&mut self, now: Time) {
         self.torn += 1;
         self.bank = self.cut(now, self.torn);
@@ -149,7 +151,7 @@ impl Flash {
         self.open_since = None;
     }
 
-    /// Returns the contents of the bank after a power failure at this moment.
+    /// Returns the contents of bank 2 after a power failure at `now`.
     pub fn cut(&self, now: Time, seed: u64) -> Bank2 {
         let mut bank = self.bank.clone();
         if let Some(operation) = self.running.filter(|o| o.start < now) {
@@ -159,12 +161,12 @@ impl Flash {
         bank
     }
 
-    /// Returns the end of the operation that is running now.
+    /// Returns the end of the flash operation that is running at `now`.
     pub fn busy_until(&self, now: Time) -> Option<Time> {
         self.running.map(|operation| operation.end).filter(|end| *end > now)
     }
 
-    /// Completes the running operation if its end time has passed.
+    /// Completes the running flash operation if its end time has passed.
     pub fn advance(&mut self, now: Time) {
         let Some(operation) = self.running.take_if(|operation| operation.end <= now) else { return };
         self.guard(operation.end, true);
@@ -188,7 +190,7 @@ impl Flash {
         }
     }
 
-    /// Records that the protection unit blocks or permits accesses of the core from now on.
+    /// Records that the protection unit blocks or permits accesses of the core from `now` on.
     pub fn guard(&mut self, now: Time, closed: bool) {
         if closed {
             let open = self.open_since.take().map_or(0, |since| now.saturating_sub(since));
@@ -209,7 +211,7 @@ impl Flash {
         self.guard(now, closed);
     }
 
-    /// Reads a register; returns `None` for registers that are modelled as plain memory.
+    /// Reads a register of the flash interface. Returns `None` for registers that are modelled as plain memory.
     pub fn read_register(&mut self, offset: u32, now: Time) -> Option<u32> {
         self.advance(now);
         Some(match offset {
@@ -229,8 +231,8 @@ impl Flash {
         })
     }
 
-    /// Writes a register; returns `false` for registers that are modelled as plain memory. `closed` means that the
-    /// protection unit blocks accesses of the core to the bank.
+    /// Writes a register of the flash interface. Returns `false` for registers that are modelled as plain memory.
+    /// `closed` means that the protection unit blocks accesses of the core to bank 2.
     pub fn write_register(&mut self, offset: u32, value: u32, now: Time, closed: bool) -> bool {
         self.advance(now);
         match offset {
@@ -273,7 +275,7 @@ impl Flash {
         }
     }
 
-    /// Handles a read by the core. The flag is `true` if the word is unreadable.
+    /// Handles a read of bank 2 by the core. The flag in the result is `true` if the word is unreadable.
     pub fn load(&mut self, address: u32, size: usize) -> (u32, bool) {
         let at = (address - BANK2) as usize;
         let bad = self.bank.cells[at / WORD] == Cell::Unreadable;
@@ -284,7 +286,7 @@ impl Flash {
         (bytes.rev().fold(0, |value, byte| value << 8 | u32::from(*byte)), bad)
     }
 
-    /// Handles a write by the core. No operation may be running.
+    /// Handles a write to bank 2 by the core. No flash operation may be running.
     pub fn store(&mut self, address: u32, size: usize, value: u32, now: Time, closed: bool) {
         let at = (address - BANK2) as usize;
         let (n, first) = (at / WORD, at % WORD);

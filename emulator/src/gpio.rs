@@ -1,4 +1,5 @@
-//! Pins (RM0399 chapter 12) that external signals can drive, with a record of every change that the firmware makes.
+//! Pins of the chip (RM0399 chapter 12). External signals can drive the pins, and the module records every change that
+//! the firmware makes.
 use crate::clock::Time;
 
 /// A pin, as port letter and number.
@@ -8,11 +9,11 @@ pub struct Pin(pub char, pub u8);
 /// A change of a pin that the firmware drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PinChange {
-    /// Time of the change.
+    /// Time at which the level changed.
     pub time: Time,
-    /// The pin.
+    /// The pin whose level changed.
     pub pin: Pin,
-    /// New level.
+    /// New level of the pin.
     pub level: bool,
 }
 
@@ -27,14 +28,14 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// Levels driven from outside, valid for the pins whose bits are set in `driven`.
+    /// Levels that external signals drive. A level is valid if the bit of the pin is set in `driven`.
     outside: u16,
     driven: u16,
 }
 
 impl Port {
     fn new(index: usize) -> Self {
-        // After a reset the debug pins have their alternate function.
+        // After a reset, the debug pins have their alternate function.
         let (moder, pupdr) = match index {
             0 => (0xABFF_FFFF, 0x6400_0000),
             1 => (0xFFFF_FEBF, 0x0000_0100),
@@ -47,8 +48,8 @@ impl Port {
         self.moder >> (2 * pin) & 3 == 1
     }
 
-    /// Returns the levels on the pins. The level of a pin is the output level of the port, if any; otherwise the
-    /// external level, if any; otherwise the level of the pull resistor.
+    /// Returns the levels on the pins. If the firmware drives a pin, the level is the output level. Otherwise, the
+    /// level is the external level, if any, or the level of the pull resistor.
     fn idr(&self) -> u32 {
         (0..16).fold(0, |word, pin| {
             let outside = u32::from(self.outside) >> pin & 1;
@@ -68,7 +69,7 @@ impl Port {
     }
 }
 
-/// All ports.
+/// All GPIO ports.
 pub struct Gpio {
     ports: [Port; PORTS],
     changes: Vec<PinChange>,
@@ -81,7 +82,7 @@ impl Default for Gpio {
 }
 
 impl Gpio {
-    /// Resets all ports, so that all pins are inputs again. Levels driven from outside do not change.
+    /// Resets all ports, so that all pins are inputs again. Levels that external signals drive do not change.
     pub fn reset(&mut self, now: Time) {
         for index in 0..PORTS {
             let before = self.ports[index].outputs();
@@ -99,7 +100,7 @@ impl Gpio {
         }
     }
 
-    /// Reads a word of a port.
+    /// Reads a register of a port.
     pub fn read(&self, index: usize, offset: u32) -> u32 {
         let Some(port) = self.ports.get(index) else { return 0 };
         match offset {
@@ -115,7 +116,7 @@ impl Gpio {
         }
     }
 
-    /// Writes a word of a port.
+    /// Writes a register of a port.
     pub fn write(&mut self, index: usize, offset: u32, value: u32, now: Time) {
         let Some(port) = self.ports.get_mut(index) else { return };
         let before = port.outputs();
@@ -125,7 +126,7 @@ impl Gpio {
             0x08 => port.ospeedr = value,
             0x0C => port.pupdr = value,
             0x14 => port.odr = value & 0xFFFF,
-            // If both bits are set, set has priority over reset.
+            // If both bits of a pin are set, the set bit has priority over the reset bit.
             0x18 => port.odr = port.odr & !(value >> 16) | value & 0xFFFF,
             0x1C => port.lckr = value,
             0x20 | 0x24 => port.afr[(offset as usize - 0x20) / 4] = value,
@@ -139,7 +140,7 @@ impl Gpio {
         (index < PORTS && pin.1 < 16).then_some((index, u32::from(pin.1)))
     }
 
-    /// Returns the port index of a pin, 0 for A.
+    /// Returns the index of the port of a pin; port A has index 0.
     pub fn port(pin: Pin) -> Option<usize> {
         Self::place(pin).map(|(port, _)| port)
     }
@@ -149,7 +150,7 @@ impl Gpio {
         self.ports.get(port).map_or(0, Port::idr)
     }
 
-    /// Drives a pin from outside; with `None`, the pin is not connected.
+    /// Drives a pin from outside the chip; with `None`, the pin is not connected.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         let Some((index, bit)) = Self::place(pin) else { return };
         let port = &mut self.ports[index];
@@ -158,7 +159,7 @@ impl Gpio {
         port.outside = port.outside & !mask | if level == Some(true) { mask } else { 0 };
     }
 
-    /// Returns the level that the firmware drives; `None` if the pin is not an output.
+    /// Returns the level that the firmware drives at a pin. Returns `None` if the pin is not an output.
     pub fn output(&self, pin: Pin) -> Option<bool> {
         let (index, bit) = Self::place(pin)?;
         let port = &self.ports[index];

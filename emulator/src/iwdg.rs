@@ -1,9 +1,10 @@
-//! Independent watchdog 1 (RM0399 chapter 47), which counts down with the LSI clock and resets the machine at zero.
+//! Independent watchdog 1 (RM0399 chapter 47). The watchdog counts down with the LSI clock and resets the machine at
+//! zero.
 use crate::clock::{NEVER, SECOND, Time};
 
 const LSI_HZ: u64 = 32_000;
 
-/// The watchdog.
+/// The independent watchdog.
 #[derive(Debug)]
 pub struct Iwdg {
     prescaler: u32,
@@ -27,7 +28,7 @@ impl Iwdg {
         *self = Self { least_left: self.least_left, ..Self::default() };
     }
 
-    /// Reads a word.
+    /// Reads a register of the watchdog.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x04 => self.prescaler,
@@ -37,7 +38,7 @@ impl Iwdg {
         }
     }
 
-    /// Writes a word.
+    /// Writes a register of the watchdog.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) {
         match offset {
             0x00 => match value & 0xFFFF {
@@ -68,7 +69,7 @@ impl Iwdg {
         (u64::from(self.reload) + 1) * divider * SECOND / LSI_HZ
     }
 
-    /// Returns the time at which the watchdog resets the machine if the firmware does not feed it.
+    /// Returns the time at which the watchdog resets the machine if the firmware does not feed the watchdog.
     pub fn bites(&self) -> Time {
         self.bites
     }

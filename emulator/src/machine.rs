@@ -1,4 +1,4 @@
-//! External access to the machine: registers, memory, faults. The module `cpu` runs the machine.
+//! External access to the machine: registers, memory and faults. The module `cpu` executes the program of the machine.
 use unicorn_engine::{RegisterARM, Unicorn};
 
 use crate::chip::Chip;
@@ -19,9 +19,9 @@ pub struct Machine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sleep {
     Awake,
-    /// Sleeping in WFI.
+    /// The core sleeps in WFI.
     Interrupt,
-    /// Sleeping in WFE.
+    /// The core sleeps in WFE.
     Event,
     /// The core is in lock-up until a reset.
     Lockup,
@@ -37,7 +37,7 @@ impl Machine {
         self.uc.get_data_mut()
     }
 
-    /// Returns the firmware's ELF file.
+    /// Returns the ELF file of the firmware.
     pub fn elf(&self) -> &Elf {
         &self.elf
     }
@@ -47,12 +47,12 @@ impl Machine {
         self.uc.get_data().now()
     }
 
-    /// Returns the number of instructions executed since power-on.
+    /// Returns the number of instructions that the core has executed since power-on.
     pub fn instructions(&self) -> u64 {
         self.uc.get_data().core.instructions
     }
 
-    /// Returns a core register.
+    /// Returns the value of a core register.
     pub fn register(&self, register: RegisterARM) -> u32 {
         self.uc.reg_read(register).unwrap_or(0) as u32
     }
@@ -74,11 +74,11 @@ impl Machine {
     }
 
     pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
-        // Every register that this code uses exists on the core, so a write cannot fail.
+        // Every register that this code writes exists on the core, so a write cannot fail.
         let _ = self.uc.reg_write(register, u64::from(value));
     }
 
-    /// Returns the word of memory at an address; `None` if the address is not mapped.
+    /// Returns the word of memory at an address. Returns `None` if the address is not mapped.
     pub fn word(&self, address: u32) -> Option<u32> {
         if in_bank2(address) {
             let bytes = self.memory(address, 4)?;
@@ -89,7 +89,7 @@ impl Machine {
         Some(u32::from_le_bytes(bytes))
     }
 
-    /// Returns the bytes of memory at an address; `None` if the address is not mapped.
+    /// Returns the bytes of memory at an address. Returns `None` if the address is not mapped.
     pub fn memory(&self, address: u32, length: usize) -> Option<Vec<u8>> {
         if in_bank2(address) {
             let fits = address as usize + length <= (BANK2 + BANK2_SIZE) as usize;
@@ -98,8 +98,7 @@ impl Machine {
         self.uc.mem_read_as_vec(u64::from(address), length).ok()
     }
 
-    /// Changes memory from outside, as a debugger does; the memory may contain code. Returns `false` at an unmapped
-    /// address.
+    /// Changes memory as a debugger does; the memory may contain code. Returns `false` at an unmapped address.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
         if in_bank2(address) {
             let fits = address as usize + bytes.len() <= (BANK2 + BANK2_SIZE) as usize;
@@ -110,20 +109,20 @@ impl Machine {
         }
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
-            // Without this step, Unicorn would continue to execute its translation of the old code.
+            // Without this call, Unicorn would continue to execute its translation of the old code.
             self.chip().core.it_block = 0..0;
             let _ = self.uc.ctl_flush_tb();
         }
         written
     }
 
-    /// Reads a register of a peripheral from outside, as a debugger does.
+    /// Reads a register of a peripheral as a debugger does.
     pub fn read_register(&mut self, address: u32) -> u32 {
         let mut ram = Ram(self.uc.clone());
         self.uc.get_data_mut().load(address, 4, &mut ram)
     }
 
-    /// Writes a register of a peripheral from outside, as a debugger does.
+    /// Writes a register of a peripheral as a debugger does.
     pub fn write_register(&mut self, address: u32, value: u32) {
         let mut ram = Ram(self.uc.clone());
         self.uc.get_data_mut().store(address, 4, value, &mut ram);
@@ -132,8 +131,8 @@ impl Machine {
         }
     }
 
-    /// Returns the contents of flash bank 2 after a power failure at this moment. Words that are being erased or
-    /// programmed contain random values generated from `seed`.
+    /// Returns the contents of flash bank 2 after a power failure at the current virtual time. Words that the flash is
+    /// erasing or programming at that time contain random values generated from `seed`.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.uc.get_data().flash.cut(self.now(), seed)
     }
@@ -146,13 +145,13 @@ impl Machine {
         }
     }
 
-    /// Maps the D2 SRAM blocks whose clocks are enabled.
+    /// Maps the SRAM blocks of domain D2 whose clocks are enabled.
     pub(crate) fn remap(&mut self) {
         self.chip().remap = false;
         memory::protect(&mut self.uc);
     }
 
-    /// Handles a fault at an instruction: enters HardFault, or lock-up if the core is already in HardFault.
+    /// Handles a fault at an instruction. The core enters HardFault, or lock-up if it is already in HardFault.
     pub(crate) fn fault(&mut self, kind: FaultKind, pc: u32) {
         let masks = self.masks();
         let chip = self.chip();

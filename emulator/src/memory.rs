@@ -1,4 +1,4 @@
-//! The memory map of the STM32H745 and H743 as the Cortex-M7 sees it (RM0399 chapter 2).
+//! The memory map of the STM32H745 and H743 for the Cortex-M7 (RM0399 chapter 2).
 use unicorn_engine::unicorn_const::Prot;
 use unicorn_engine::{RegisterARM, Unicorn};
 
@@ -20,10 +20,10 @@ impl Memory for Ram<'_> {
     }
 }
 
-/// Start of flash bank 1; bank 2 starts 1 MiB after it.
+/// Start address of flash bank 1; bank 2 starts 1 MiB after it.
 pub const FLASH: u32 = 0x0800_0000;
 
-/// Size of bank 1.
+/// Size of flash bank 1.
 const FLASH_SIZE: u64 = 0x10_0000;
 const SYSTEM: u64 = 0x1FF0_0000;
 const SYSTEM_SIZE: u64 = 0x2_0000;
@@ -62,14 +62,14 @@ pub const FORBIDDEN: [(u64, u64); 11] = [
 ];
 
 /// Returns the access rights of data memory. Code is expected only in ITCM and flash. After every store to memory that
-/// may contain code, Unicorn searches for translated code, which makes the store slow. The first jump to another
-/// memory calls [`allow_code`].
+/// may contain code, Unicorn searches for translated code, which makes the store slow. At the first jump to code in
+/// other memory, the machine calls [`allow_code`].
 fn data() -> Prot {
     Prot::READ | Prot::WRITE
 }
 
-/// Permits code in the RAM around an address. Returns `false` if the address is not in RAM, or if code is already
-/// permitted.
+/// Permits code in the RAM region that contains an address. Returns `false` if the address is not in RAM, or if code is
+/// already permitted.
 pub fn allow_code(uc: &mut Unicorn<'static, Chip>, address: u32) -> bool {
     let regions = uc.mem_regions().unwrap_or_default();
     let holds = |begin: u64, end: u64| (begin..=end).contains(&u64::from(address));
@@ -79,7 +79,7 @@ pub fn allow_code(uc: &mut Unicorn<'static, Chip>, address: u32) -> bool {
     uc.mem_protect(region.begin, region.end - region.begin + 1, Prot::ALL).is_ok()
 }
 
-/// Maps all memory. RAM is filled with random data from `seed`.
+/// Maps all memory of the chip. RAM is filled with random data generated from `seed`.
 pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     let mut rng = fastrand::Rng::with_seed(seed ^ 0x7261_6D00);
     for (address, size) in RAM.into_iter().chain(D2) {
@@ -108,7 +108,7 @@ pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     }
 }
 
-/// Maps flash bank 2. The core accesses bank 2 through the flash interface.
+/// Maps flash bank 2 into the address space. The core accesses bank 2 through the flash interface.
 fn map_bank2(uc: &mut Unicorn<'static, Chip>) {
     let faults_masked = |uc: &Unicorn<'_, Chip>| {
         let mask = uc.reg_read(RegisterARM::FAULTMASK).unwrap_or(0) & 1 == 1;
@@ -130,7 +130,7 @@ fn map_bank2(uc: &mut Unicorn<'static, Chip>) {
     .expect("bank 2");
 }
 
-/// Permits access to the D2 SRAM blocks whose clocks are enabled.
+/// Permits access to the SRAM blocks of domain D2 whose clocks are enabled.
 pub fn protect(uc: &mut Unicorn<'static, Chip>) {
     for (n, (address, size)) in D2.into_iter().enumerate() {
         let on = uc.get_data().rcc.enabled(Gate::Sram(n as u32 + 1));

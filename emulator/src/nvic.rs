@@ -1,24 +1,25 @@
-//! Exceptions: pending state, enable state and priority order (ARMv7-M B1.5, with the four priority bits of STM32).
+//! Exceptions of the core: pending state, enable state and priority order (ARMv7-M B1.5, with the four priority bits of
+//! STM32).
 use crate::clock::Time;
 
-/// Number of interrupt lines of the device.
+/// Number of interrupt lines of the chip.
 pub const LINES: usize = 150;
 /// Exception number of the first interrupt line.
 pub const FIRST_LINE: usize = 16;
 /// Number of exceptions, including interrupts.
 pub const EXCEPTIONS: usize = FIRST_LINE + LINES;
 
-/// Numbers of the core's own exceptions.
+/// Numbers of the exceptions of the core itself.
 pub mod exception {
-    /// Non-maskable interrupt.
+    /// Non-maskable interrupt (NMI).
     pub const NMI: usize = 2;
-    /// Hard fault.
+    /// Hard fault (HardFault).
     pub const HARD_FAULT: usize = 3;
-    /// Supervisor call.
+    /// Supervisor call (SVCall).
     pub const SV_CALL: usize = 11;
-    /// Pendable request.
+    /// Pendable service request (PendSV).
     pub const PEND_SV: usize = 14;
-    /// System tick timer.
+    /// System tick timer (SysTick).
     pub const SYS_TICK: usize = 15;
 }
 
@@ -28,15 +29,15 @@ const THREAD: i32 = 256;
 /// Mask registers of the core.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Masks {
-    /// PRIMASK.PM.
+    /// Mask bit PRIMASK.PM.
     pub primask: bool,
-    /// FAULTMASK.FM.
+    /// Mask bit FAULTMASK.FM.
     pub faultmask: bool,
     /// BASEPRI; the value 0 does not mask any exception.
     pub basepri: u8,
 }
 
-/// The interrupt controller and the priorities of the core's own exceptions.
+/// The interrupt controller and the priorities of the exceptions of the core itself.
 pub struct Nvic {
     enabled: [bool; EXCEPTIONS],
     pending: [bool; EXCEPTIONS],
@@ -47,10 +48,10 @@ pub struct Nvic {
     priority: [u8; EXCEPTIONS],
     /// Exceptions that are pending and enabled, in any order.
     waiting: Vec<usize>,
-    /// AIRCR.PRIGROUP.
+    /// Value of AIRCR.PRIGROUP.
     pub prigroup: u32,
-    /// `true` if an interrupt has become pending since this flag was cleared. The flag ends WFE if SCR.SEVONPEND is
-    /// set.
+    /// `true` if an interrupt has become pending since this flag was cleared. If SCR.SEVONPEND is set, the flag ends a
+    /// sleep in WFE.
     pub pended: bool,
 }
 
@@ -136,7 +137,7 @@ impl Nvic {
         self.priority[exception]
     }
 
-    /// Sets a priority byte; only its upper four bits exist.
+    /// Sets the priority byte of an exception; only the upper four bits of the byte exist.
     pub fn set_priority(&mut self, exception: usize, priority: u8) {
         self.priority[exception] = priority & 0xF0;
     }
@@ -151,7 +152,7 @@ impl Nvic {
         !self.waiting.is_empty()
     }
 
-    /// Returns the priority for preemption, without the lower bits that PRIGROUP excludes.
+    /// Returns the priority that decides preemption, without the lower bits that PRIGROUP excludes.
     fn group(&self, priority: i32) -> i32 {
         if priority < 0 { priority } else { priority >> (self.prigroup + 1) << (self.prigroup + 1) }
     }
@@ -164,13 +165,13 @@ impl Nvic {
         }
     }
 
-    /// Returns the priority of the running exception or thread, ignoring the masks.
+    /// Returns the priority of the running exception or thread, ignoring the mask registers.
     pub fn running_priority(&self) -> i32 {
         let active = (0..EXCEPTIONS).filter(|&e| self.active[e]);
         active.map(|e| self.group(self.raw_priority(e))).min().unwrap_or(THREAD)
     }
 
-    /// Returns the most urgent waiting exception.
+    /// Returns the waiting exception with the highest priority.
     fn most_urgent(&self) -> Option<usize> {
         self.waiting.iter().copied().min_by_key(|&e| (self.raw_priority(e), e))
     }
@@ -196,12 +197,12 @@ impl Nvic {
         (self.group(self.raw_priority(exception)) < self.masked(running, masks)).then_some(exception)
     }
 
-    /// Returns `true` if only the masks block a waiting exception.
+    /// Returns `true` if only the mask registers block a waiting exception.
     pub fn held_by_masks(&self, masks: Masks) -> bool {
         self.next(masks).is_none() && self.next(Masks::default()).is_some()
     }
 
-    /// Returns `true` if WFI ends, because an exception would run if PRIMASK were not set.
+    /// Returns `true` if WFI ends because an exception would run if PRIMASK were not set.
     pub fn wakes(&self, masks: Masks) -> bool {
         self.next(Masks { primask: false, ..masks }).is_some()
     }
@@ -220,7 +221,7 @@ impl Nvic {
         }
     }
 
-    /// Returns ICSR.VECTPENDING.
+    /// Returns the value of ICSR.VECTPENDING.
     pub fn vect_pending(&self) -> usize {
         self.most_urgent().unwrap_or(0)
     }

@@ -3,7 +3,7 @@
 use crate::clock::Time;
 use crate::nvic::EXCEPTIONS;
 
-/// Instruction counts of a function or a handler, not including exceptions that interrupted it.
+/// Instruction counts of a function or a handler, without the instructions of exceptions that interrupted it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
     /// Number of calls that have returned.
@@ -32,13 +32,13 @@ impl Count {
 /// handler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
-    /// Number of entries.
+    /// Number of entries into the handler.
     pub entries: u64,
-    /// Longest delay.
+    /// Longest latency.
     pub worst: Time,
-    /// Time at which the longest delay occurred.
+    /// Time at which the longest latency occurred.
     pub at: Time,
-    /// Delay of the last entry.
+    /// Latency of the last entry.
     pub last: Time,
 }
 
@@ -47,15 +47,15 @@ pub struct Latency {
 pub enum ResetCause {
     /// The power was switched on.
     PowerOn,
-    /// The reset pin.
+    /// The reset pin was pulled low.
     Pin,
-    /// AIRCR.SYSRESETREQ.
+    /// The program set AIRCR.SYSRESETREQ.
     Software,
-    /// The independent watchdog.
+    /// The independent watchdog reset the machine.
     Watchdog,
 }
 
-/// A reset.
+/// A reset of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reset {
     /// Time of the reset.
@@ -75,22 +75,22 @@ pub enum FaultKind {
     BadJump,
     /// Instruction that does not exist.
     Undefined,
-    /// BKPT without a debugger.
+    /// BKPT instruction without a debugger.
     Breakpoint,
     /// Invalid exception return.
     BadReturn,
 }
 
-/// A fault, after which the core enters HardFault.
+/// A fault of the core, after which the core enters HardFault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// Time of the fault.
     pub time: Time,
     /// Kind of the fault.
     pub kind: FaultKind,
-    /// Address of the instruction.
+    /// Address of the instruction that caused the fault.
     pub pc: u32,
-    /// Address of the failed access.
+    /// Address of the access that failed.
     pub address: u32,
     /// `true` if the fault occurred in HardFault or NMI, so that the core is in lock-up until a reset.
     pub lockup: bool,
@@ -118,23 +118,23 @@ struct Running {
     base: Option<u32>,
 }
 
-/// All observers.
+/// All observers of the machine.
 pub struct Observers {
     probes: Vec<Probe>,
     calls: Vec<Call>,
     running: Vec<Running>,
     /// Instruction counts of the handlers, by exception number.
     pub handlers: Vec<Count>,
-    /// Latencies by exception number.
+    /// Interrupt latencies, by exception number.
     pub latencies: Vec<Latency>,
-    /// Lowest stack pointer while exception n was running; entry 0 is for code outside of exceptions.
+    /// Lowest stack pointer while exception n was running. Entry 0 is for code outside of exceptions.
     pub lowest_sp: Vec<u32>,
     /// Largest stack use (bytes) of one execution of exception n, including the frames of exceptions that
     /// interrupted it. Entry 0 is not used.
     pub deepest: Vec<u32>,
-    /// Resets, oldest first.
+    /// Resets of the machine, oldest first.
     pub resets: Vec<Reset>,
-    /// Faults, oldest first.
+    /// Faults of the core, oldest first.
     pub faults: Vec<Fault>,
 }
 
@@ -155,7 +155,7 @@ impl Default for Observers {
 }
 
 impl Observers {
-    /// Starts counting the instructions of the function at this entry address; returns the number of the counter.
+    /// Starts counting the instructions of the function at this entry address. Returns the number of the counter.
     pub fn add_probe(&mut self, entry: u32) -> usize {
         self.probes.push(Probe { entry, count: Count::default() });
         self.probes.len() - 1
@@ -166,7 +166,7 @@ impl Observers {
         self.probes[probe].count
     }
 
-    /// Resets all counts, latencies and lowest stack pointers.
+    /// Resets all instruction counts, latencies and lowest stack pointers.
     pub fn clear(&mut self) {
         for probe in &mut self.probes {
             probe.count = Count::default();
@@ -177,8 +177,8 @@ impl Observers {
         self.deepest.fill(0);
     }
 
-    /// Handles a watched instruction. If a counted function begins at this instruction, returns its return address,
-    /// which must be watched next.
+    /// Handles a watched instruction. If a counted function begins at this instruction, returns the return address of
+    /// the function, which must be watched next.
     pub fn at(&mut self, pc: u32, sp: u32, lr: u32, instructions: u64) -> Option<u32> {
         let depth = self.running.len();
         while let Some(i) = self.calls.iter().rposition(|c| c.back == pc && c.sp == sp && c.depth == depth) {
@@ -215,7 +215,7 @@ impl Observers {
     /// Records the return from the innermost exception.
     pub fn leave(&mut self, instructions: u64) {
         let depth = self.running.len();
-        // A counted function that is itself a handler ends with the exception.
+        // If a counted function is itself a handler, the call ends with the exception.
         while let Some(i) = self.calls.iter().rposition(|c| c.depth >= depth) {
             self.finish(i, instructions);
         }
@@ -230,7 +230,7 @@ impl Observers {
         }
     }
 
-    /// Records the stack pointer.
+    /// Records the stack pointer of the current context.
     pub fn note_sp(&mut self, sp: u32) {
         let mut context = 0;
         if let Some(running) = self.running.last_mut() {

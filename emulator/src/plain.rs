@@ -1,19 +1,19 @@
-//! Registers that behave as plain memory.
+//! Peripheral registers that behave as plain memory.
 use std::collections::BTreeMap;
 
-/// Words by address. The value of a word that was never written is 0.
+/// Values of the registers, by address. The value of a register that was never written is 0.
 #[derive(Clone, Debug, Default)]
 pub struct Plain {
     words: BTreeMap<u32, u32>,
 }
 
 impl Plain {
-    /// Returns the word at an address.
+    /// Returns the value of the register at an address.
     pub fn read(&self, address: u32) -> u32 {
         self.words.get(&(address & !3)).copied().unwrap_or(0)
     }
 
-    /// Replaces the word at an address.
+    /// Sets the value of the register at an address.
     pub fn write(&mut self, address: u32, value: u32) {
         self.words.insert(address & !3, value);
     }

@@ -5,7 +5,7 @@ use crate::plain::Plain;
 const HSI_HZ: u64 = 64_000_000;
 const CSI_HZ: u64 = 4_000_000;
 
-/// Register offsets.
+/// Register offsets of the RCC.
 mod reg {
     pub const CR: u32 = 0x00;
     pub const CFGR: u32 = 0x10;
@@ -27,54 +27,54 @@ mod reg {
     pub const AHB4ENR: u32 = 0xE0;
     pub const APB1LENR: u32 = 0xE8;
     pub const APB1HENR: u32 = 0xEC;
-    /// Address range of the register copies of core 1, and the offset between a copy and the common register.
+    /// Address range of the register copies for core 1, and the offset between a copy and the common register.
     pub const C1: core::ops::Range<u32> = 0x130..0x190;
     pub const C1_OFFSET: u32 = 0x60;
 }
 
 /// Reset flags of RSR.
 pub mod flag {
-    /// Core 1.
+    /// Reset of core 1.
     pub const CPU: u32 = 1 << 17;
-    /// Domain D1.
+    /// Reset of domain D1.
     pub const D1: u32 = 1 << 19;
-    /// Domain D2.
+    /// Reset of domain D2.
     pub const D2: u32 = 1 << 20;
-    /// Brown-out.
+    /// Brown-out reset.
     pub const BOR: u32 = 1 << 21;
-    /// NRST pin.
+    /// Reset by the NRST pin.
     pub const PIN: u32 = 1 << 22;
-    /// Power-on.
+    /// Power-on reset.
     pub const POR: u32 = 1 << 23;
     /// Core 1 requested a software reset.
     pub const SFT: u32 = 1 << 24;
-    /// Independent watchdog 1.
+    /// Reset by independent watchdog 1.
     pub const IWDG1: u32 = 1 << 26;
-    /// Writing RMVF clears all flags.
+    /// Bit RMVF. Writing a 1 to this bit clears all reset flags.
     pub const REMOVE: u32 = 1 << 16;
-    /// All flags.
+    /// All reset flags.
     pub const ALL: u32 = 0xFFFE_0000;
 }
 
 /// Peripheral with its own clock enable bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gate {
-    /// DMA1, DMA2 (index from 0).
+    /// DMA1 or DMA2, with an index from 0.
     Dma(u32),
-    /// GPIOA and the other ports (index from 0).
+    /// GPIO port, with an index from 0; port A has index 0.
     Gpio(u32),
-    /// TIM2..TIM7 by number.
+    /// Timer TIM2 to TIM7, with its number.
     Timer(u32),
-    /// USART2, USART3 by number.
+    /// USART2 or USART3, with its number.
     Usart(u32),
-    /// FDCAN.
+    /// FDCAN controller.
     Fdcan,
-    /// SRAM1..SRAM3 of D2 by number.
+    /// SRAM1 to SRAM3 of domain D2, with its number.
     Sram(u32),
 }
 
 impl Gate {
-    /// Returns the offset of the enable register and the bit.
+    /// Returns the offset of the enable register and the bit of the peripheral.
     fn place(self) -> (u32, u32) {
         match self {
             Self::Dma(n) => (reg::AHB1ENR, n),
@@ -90,17 +90,17 @@ impl Gate {
 /// Clock frequencies that the registers configure, Hz; 0 for a clock that is off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clocks {
-    /// Core.
+    /// Clock of the core.
     pub core: u64,
-    /// AHB.
+    /// Clock of the AHB.
     pub hclk: u64,
-    /// APB1.
+    /// Clock of the APB1.
     pub pclk1: u64,
-    /// TIM2..7.
+    /// Clock of TIM2..7.
     pub timers: u64,
-    /// USART2, USART3 kernel.
+    /// Kernel clock of USART2 and USART3.
     pub usart: u64,
-    /// FDCAN kernel.
+    /// Kernel clock of FDCAN.
     pub fdcan: u64,
 }
 
@@ -116,7 +116,7 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// Creates the module in its state after power-on, with a clock at OSC_IN.
+    /// Creates the RCC in its state after power-on, with a clock at OSC_IN.
     pub fn new(hse_hz: u64) -> Self {
         let rsr = flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU;
         let mut rcc =
@@ -139,30 +139,30 @@ impl Rcc {
         self.update();
     }
 
-    /// Resets the system, and sets the flags of the reset cause in addition to the existing flags.
+    /// Resets the RCC, and sets the flags of the reset cause in addition to the existing flags.
     pub fn reset(&mut self, flags: u32) {
         self.plain = Plain::default();
         self.rsr |= flags;
         self.defaults();
     }
 
-    /// Returns RSR.
+    /// Returns the value of RSR, which contains the reset flags.
     pub fn reset_flags(&self) -> u32 {
         self.rsr
     }
 
-    /// Returns all frequencies.
+    /// Returns all clock frequencies.
     pub fn clocks(&self) -> Clocks {
         self.clocks
     }
 
-    /// Returns `true` if the peripheral's clock is enabled.
+    /// Returns `true` if the clock of the peripheral is enabled.
     pub fn enabled(&self, gate: Gate) -> bool {
         let (offset, bit) = gate.place();
         self.plain.read(offset) >> bit & 1 == 1
     }
 
-    /// Reads a word.
+    /// Reads a register of the RCC.
     pub fn read(&self, offset: u32) -> u32 {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         let value = self.plain.read(offset);
@@ -184,7 +184,7 @@ impl Rcc {
         }
     }
 
-    /// Writes a word.
+    /// Writes a register of the RCC.
     pub fn write(&mut self, offset: u32, value: u32) {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         if offset == reg::RSR {

@@ -1,22 +1,22 @@
-//! The core's own registers, at address 0xE000_0000: system control block, NVIC, SysTick, MPU, debug cycle counter
-//! (ARMv7-M B3).
+//! The registers of the core itself, at address 0xE000_0000: system control block, NVIC, SysTick, MPU, debug cycle
+//! counter (ARMv7-M B3).
 use crate::clock::{NEVER, Time};
 use crate::nvic::{EXCEPTIONS, FIRST_LINE, Nvic, exception};
 use crate::plain::Plain;
 
-/// CPUID of a Cortex-M7 r1p1.
+/// Value of CPUID for a Cortex-M7 r1p1.
 const CPUID: u32 = 0x411F_C271;
 const AIRCR_KEY: u32 = 0x05FA;
 /// CCSIDR of a 16 KiB data cache: 128 sets, 4 ways, 32-byte lines.
 const CCSIDR_DATA: u32 = 0xF00F_E019;
 /// CCSIDR of a 16 KiB instruction cache: 256 sets, 2 ways, 32-byte lines.
 const CCSIDR_INSTRUCTION: u32 = 0xF01F_E009;
-/// ICSR.PENDSTSET and ICSR.PENDSVSET.
+/// Bits ICSR.PENDSTSET and ICSR.PENDSVSET.
 const PEND_ST: u32 = 1 << 26;
 const PEND_SV: u32 = 1 << 28;
 const MPU_CTRL: u32 = 0xE000_ED94;
 
-/// SysTick, counting core clock cycles.
+/// The timer SysTick, which counts core clock cycles.
 #[derive(Default)]
 pub struct SysTick {
     ctrl: u32,
@@ -28,20 +28,20 @@ pub struct SysTick {
     wrapped: bool,
 }
 
-/// The core's own registers.
+/// The registers of the core itself.
 #[derive(Default)]
 pub struct Scs {
     /// Address of the vector table.
     pub vtor: u32,
     /// Register SCR with bit 4 (SEVONPEND) and bit 1 (SLEEPONEXIT).
     pub scr: u32,
-    /// CPACR.
+    /// Value of register CPACR.
     pub cpacr: u32,
-    /// CFSR of the last fault.
+    /// Value of CFSR after the last fault.
     pub cfsr: u32,
-    /// HFSR of the last fault.
+    /// Value of HFSR after the last fault.
     pub hfsr: u32,
-    /// BFAR of the last fault.
+    /// Value of BFAR after the last fault.
     pub bfar: u32,
     csselr: u32,
     ccr: u32,
@@ -50,12 +50,12 @@ pub struct Scs {
     systick: SysTick,
     cyccnt_base: u64,
     cyccnt_on: bool,
-    /// `true` if SYSRESETREQ was written.
+    /// `true` if the program wrote SYSRESETREQ.
     pub reset_request: bool,
     plain: Plain,
 }
 
-/// Access rights that the protection unit grants for an access.
+/// Access rights that the memory protection unit grants for an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
     /// `true` if the access is permitted.
@@ -71,14 +71,14 @@ pub struct Moment {
     pub now: Time,
     /// Number of core clock cycles, including sleep.
     pub cycles: u64,
-    /// Number of instructions executed.
+    /// Number of instructions that the core has executed.
     pub instructions: u64,
     /// Number of the running exception.
     pub running: usize,
 }
 
 impl Scs {
-    /// Reads a word.
+    /// Reads a register of the core.
     pub fn read(&mut self, address: u32, nvic: &Nvic, at: Moment) -> u32 {
         match address {
             0xE000_1004 if self.cyccnt_on => at.instructions.wrapping_sub(self.cyccnt_base) as u32,
@@ -128,7 +128,7 @@ impl Scs {
         }
     }
 
-    /// Writes a word.
+    /// Writes a register of the core.
     pub fn write(&mut self, address: u32, value: u32, nvic: &mut Nvic, at: Moment) {
         match address {
             0xE000_1000 => {
@@ -188,8 +188,8 @@ impl Scs {
         &self.mpu
     }
 
-    /// Returns the access rights that the protection unit grants for a load or store by the program (ARMv7-M B3.5).
-    /// `faults_masked` means that FAULTMASK is set, or that HardFault or NMI is running.
+    /// Returns the access rights that the memory protection unit grants for a load or store by the program (ARMv7-M
+    /// B3.5). `faults_masked` means that FAULTMASK is set, or that HardFault or NMI is running.
     pub fn protection(&self, address: u32, faults_masked: bool) -> Protection {
         const DEFAULT: Protection = Protection { allowed: true, ahead: true };
         let ctrl = self.plain.read(MPU_CTRL);
@@ -207,12 +207,12 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // `true` for strongly ordered memory and device memory. This code does not distinguish read-only memory.
+        // `true` for strongly ordered memory and device memory. This code does not model read-only memory.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }
 
-    /// Returns `true` if bus faults of loads and stores are ignored while faults are masked (CCR.BFHFNMIGN).
+    /// Returns `true` if the core ignores bus faults of loads and stores while faults are masked (CCR.BFHFNMIGN).
     pub fn ignores_bus_faults(&self) -> bool {
         self.ccr >> 8 & 1 == 1
     }

@@ -23,17 +23,17 @@ pub struct Timer {
     arr: u32,
     arr_active: u32,
     ccr: [u32; 4],
-    /// Counter value at time `at`. While the timer runs, it counts up from this value.
+    /// Counter value at time `at`. While the timer runs, the counter counts up from this value.
     count: u32,
     at: Time,
-    /// Length of a clock period.
+    /// Length of a period of the timer clock.
     clock: Time,
     /// Number of update events since reset.
     pub updates: u64,
 }
 
 impl Timer {
-    /// Creates the timer with this number, TIM2..TIM7.
+    /// Creates the timer with this number, which is 2..7 for TIM2..TIM7.
     pub fn new(number: u32) -> Self {
         let wide = number == 2 || number == 5;
         let max = if wide { u32::MAX } else { 0xFFFF };
@@ -59,7 +59,7 @@ impl Timer {
         }
     }
 
-    /// Sets the kernel clock. The caller must advance the timer to `now` before this call.
+    /// Sets the kernel clock of the timer. The caller must advance the timer to `now` before this call.
     pub fn set_clock(&mut self, hz: u64, now: Time) {
         let clock = period(hz);
         if clock != self.clock {
@@ -95,18 +95,18 @@ impl Timer {
         }
     }
 
-    /// Returns the number of timer ticks from `count` until the counter overflows to 0.
+    /// Returns the number of timer clock ticks from `count` until the counter overflows to 0.
     fn to_overflow(&self) -> u64 {
         if self.count > self.arr_active {
-            // ARR is less than the counter, so the counter first continues to the end of its range.
+            // ARR is less than the counter, so the counter first counts up to the end of its range.
             let top = if self.wide { 1u64 << 32 } else { 1 << 16 };
             return top - u64::from(self.count);
         }
         u64::from(self.arr_active - self.count) + 1
     }
 
-    /// Returns the number of timer ticks until the next match of a compare channel, if the match occurs before the
-    /// overflow.
+    /// Returns the number of timer clock ticks until the next match of a compare channel. Returns `None` if the
+    /// overflow occurs first.
     fn to_match(&self, channel: usize) -> Option<u64> {
         let compare = self.ccr[channel];
         (compare > self.count && compare <= self.arr_active).then(|| u64::from(compare - self.count))
@@ -120,26 +120,28 @@ impl Timer {
         (0..4).filter_map(|c| self.to_match(c)).fold(overflow, u64::min)
     }
 
-    /// Returns the time of the next flag that is not set yet or whose interrupt is enabled.
+    /// Returns the time of the next timer event with an enabled interrupt. In one-pulse mode, the overflow is always
+    /// included.
     pub fn next_event(&self) -> Time {
         if !self.runs() {
             return NEVER;
         }
-        // Flags without an enabled interrupt do not need an event, because they are computed when a register is read.
+        // The model computes flags without an enabled interrupt when the program reads a register. Therefore, flags
+        // without an enabled interrupt do not need an event.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();
         }
         if !self.basic {
             for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
-                // A match after the overflow is detected when the overflow is executed.
+                // The model detects a match after the overflow when it executes the overflow.
                 ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
             }
         }
         if ticks == NEVER { NEVER } else { self.at.saturating_add(ticks.saturating_mul(self.tick())) }
     }
 
-    /// Executes all events up to `now`.
+    /// Executes all events of the timer up to `now`.
     pub fn advance(&mut self, now: Time) {
         while self.runs() {
             let ticks = self.next_ticks();
@@ -180,12 +182,12 @@ impl Timer {
         }
     }
 
-    /// Returns the level of the interrupt line.
+    /// Returns the level of the interrupt line of the timer.
     pub fn line(&self) -> bool {
         self.sr & self.dier & 0x1F != 0
     }
 
-    /// Reads a word.
+    /// Reads a register of the timer.
     pub fn read(&mut self, offset: u32, now: Time) -> u32 {
         self.advance(now);
         match offset {
@@ -204,7 +206,7 @@ impl Timer {
         }
     }
 
-    /// Writes a word.
+    /// Writes a register of the timer.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) {
         self.advance(now);
         self.settle(now);
@@ -219,7 +221,7 @@ impl Timer {
             0x04 => self.cr2 = value,
             0x08 => self.smcr = value,
             0x0C => self.dier = value,
-            // Writing a 0 clears a flag.
+            // Writing a 0 to a flag clears the flag.
             0x10 => self.sr &= value,
             0x14 => {
                 if value & 1 != 0 {

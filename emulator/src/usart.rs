@@ -1,5 +1,5 @@
 //! USART2 and USART3 (RM0399 chapter 51): asynchronous 8N1 with FIFOs, DMA requests, idle line and receiver timeout.
-//! The transmission of each byte takes as long as on the real line.
+//! The transmission of each byte takes as long as on a real serial line.
 mod bits;
 mod next;
 mod registers;
@@ -14,17 +14,17 @@ const RTOEN: u32 = 1 << 23;
 const DMAR: u32 = 0x40;
 const DMAT: u32 = 0x80;
 const FIFO: usize = 16;
-/// Number of bytes examined in advance to find the next event.
+/// Number of bytes that the model examines in advance to find the next event.
 const LOOK_AHEAD: usize = 64;
-/// Largest difference between the two rates, in thousandths, at which bytes are still received correctly.
+/// Largest difference between the two bit rates, in thousandths, at which the receiver still receives bytes correctly.
 const TOLERANCE: u64 = 40;
 
 /// A transmitted byte and the end time of its stop bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WireByte {
-    /// End of the stop bit.
+    /// Time of the end of the stop bit.
     pub end: Time,
-    /// The byte.
+    /// Value of the byte.
     pub byte: u8,
 }
 
@@ -47,23 +47,23 @@ pub struct Usart {
     /// Bytes that are being transmitted to the device.
     rx_wire: VecDeque<WireByte>,
     rx_wire_free: Time,
-    /// End of the last byte received. The idle flag is derived from this time.
+    /// End of the last byte that the receiver received. The model derives the idle flag from this time.
     idle_from: Option<Time>,
     timeout_from: Option<Time>,
     tx_fifo: VecDeque<u8>,
     shifting: Option<WireByte>,
     output: VecDeque<WireByte>,
-    /// Rate of the host, bit/s.
+    /// Bit rate of the host, bit/s.
     pub host_baud: u32,
     /// Number of bytes from the host that arrived while the receiver was off.
     pub missed: u64,
-    /// Number of overruns.
+    /// Number of receiver overruns.
     pub overruns: u64,
-    /// Number of bytes that the receiver cannot read because of their rate.
+    /// Number of bytes that the receiver cannot read because of their bit rate.
     pub garbled: u64,
-    /// Number of bytes received.
+    /// Number of bytes that the board has received.
     pub received: u64,
-    /// Number of bytes sent.
+    /// Number of bytes that the board has sent.
     pub sent: u64,
 }
 
@@ -102,7 +102,7 @@ impl Usart {
         }
     }
 
-    /// Sets the registers to their values after reset. The transmission of bytes on the line continues.
+    /// Sets the registers to their values after a reset. The transmission of bytes on the serial line continues.
     pub fn reset(&mut self) {
         let old = core::mem::replace(self, Self::new(if self.rx_request == 43 { 2 } else { 3 }));
         self.rx_wire = old.rx_wire;
@@ -114,7 +114,7 @@ impl Usart {
         (self.received, self.sent) = (old.received, old.sent);
     }
 
-    /// Sets the kernel clock.
+    /// Sets the kernel clock of the USART.
     pub fn set_clock(&mut self, hz: u64) {
         if hz != self.kernel_hz {
             self.kernel_hz = hz;
@@ -158,7 +158,8 @@ impl Usart {
         own.abs_diff(host) * 1000 <= host * TOLERANCE
     }
 
-    /// Sends bytes from the host. The transmission of the first byte starts at `now` or later.
+    /// Sends bytes from the host. The transmission of the first byte starts at `now`, or later if the serial line is
+    /// not free before.
     pub fn host_write(&mut self, now: Time, bytes: &[u8]) {
         let length = 10 * SECOND / u64::from(self.host_baud.max(1));
         for &byte in bytes {
@@ -168,7 +169,7 @@ impl Usart {
         }
     }
 
-    /// Returns the number of host bytes that still wait for transmission.
+    /// Returns the number of host bytes that still wait for transmission on the serial line.
     pub fn host_pending(&self) -> usize {
         self.rx_wire.len()
     }
@@ -178,21 +179,21 @@ impl Usart {
         core::mem::take(&mut self.output).into_iter()
     }
 
-    /// Executes all events up to `now`.
+    /// Executes all events of the USART up to `now`.
     pub fn advance(&mut self, now: Time, dma: &mut Dma, memory: &mut dyn Memory) {
         while let Some(&next) = self.rx_wire.front().filter(|b| b.end <= now) {
             self.rx_wire.pop_front();
             self.idle(next.end.saturating_sub(self.frame()));
             self.receive(next, dma, memory);
         }
-        // The silence ends with the start bit of the byte that is being transmitted.
+        // The silence on the line ends with the start bit of the byte that the host is transmitting.
         let until = self.rx_wire.front().map_or(now, |b| now.min(b.end.saturating_sub(self.frame())));
         self.idle(until);
         self.drain_fifo(dma, memory);
         self.send(now, dma, memory);
     }
 
-    /// Handles a silent line until the time `until`.
+    /// Sets the idle and timeout flags that result from the silence of the serial line until the time `until`.
     fn idle(&mut self, until: Time) {
         if let Some(from) = self.idle_from
             && until >= from.saturating_add(self.frame())
@@ -252,7 +253,7 @@ impl Usart {
             return;
         }
         let depth = if self.cr1 & cr1::FIFOEN != 0 { FIFO } else { 1 };
-        // The next byte can start when the previous byte has ended, but not earlier than now.
+        // The next byte can start when the previous byte has ended, but not earlier than `now`.
         loop {
             while self.cr3 & DMAT != 0
                 && self.tx_fifo.len() < depth

@@ -11,8 +11,8 @@ pub struct Counter(usize);
 const RTT_CHANNEL: u32 = 24;
 
 impl Machine {
-    /// Counts the instructions of a function from now on. `name` is the full name of the function, or a part that
-    /// no other symbol name contains. A function that the compiler has inlined has no symbol.
+    /// Starts counting the instructions of a function. `name` is the full name of the function, or a part of the name
+    /// that no other symbol contains. A function that the compiler has inlined has no symbol.
     pub fn count(&mut self, name: &str) -> Result<Counter, ElfError> {
         let entry = self.elf().symbol(name)?.address;
         let chip = self.chip();
@@ -25,15 +25,15 @@ impl Machine {
         self.uc.get_data().observers.probe(counter.0)
     }
 
-    /// Returns the bytes, encoded by defmt, that the firmware has written into RTT's first channel since the last call.
-    /// Reads the log in the same way as a debug probe.
+    /// Returns the bytes that the firmware has written into the first RTT channel since the last call. The bytes are
+    /// encoded by defmt. The function reads the log in the same way as a debug probe.
     pub fn defmt(&mut self) -> Vec<u8> {
         let Ok(block) = self.elf().symbol("_SEGGER_RTT") else { return Vec::new() };
         let at = block.address + RTT_CHANNEL;
         let fields = [4, 8, 12, 16].map(|offset| self.word(at + offset).unwrap_or(0));
         let [buffer, size, write, read] = fields;
         if size == 0 || size > 0x10_0000 || write >= size || read >= size {
-            return Vec::new(); // not initialised yet
+            return Vec::new(); // the firmware has not initialised RTT yet
         }
         let part = |from: u32, to: u32| self.memory(buffer + from, (to - from) as usize).unwrap_or_default();
         let bytes =

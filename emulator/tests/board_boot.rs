@@ -13,7 +13,7 @@ fn two_cores(board: &str) -> bool {
     board.contains("h745")
 }
 
-/// Returns `true` for the board whose core voltage comes from the SMPS.
+/// Returns `true` for the board that generates its core voltage with the SMPS.
 fn smps(board: &str) -> bool {
     board == "nucleo-h745zi-q"
 }
@@ -30,8 +30,8 @@ fn j10_clocks_are_those_of_the_documents() {
     }
 }
 
-/// RM0399 and RM0433: PWR_CR3 contains LDOEN in bit 1 and SDEN in bit 2. D3CR.VOS 0b11 is scale 1; SYSCFG_PWRCR.ODEN
-/// raises it to scale 0, which is permitted only with the LDO.
+/// RM0399 and RM0433: PWR_CR3 contains LDOEN in bit 1 and SDEN in bit 2. The value 0b11 of D3CR.VOS is scale 1.
+/// SYSCFG_PWRCR.ODEN raises the voltage from scale 1 to scale 0, which is permitted only with the LDO.
 #[test]
 fn supply_and_voltage_are_those_of_the_board() {
     for board in BOARDS {
@@ -79,7 +79,7 @@ fn memory_is_protected_and_shared_memory_is_not_cached() {
         assert_eq!(rig.register(0xE000_ED94) & 1, 1, "{board}: MPU_CTRL");
         assert_eq!(rig.register(0xE000_ED14) >> 16 & 3, 3, "{board}: both caches");
         let regions = *rig.board.machine.chip().scs.mpu_regions();
-        // If several regions contain an address, the region with the highest number applies.
+        // If several MPU regions contain an address, the region with the highest number applies.
         let at = |address: u32| {
             let holds = |(rbar, rasr): &(u32, u32)| {
                 let size = 1u64 << ((rasr >> 1 & 31) + 1);
@@ -97,7 +97,7 @@ fn memory_is_protected_and_shared_memory_is_not_cached() {
     }
 }
 
-/// J-12: no other interrupt has the tick's priority, so only critical sections can delay the tick.
+/// J-12: no other interrupt has the same priority as the tick, so only critical sections can delay the tick.
 #[test]
 fn j12_the_tick_is_above_all_other_interrupts() {
     const ENABLED: u32 = 0xE000_E100;
@@ -115,7 +115,7 @@ fn j12_the_tick_is_above_all_other_interrupts() {
     }
 }
 
-/// J-01: eight data bits, no parity, one stop bit, no flow control.
+/// J-01: both serial lines use eight data bits, no parity, one stop bit and no flow control.
 #[test]
 fn j01_both_lines_are_8n1() {
     for board in BOARDS {
@@ -216,7 +216,7 @@ fn the_second_core_is_parked_where_there_is_one() {
         for vector in &words[1..16] {
             assert_eq!(*vector, BANK2 + 64 + 1, "{board}: every vector leads to the sleep");
         }
-        // The program is WFI and a branch back to WFI.
+        // The program of the second core is WFI and a branch back to WFI.
         assert_eq!(words[16], 0xE7FD_BF30, "{board}");
     }
 }

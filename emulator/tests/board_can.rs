@@ -1,4 +1,4 @@
-//! Joint bus and FDCAN controller of the chip: timing, filters, errors and bus-off.
+//! Joint bus and FDCAN controller of the board: timing, filters, errors and bus-off.
 mod rig;
 
 use std::collections::BTreeSet;
@@ -20,7 +20,7 @@ fn expected() -> BTreeSet<u16> {
     [0x200, 0x210, 0x2F0].into_iter().flat_map(|base| (0..7).map(move |node| base + node)).collect()
 }
 
-/// J-10: the configuration of the controller, with the register names of RM0399. The registers contain these
+/// J-10: the configuration of the CAN controller, with the register names of RM0399. The timing registers contain the
 /// values minus one.
 #[test]
 fn j10_registers_of_the_controller() {
@@ -29,14 +29,14 @@ fn j10_registers_of_the_controller() {
         rig.run(20);
         let state = rig.board.machine.chip().fdcan.state();
         assert_eq!(state.rates, (1_000_000, 5_000_000), "{board}");
-        // The values are NSJW 2, NBRP 5, NTSEG1 12, NTSEG2 4, and TDC on, DBRP 1, DTSEG1 12, DTSEG2 4, DSJW 2.
+        // The timing values are NSJW 2, NBRP 5, NTSEG1 12, NTSEG2 4, and TDC on, DBRP 1, DTSEG1 12, DTSEG2 4, DSJW 2.
         assert_eq!(state.nbtp, 1 << 25 | 4 << 16 | 11 << 8 | 3, "{board}");
         assert_eq!(state.dbtp, 1 << 23 | 11 << 8 | 3 << 4 | 1, "{board}");
         assert_eq!(state.tdcr, 13 << 8, "{board}: the sample point, 13 of 17, after the loop delay");
-        // TXP, BRSE and FDOE are set. INIT and CCE are not set. DAR is not set (retransmission is on), and NISO is
-        // not set (ISO format).
+        // In CCCR, the bits TXP, BRSE and FDOE are set. The bits INIT and CCE are not set. The bit DAR is not set
+        // (retransmission is on), and NISO is not set (ISO format).
         assert_eq!(state.cccr, 1 << 14 | 1 << 9 | 1 << 8, "{board}");
-        // Remote frames and frames that match no filter are rejected, with 11-bit and 29-bit identifiers.
+        // The CAN controller rejects remote frames and frames that match no filter, with 11-bit and 29-bit identifiers.
         let gfc = rig.register(FDCAN1 + 0x80);
         assert_eq!(gfc & 3, 3, "{board}: RRFS, RRFE");
         assert!(gfc >> 2 & 3 >= 2 && gfc >> 4 & 3 >= 2, "{board}: ANFE, ANFS {gfc:#x}");
@@ -70,7 +70,7 @@ impl CanPeers for Mute {
     }
 }
 
-/// J-10, J-15: of all frames that can occur on a bus, only the expected answers reach the controller.
+/// J-10, J-15: of all frames that can occur on a CAN bus, only the expected answers reach the controller.
 #[test]
 fn j10_only_expected_frames_arrive() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });
@@ -118,7 +118,7 @@ fn j10_only_expected_frames_arrive() {
     assert_eq!((fdcan.stored, fdcan.state().lost), (42, 0));
 }
 
-/// Returns start time and torques of the frames that the controller sent in this millisecond.
+/// Returns start time and torques of the frames that the controller sent in the last millisecond.
 fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     let good = rig.bus.iter().filter(|e| e.from_controller && e.outcome == Outcome::Good);
     good.filter_map(|e| {
@@ -131,11 +131,11 @@ fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     .collect()
 }
 
-/// J-14, J-12: the error is raised at once, and the controller leaves bus-off as ISO 11898-1 requires. A torque that
-/// waited during bus-off is never sent.
+/// J-14, J-12: the controller reports the error at once, and leaves bus-off as ISO 11898-1 requires. The controller
+/// never sends a torque that waited during bus-off.
 #[test]
 fn j14_after_bus_off_no_stale_frame() {
-    // A pose in which gravity requires torque.
+    // The arm starts in a pose in which gravity requires torque.
     let sim = SimConfig { start: [0.0, 0.5, -0.4, 0.3, 0.0, 0.0], ..SimConfig::default() };
     let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
     rig.bring_up(Port::Usart2);
@@ -168,7 +168,7 @@ fn j14_after_bus_off_no_stale_frame() {
         to_us(first.saturating_sub(healed))
     );
     assert!(first > off + 129 * 11 * MILLISECOND / 1000, "129 times 11 recessive bits are waited for");
-    // The error remains until the host clears it (J-21). Then operation continues.
+    // The error remains until the host clears it (J-21). After the host has cleared the error, operation continues.
     assert_eq!(rig.state(), ControllerState::Error);
     rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
     rig.wait_for_hold(15_000);
@@ -192,7 +192,7 @@ fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(Port::Usart2);
     let (ticks, flags) = ticks_to_error(&mut rig, FaultKind::NoAcknowledge);
-    // The error is raised in the tick after the fifth frame without acknowledgement.
+    // The controller reports the error in the tick after the fifth frame without acknowledgement.
     assert!((5..=7).contains(&ticks), "{ticks} ticks");
     assert!(flags & 1 != 0, "{flags:#x}");
     assert!(!rig.board.machine.chip().fdcan.state().bus_off, "a missing acknowledge alone makes no bus-off");
@@ -230,7 +230,7 @@ fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
     assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
 
-/// J-15: a frame that is too short for its identifier is ignored, for every node that may send it.
+/// J-15: the controller ignores a frame that is too short for its identifier, for every node that may send the frame.
 #[test]
 fn j15_short_answers_are_no_answers() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });

@@ -1,6 +1,6 @@
-//! J-07: with any bytes on the lines and any frames on the joint bus, the program does not hang, no tick is missed, and
-//! no reset occurs. In every tick, the outputs of the board equal the outputs of a controller on the PC with the same
-//! inputs (`rig`).
+//! J-07: tests with any bytes on the serial lines and any frames on the joint bus. The program does not hang, no tick
+//! is missed, and no reset occurs. In every tick, the outputs of the board equal the outputs of a controller on the PC
+//! with the same inputs (`rig`).
 mod rig;
 
 use std::path::Path;
@@ -18,7 +18,7 @@ fn fast() -> Rig {
     Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() })
 }
 
-/// Returns all inputs that are stored for a fuzz target, with their names.
+/// Returns all inputs that are stored for a fuzz target, with their file names.
 fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz"));
     let mut inputs = Vec::new();
@@ -40,7 +40,7 @@ fn unharmed(mut rig: Rig) {
     for port in PORTS {
         rig.wait("the line falls silent", 60_000, |rig| rig.board.pending(port) == 0);
     }
-    // The last bytes may be the beginning of a frame, so a gap is sent to end this frame.
+    // The last bytes may be the beginning of a frame, so the host sends a gap to end this frame.
     rig.run(20);
     rig.wait("every record", 60_000, |rig| {
         for host in &mut rig.hosts {
@@ -65,9 +65,9 @@ fn unharmed(mut rig: Rig) {
     assert!(late < 1_000, "{late} ns");
 }
 
-/// J-03, J-04, J-05: the records on the line equal the records of a parser that receives all bytes. Two kinds of
-/// exceptions are counted: noise that was merged with another record, and records that were lost because more than 64
-/// records were waiting.
+/// J-03, J-04, J-05: the records on the line equal the records of a parser that receives all bytes. The test counts two
+/// kinds of exceptions: noise records that were merged, and records that were lost because more than 64 records were
+/// waiting.
 #[test]
 fn j03_records_of_kept_streams_are_those_of_the_reference() {
     let mut rig = fast();
@@ -95,7 +95,7 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
         let records = rig.hosts[index(port)].records.iter();
         let records: Vec<_> = records.map(|r| (r.frame_type, r.status, r.length)).collect();
         let lost = rig.telemetry().records_lost as usize - lost_before;
-        // Noise is merged with the record of waiting noise. Records of other kinds are not merged.
+        // The board merges noise with the record of waiting noise. The board does not merge records of other kinds.
         let noise = |record: &&(u8, FrameStatus, u16)| record.0 == 0;
         let count = |all: &[(u8, FrameStatus, u16)]| all.iter().filter(|record| !noise(record)).count();
         assert!(count(&records) + lost >= count(&expected), "{name}: {records:?} instead of {expected:?}");
@@ -111,7 +111,7 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
     unharmed(rig);
 }
 
-/// Valid frames with random contents are sent to a controller that is able to execute them.
+/// A controller that is able to execute frames receives valid frames with random contents.
 #[test]
 fn j07_kept_frames_with_any_body() {
     let mut rig = fast();
@@ -125,8 +125,8 @@ fn j07_kept_frames_with_any_body() {
     unharmed(rig);
 }
 
-/// Both lines are under full load, with the 15 MBd firmware and with the firmware of another board at the default
-/// rate.
+/// Both serial lines are under full load, with the 15 MBd firmware and with the firmware of another board at the
+/// default bit rate.
 #[test]
 fn j07_random_bytes() {
     for (seed, mut rig, bytes) in [(1, fast(), 150_000), (2, Rig::new(BOARDS[2]), 6_000)] {
@@ -134,7 +134,7 @@ fn j07_random_bytes() {
         let mut rng = fastrand::Rng::with_seed(seed);
         rig.bring_up(Port::Usart3);
         for port in PORTS {
-            // The bytes contain many header bytes, because the parser reacts to headers.
+            // The random bytes contain many header bytes, because the parser reacts to headers.
             let noise: Vec<u8> =
                 (0..bytes).map(|_| if rng.u8(..) < 40 { 0x9B } else { rng.u8(..) }).collect();
             rig.write(port, &noise);
@@ -143,7 +143,7 @@ fn j07_random_bytes() {
     }
 }
 
-/// Frames with a valid CRC have a random type, length and body.
+/// The board receives frames with a valid CRC, and with a random type, length and body.
 #[test]
 fn j07_random_frames_of_hosts() {
     let mut rng = fastrand::Rng::with_seed(3);
@@ -158,7 +158,7 @@ fn j07_random_frames_of_hosts() {
     unharmed(rig);
 }
 
-/// J-15: random frames that can occur on a bus are sent between the frames of the real nodes.
+/// J-15: the test sends random frames that can occur on a CAN bus between the frames of the real nodes.
 #[test]
 fn j15_random_frames_on_the_joint_bus() {
     for seed in 4..7 {
@@ -175,7 +175,7 @@ fn j15_random_frames_on_the_joint_bus() {
             }
             rig.step();
         }
-        // When the random frames end, the bus recovers, and a host can clear the errors.
+        // When the random frames end, the joint bus recovers, and a host can clear the errors.
         rig.wait("the bus is free", 1_000, |rig| rig.board.machine.chip().fdcan.wire.waiting() < 8);
         rig.run(50);
         rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
@@ -188,7 +188,7 @@ fn random_frame(rng: &mut fastrand::Rng) -> CanFrame {
     const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 16, 20, 24, 48, 64];
     let id = match rng.u8(0..4) {
         0 => rng.u32(0..0x800),
-        // Answers with identifiers of existing and non-existing nodes.
+        // The test sends answers with identifiers of existing and non-existing nodes.
         _ => [0x200, 0x200, 0x210, 0x2F0][rng.usize(0..4)] + rng.u32(0..9),
     };
     let standard = Id::standard(id).expect("11 bits");

@@ -12,7 +12,7 @@ use rig::{BOARDS, PORTS, Rig, elf, fast_elf, index};
 const A: Port = Port::Usart2;
 const B: Port = Port::Usart3;
 
-/// Returns the only segment of a trajectory with this number of points, all at position 0.
+/// Returns the only segment of a trajectory with this number of points. All points are at position 0.
 fn segment(points: usize) -> Vec<u8> {
     let mut frame = vec![0; 60_000];
     let still = std::iter::repeat_n(RawPoint::default(), points);
@@ -21,7 +21,7 @@ fn segment(points: usize) -> Vec<u8> {
     frame
 }
 
-/// Runs the board until the line of a port has been silent for this time.
+/// Runs the board until the serial line of a port has been silent for this time.
 fn silence(rig: &mut Rig, port: Port, ms: u64) {
     rig.wait("the line falls silent", 10_000, |rig| rig.board.pending(port) == 0);
     rig.run(ms);
@@ -33,19 +33,20 @@ fn no_losses(rig: &mut Rig) {
     }
 }
 
-/// J-03, J-05: sends the first three bytes of a frame, waits a whole number of ms, and sends the remaining bytes.
+/// J-03, J-05: the host sends the first three bytes of a frame, waits a whole number of ms, and sends the remaining
+/// bytes of the frame.
 #[test]
 fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // The second part of the frame is so long that the line does not become idle right after the gap and wake the
-        // program.
+        // The second part of the frame is long. Therefore the line does not become idle right after the gap, and the
+        // idle line does not wake the program.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
-        // The transmission time of the first bytes makes the silence 0.2 ms shorter than the time between the two
-        // parts.
-        // The parts are sent at different times between two ticks.
+        // The silence is 0.2 ms shorter than the time between the two parts of the frame, because of the transmission
+        // time of the first bytes. The test sends both parts of the frame 0, 300 or 600 µs after the start of a
+        // millisecond.
         let moments = [0, 300, 600].into_iter().flat_map(|us| [1, 3, 4, 5, 6, 8, 12].map(|ms| (us, ms)));
         for (us, ms) in moments {
             let later = |rig: &mut Rig| {
@@ -76,8 +77,8 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     }
 }
 
-/// J-01, J-07: the board receives the longest possible frames on both lines at the same time without losing a byte or
-/// a tick.
+/// J-01, J-07: the board receives the longest possible frames on both lines at the same time. The board loses neither a
+/// byte nor a tick.
 fn longest_frames(mut rig: Rig) {
     rig.bring_up(A);
     let (accepted, refused) = (segment(1500), segment(1666));
@@ -114,8 +115,8 @@ fn j01_frames_of_60_000_bytes_at_15_mbd() {
     longest_frames(rig);
 }
 
-/// J-04: each answer is sent on the line of its request, in order, while frames arrive on the other line at the same
-/// time.
+/// J-04: the board sends each answer on the line of its request, in order, while frames arrive on the other line at the
+/// same time.
 #[test]
 fn j04_every_port_gets_its_own_records() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -138,7 +139,7 @@ fn j04_every_port_gets_its_own_records() {
             host.records.clear();
         }
         for (port, frames) in PORTS.into_iter().zip(asked) {
-            // In each round, the frames begin at a different time within the tick.
+            // In each round, the frames begin at a different time within a tick.
             for (_, frame) in frames.iter().cycle().skip(round).take(frames.len()) {
                 rig.write(port, frame);
             }
@@ -154,29 +155,29 @@ fn j04_every_port_gets_its_own_records() {
     }
 }
 
-/// J-04: "at once" means in the tick after the frame's last byte.
+/// J-04: "at once" means in the tick after the last byte of the frame.
 #[test]
 fn j04_a_record_waits_for_nothing_but_the_tick() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.run(65);
     for shift in 0..40 {
-        // The request is sent right after a status, when the line is free again.
+        // The host sends the request right after a status, when the line is free again.
         let port = PORTS[shift % 2];
         rig.run(1 + shift as u64);
         rig.wait("the line is free", 50, |rig| rig.flight.status_free && rig.ticks % 40 > 25);
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // The delay consists of six received bytes, at most one tick, and 175 sent bytes, at 86.8 µs per byte. The
-        // record is sent later if a periodic status was sent just before it.
+        // The delay consists of six received bytes, at most one tick, and 175 sent bytes, at 86.8 µs per byte. If the
+        // board sent a periodic status just before the record, the record is sent later.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");
     }
 }
 
-/// J-03, J-07: noise of any kind causes only one or two error records. Frames after the noise are not lost, with or
-/// without a gap.
+/// J-03, J-07: noise of any kind causes only one or two error records. The board does not lose frames that follow the
+/// noise, with or without a gap.
 #[test]
 fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -189,7 +190,7 @@ fn j03_noise_costs_no_frame_that_follows() {
         for (gap, port) in [(8, A), (8, B), (0, A), (0, B)] {
             if gap == 0 && noise == header {
                 // After a header that announces 59 974 bytes, the parser waits for a gap before it parses the bytes
-                // that follow.
+                // after the header.
                 rig.write(port, noise);
             }
             rig.hosts[index(port)].records.clear();
@@ -209,8 +210,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     no_losses(&mut rig);
 }
 
-/// J-07: a port with continuous traffic does not delay the tick (checked in every millisecond). A record of the other
-/// port waits only for records that were queued before it.
+/// J-07: a port with continuous traffic does not delay the tick (the rig checks this in every millisecond). A record of
+/// the other port waits only for records that were queued before it.
 #[test]
 fn j07_a_flooding_port_does_not_starve_the_other() {
     for (flood, other) in [(A, B), (B, A)] {
@@ -252,7 +253,7 @@ fn j04_a_host_that_pipelines_loses_no_record() {
     no_losses(&mut rig);
 }
 
-/// Returns a board that moves the arm along a path, controlled by the host at port A.
+/// Returns a board that moves the arm along a path. The host at port A controls the board.
 fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     let mut rig = Rig::of(elf, &BoardConfig { baud, ..Default::default() });
     rig.bring_up(A);
@@ -266,7 +267,8 @@ fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     rig
 }
 
-/// J-04: a Stop takes effect in the tick after its last byte, regardless of earlier bytes on either line.
+/// J-04: a Stop takes effect in the tick after the last byte of the Stop frame, regardless of earlier bytes on either
+/// line.
 #[test]
 fn j04_a_stop_waits_for_nothing() {
     let clear = fixed::CLEAR_OCCURRED_ERRORS;
@@ -292,7 +294,8 @@ fn j04_a_stop_waits_for_nothing() {
                     break;
                 }
             }
-            // The last byte is transmitted in this millisecond, so one of the next two ticks finds it.
+            // The last byte of the Stop frame is transmitted in this millisecond, so one of the next two ticks finds
+            // it.
             let mut ticks = 0;
             while rig.flight.urgent[index(port)].is_empty() {
                 ticks += 1;

@@ -1,4 +1,4 @@
-//! Real-time tests of the command `jtc`, which is connected to the board's firmware through a pseudo-terminal.
+//! Real-time tests of the command `jtc`, which is connected to the firmware of the board through a pseudo-terminal.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read};
@@ -26,7 +26,7 @@ impl Finished {
     }
 }
 
-/// An emulated board on a pseudo-terminal, and the program that communicates with the board.
+/// An emulated board on a pseudo-terminal, and the program `jtc` that communicates with the board.
 struct Live {
     jtc: PathBuf,
     directory: PathBuf,
@@ -66,7 +66,7 @@ impl Live {
         finished(self.command(words).spawn().expect("jtc starts"))
     }
 
-    /// Waits until a status contains this value.
+    /// Waits until a status contains this value of a field.
     #[track_caller]
     fn wait_for(&self, name: &str, value: &str) {
         let begin = Instant::now();
@@ -103,7 +103,7 @@ fn interrupt(child: &Child) {
     assert!(status.is_ok_and(|status| status.success()), "kill");
 }
 
-/// Returns a motion of 5 s that starts slightly off the zero pose, moves out and returns there.
+/// Returns a trajectory of 5 s that starts slightly off the zero pose, moves the arm away and returns it to the start.
 fn motion() -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=250 {
@@ -123,7 +123,7 @@ fn a_session_at_the_command_line() {
     let mut live = Live::start(jtc.into(), &Path::new(&firmware).join("nucleo-h745zi-q.elf"));
     let status = live.jtc(&["status"]).ends(0);
     assert!(status.out.contains(r#""missing_parameters":["friction"#), "{}", status.out);
-    // The emulated board runs exactly this firmware file.
+    // The emulated board executes exactly this firmware file.
     let image =
         |board: &str| Path::new(&firmware).join(format!("{board}.elf")).to_string_lossy().into_owned();
     let verified = live.jtc(&["firmware", "verify", "--image", &image("nucleo-h745zi-q")]).ends(0);
@@ -133,7 +133,7 @@ fn a_session_at_the_command_line() {
     live.jtc(&["params", "use-defaults"]).ends(0);
     live.wait_for("state", "HoldPos");
 
-    // The complete sequence consists of upload, approach and execution.
+    // The complete sequence consists of upload, approach and execution of a trajectory.
     let file = live.directory.join("motion.csv");
     std::fs::write(&file, motion()).expect("a file");
     let file = file.to_str().expect("UTF-8");
@@ -163,7 +163,7 @@ fn a_session_at_the_command_line() {
     let doctor = live.jtc(&["doctor"]).ends(0);
     assert!(doctor.out.contains(r#""healthy":true"#), "{}", doctor.out);
 
-    // The board was never reset, and its process ends when it receives a signal.
+    // The board was never reset. The process of the emulated board ends when it receives a signal.
     interrupt(&live.board);
     assert_eq!(live.board.wait().expect("it ends").code(), Some(0));
     let mut errors = String::new();

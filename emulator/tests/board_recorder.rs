@@ -1,4 +1,4 @@
-//! J-56: tests of the board's flight recorder, whose memory survives a reset.
+//! J-56: tests of the flight recorder on the board. The memory of the flight recorder survives a reset.
 mod rig;
 
 use jtc_core::recorder::{BLOCK_BYTES, Block, Log, Outcome, Replay};
@@ -21,7 +21,7 @@ fn moving() -> Rig {
     rig
 }
 
-/// Returns the memory of the board's flight recorder.
+/// Returns the memory of the flight recorder on the board.
 fn memory(rig: &Rig) -> Vec<Block> {
     let piece = |(name, blocks): (&str, usize)| {
         let at = rig.board.machine.elf().symbol(name).expect("its memory");
@@ -33,8 +33,8 @@ fn memory(rig: &Rig) -> Vec<Block> {
     names.into_iter().zip(jtc_sim::RECORDER_BLOCKS).flat_map(piece).collect()
 }
 
-/// Replays the log of the shadow controller and returns the telemetry of each tick. The replay must agree in every
-/// tick.
+/// Replays the log of the shadow controller and returns the telemetry of each tick. The replayed values must equal the
+/// recorded values in every tick.
 fn replayed(rig: &Rig) -> Vec<Telemetry> {
     let shadow = rig.shadow.as_ref().expect("a controller");
     let blocks: Vec<Block> = shadow.recorder().blocks().copied().collect();
@@ -47,8 +47,8 @@ fn replayed(rig: &Rig) -> Vec<Telemetry> {
         .collect()
 }
 
-/// The log of the board equals the log of the recorder on the PC in every word. A replay on the PC computes the
-/// values that the board computed, for at least two seconds before the error and 0.3 s after it.
+/// The log of the board equals the log of the recorder on the PC in every word. A replay on the PC computes the same
+/// values as the board, for at least two seconds before the error and 0.3 s after it.
 #[test]
 fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     let mut rig = moving();
@@ -67,19 +67,19 @@ fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     assert!(error - first >= 2_000 && last == error + 300, "{first} {error} {last}");
     for then in seen.iter().filter(|then| then.tick <= last) {
         let now = replayed.iter().find(|now| now.tick == then.tick).expect("each tick");
-        // `records_lost` is excluded, because the link sets it.
+        // The comparison excludes `records_lost`, because the link sets this value.
         assert_eq!(Telemetry { records_lost: 0, ..*now }, Telemetry { records_lost: 0, ..*then });
     }
 }
 
-/// A watchdog reset does not damage a log, and the log remains available after the next start. The pages of the log
-/// can be read and equal the pages of the shadow controller. The log can be replayed up to the last tick before the
-/// reset.
+/// A watchdog reset does not damage the log, and the log remains available after the next start. A host can read the
+/// pages of the log, and the pages equal the pages of the shadow controller. The log can be replayed up to the last
+/// tick before the reset.
 #[test]
 fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
     let mut rig = moving();
     let last = rig.telemetry().tick;
-    // The interrupt of TIM7 is masked, so no further tick occurs.
+    // The test masks the interrupt of TIM7, so no further tick occurs.
     rig.may_hang = true;
     rig.board.machine.write_register(0xE000_E184, 1 << (55 - 32));
     rig.run(30);
@@ -101,7 +101,8 @@ fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
         .collect();
     assert!(ticks.last().is_some_and(|tick| last - tick <= 500), "{ticks:?} {last}");
 
-    // Reads a complete block with frames. Each byte is compared with the answers of the shadow controller.
+    // Reads a complete block of the log with frames. The test compares each byte with the answers of the shadow
+    // controller.
     for offset in (0..BLOCK_BYTES).step_by(232) {
         rig.ask(HOST, &fixed::get_log(0, offset as u16));
         rig.run(60);

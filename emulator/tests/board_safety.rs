@@ -1,4 +1,4 @@
-//! Tests of safety functions: safety input, a tick that hangs, and faults and panics of the program.
+//! Tests of safety functions: the safety input, a tick that hangs, and faults and panics of the program.
 mod rig;
 
 use jtc_bus::Request;
@@ -22,7 +22,7 @@ fn holding() -> Rig {
     rig
 }
 
-/// Returns a board like `holding`, while it moves the arm along a trajectory.
+/// Like `holding`, but the board moves the arm along a trajectory.
 fn moving() -> Rig {
     let mut rig = holding();
     rig.set_off(HOST, 1.0, 500);
@@ -37,9 +37,9 @@ fn torque_of(frame: &can_link::CanFrame) -> Option<[f64; 6]> {
     }
 }
 
-/// J-22, J-12, J-21: the state Error begins in the first tick that reads 0. The frame of this tick contains zero
-/// torque. A broken wire has this effect, too. The error remains until the wire is repaired and the host has cleared
-/// the error.
+/// J-22, J-12, J-21: the state Error begins in the first tick that reads a safety input of 0. The frame of this tick
+/// contains zero torque. A broken wire has the same effect. The error remains until the wire is repaired and the host
+/// has cleared the error.
 #[test]
 fn j22_the_safety_input_acts_in_one_tick() {
     for level in [Some(false), None] {
@@ -50,7 +50,7 @@ fn j22_the_safety_input_acts_in_one_tick() {
             assert!(!rig.flight.safety_input && rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
             let sent: Vec<_> = rig.bus.iter().filter(|e| e.from_controller).map(|e| &e.frame).collect();
             assert_eq!(sent.into_iter().map(torque_of).collect::<Vec<_>>(), [Some([0.0; 6])], "on the bus");
-            // A request to clear the error has no effect while its cause is present.
+            // A request to clear the error has no effect while the cause of the error is present.
             rig.ask(HOST, &frames::clear_all());
             rig.run(50);
             assert_eq!(rig.state(), ControllerState::Error);
@@ -69,8 +69,8 @@ fn j22_the_safety_input_acts_in_one_tick() {
     }
 }
 
-/// Sets the safety input low for `us` µs, beginning `phase` µs after the start of a millisecond. Returns `true` if one
-/// of the next two ticks has detected the low level.
+/// Sets the safety input low for `us` µs. The pulse begins `phase` µs after the start of a millisecond. Returns `true`
+/// if one of the next two ticks has detected the low level.
 fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
     let start = rig.board.now_ms() * 1000 + phase;
     rig.board.machine.run_until(start * MICROSECOND);
@@ -83,7 +83,8 @@ fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
     })
 }
 
-/// J-22: a pulse of the safety input between two ticks is latched at any phase, and takes effect in the next tick.
+/// J-22: the board latches a pulse of the safety input between two ticks at any phase, and the pulse takes effect in
+/// the next tick.
 #[test]
 fn j22_pulses_shorter_than_a_tick_are_seen() {
     let mut rig = holding();
@@ -93,7 +94,7 @@ fn j22_pulses_shorter_than_a_tick_are_seen() {
     for us in [50, 100, 200, 300] {
         for phase in (5..995 - us).step_by(23) {
             assert!(pulse(&mut rig, phase, us), "{us} µs, {phase} µs after the start of a millisecond");
-            // The pulse is detected only once.
+            // The board detects the pulse only once.
             rig.step();
             assert!(rig.flight.safety_input, "{us} µs, {phase} µs after the start of a millisecond");
         }
@@ -106,22 +107,23 @@ fn j22_pulses_shorter_than_a_tick_are_seen() {
     }
 }
 
-/// Data about a program that ended with a reset.
+/// Data about a program run that ended with a reset.
 struct End {
     /// Time of the fault or of the last tick.
     begin: Time,
     /// Time of the reset.
     reset: Time,
     cause: ResetCause,
-    /// Record that the program wrote about the cause of its end.
+    /// Record that the program wrote about the cause of the reset.
     last_words: Vec<u8>,
-    /// Torques in the frames that were sent between `begin` and `reset`.
+    /// Torques in the frames that the board sent between `begin` and `reset`.
     torques: Vec<[f64; 6]>,
     /// Level of the safety output before the reset.
     safety: Option<bool>,
 }
 
-/// Runs until the board has been reset and started again. `undo` is called before the first tick of the new program.
+/// Runs until the board has been reset and started again. The rig calls `undo` before the first tick of the new program
+/// run.
 fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     rig.may_hang = true;
     let begin = rig.board.machine.now();
@@ -131,7 +133,8 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     let mut torques = Vec::new();
     let mut seen = 0;
     for _ in 0..20 {
-        // Runs in small steps up to the next millisecond, so that the machine is stopped between reset and start.
+        // The rig runs in small steps up to the next millisecond, so that it can stop the machine between reset and
+        // start.
         for _ in 0..99 {
             let safety = rig.board.safety_output();
             let next = rig.board.machine.now() + 10 * MICROSECOND;
@@ -158,9 +161,9 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     panic!("no reset");
 }
 
-/// Checks the state after the program has failed and restarted. From the first status on, the error is present,
-/// the torque is zero and the safety output is at 0, until the host clears the error. The arm does not continue
-/// a motion without a command.
+/// Checks the state after the program has failed and restarted. From the first status on, the error is present, the
+/// torque is zero and the safety output is at 0, until the host clears the error. The arm does not continue a motion
+/// without a command.
 fn latched_until_cleared(mut rig: Rig, cause: u32) {
     rig.wait("the first tick", 10, |rig| rig.ticks > 0);
     assert_eq!(rig.flight.cause, cause);
@@ -197,14 +200,15 @@ fn latched_until_cleared(mut rig: Rig, cause: u32) {
     assert_eq!(rig.board.safety_output(), Some(true));
 }
 
-/// Returns the largest motion of a joint since the positions `since`, rad.
+/// Returns the largest difference between a joint position and the same joint position in `since`, rad.
 fn moved(rig: &Rig, since: &[f64; 6]) -> f64 {
     rig.board.plant().truth().q.iter().zip(since).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
 }
 
 const CONTROL_STEP: &str = "control_step";
 
-/// Overwrites the first instructions of the control step; returns the old instructions and their address.
+/// Overwrites the first instructions of the control step. Returns the address of these instructions and the old
+/// instructions.
 fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
     let at = rig.board.machine.elf().symbol(CONTROL_STEP).expect("the control step").address;
     let old = rig.board.machine.memory(at, code.len()).expect("flash");
@@ -215,7 +219,8 @@ fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
 /// J-12: if a tick does not end, or does not begin, the watchdog resets the board within 6 ms.
 #[test]
 fn j12_a_tick_that_hangs_resets_the_board() {
-    // If `true`, the step is replaced by `b .`; if `false`, the interrupt of TIM7 is masked in the NVIC.
+    // If `hang` is `true`, `b .` replaces the control step. If `hang` is `false`, the test masks the interrupt of TIM7
+    // in the NVIC.
     for hang in [true, false] {
         let mut rig = holding();
         let pose = rig.board.plant().truth().q;
@@ -247,8 +252,8 @@ fn j24_after_a_hang_no_trajectory_goes_on() {
     latched_until_cleared(rig, 4);
 }
 
-/// Checks the reaction to a fault or a panic: the safety output becomes 0, one frame with zero torque is sent, and
-/// the board is reset. The cause is recorded.
+/// Checks the reaction to a fault or a panic. The safety output becomes 0, the board sends one frame with zero torque,
+/// and the board is reset. The program has recorded the cause.
 fn said_goodbye(end: &End) {
     assert_eq!(end.cause, ResetCause::Software);
     assert_eq!(
@@ -270,7 +275,7 @@ fn words(end: &End, n: usize) -> u32 {
 #[test]
 fn j12_a_hard_fault_takes_the_torque_away() {
     for mut rig in [holding(), moving()] {
-        // An undefined instruction.
+        // The half-word 0xDE00 is an undefined instruction.
         let (at, old) = patch(&mut rig, &[0x00, 0xDE]);
         let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
         said_goodbye(&end);
@@ -281,11 +286,11 @@ fn j12_a_hard_fault_takes_the_torque_away() {
     }
 }
 
-/// The tick uses an invalid pointer and loads from an unmapped address.
+/// The tick loads from an unmapped address through an invalid pointer.
 #[test]
 fn j12_a_null_pointer_is_a_hard_fault() {
     let mut rig = holding();
-    // `movw r0, 0; movt r0, 0x6000; ldr r0, [r0]` loads from external memory, which does not exist.
+    // `movw r0, 0; movt r0, 0x6000; ldr r0, [r0]` loads from external memory, which does not exist on the board.
     let (at, old) = patch(&mut rig, &[0x40, 0xF2, 0x00, 0x00, 0xC6, 0xF2, 0x00, 0x00, 0x00, 0x68]);
     let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
     said_goodbye(&end);
@@ -308,7 +313,7 @@ fn branch(from: u32, to: u32) -> [u8; 4] {
 #[test]
 fn j12_a_panic_takes_the_torque_away() {
     let mut rig = holding();
-    // Functions that panic. If such a function has a source location as an argument, it is one of the first
+    // Functions that panic. If such a function has a source location as an argument, the location is one of the first
     // arguments.
     const PANICS: [&str; 4] = [
         "core::option::unwrap_failed",
@@ -318,7 +323,8 @@ fn j12_a_panic_takes_the_torque_away() {
     ];
     let elf = rig.board.machine.elf();
     let panic = PANICS.iter().find_map(|name| elf.symbol(name).ok()).expect("a function that panics").address;
-    // The code that sets the four arguments, the branch, a `Location` and a name are written to free flash.
+    // The test writes the following to free flash: code that sets the four arguments, the branch, a `Location` and a
+    // name.
     const STUB: u32 = 0x080F_0000;
     let mut stub = vec![0x03, 0x48, 0x01, 0x46, 0x02, 0x46, 0x03, 0x46];
     stub.extend(branch(STUB + 8, panic));
@@ -340,8 +346,8 @@ fn j12_a_panic_takes_the_torque_away() {
     latched_until_cleared(rig, 6);
 }
 
-/// A reset by the button or the supply is not a failure. The board starts in Init without an error, and does not move
-/// the arm.
+/// A reset by the button or the power supply is not a failure. The board starts in Init without an error, and does not
+/// move the arm.
 #[test]
 fn j24_reset_and_power_on_begin_in_init() {
     for (cause, number) in [(ResetCause::Pin, 2), (ResetCause::PowerOn, 1)] {

@@ -1,5 +1,5 @@
-//! Complete sessions with a host and an arm, in virtual time. In every tick, a controller on the PC
-//! must compute values that are bit-identical to the values of the board (`rig`).
+//! Complete sessions with a host and an arm, in virtual time. In every tick, the values that a controller on the PC
+//! computes must be bit-identical to the values of the board (`rig`).
 mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -12,7 +12,7 @@ use rig::{BOARDS, Rig, fast_elf};
 const HOST: Port = Port::Usart2;
 const GOAL: [f64; 6] = [0.5, 0.4, -0.5, 0.4, -0.3, 0.6];
 
-/// Returns a motion to another position and back that takes 4 s, with 1001 points every 4 ms.
+/// Returns a motion to another position and back. The motion takes 4 s, with 1001 points every 4 ms.
 fn motion() -> Vec<RawPoint> {
     let points = frames::there_and_back(&[0.0; 6], &GOAL, 2.0, 1, 4);
     assert_eq!(points.len(), 1001);
@@ -31,20 +31,20 @@ impl Rig {
         self.response(HOST, &frames::exec(command))
     }
 
-    /// Returns the largest distance between the real arm and the commanded position, rad.
+    /// Returns the largest difference between a joint position of the simulated arm and its commanded position, rad.
     fn following_error(&self) -> f64 {
         let real = self.board.plant().truth().q;
         let joints = self.telemetry().joints;
         (0..6).map(|j| (joints[j].set_position - real[j]).abs()).fold(0.0, f64::max)
     }
 
-    /// Returns the largest speed of the real arm, rad/s.
+    /// Returns the largest joint speed of the simulated arm, rad/s.
     fn speed(&self) -> f64 {
         self.board.plant().truth().qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()))
     }
 }
 
-/// Runs the board until the trajectory is in this execution state; returns the largest following error.
+/// Runs the board until the trajectory is in this execution state. Returns the largest following error.
 #[track_caller]
 fn follow(rig: &mut Rig, until: TrajectoryState, ms: u64) -> f64 {
     let mut worst: f64 = 0.0;
@@ -66,12 +66,13 @@ fn a_whole_session() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(HOST);
     let limit = Config::default().joints.map(|j| j.position_error_max).into_iter().fold(f64::MAX, f64::min);
-    // J-51: the kind of line on which segment 0 arrives determines if this upload can get all data status
-    // values, including 7 and 8.
+    // J-51: the request GetInfo before segment 0 permits all data status values in the records of this upload,
+    // including 7 and 8.
     rig.ask(HOST, &fixed::GET_INFO);
     rig.upload(&motion(), 4);
 
-    // J-33: after Pause, the arm slows down on the path and is at rest after a ramp. Resume and Stop follow.
+    // J-33: after Pause, the arm slows down on the path and is at rest after a ramp. The test then sends Resume and
+    // Stop.
     assert!(accepted(rig.exec(ExecCommand::Execute)));
     rig.run(1_000);
     assert_eq!(rig.state(), ControllerState::Operate);
@@ -90,14 +91,14 @@ fn a_whole_session() {
     assert!(rig.telemetry().point > held, "it goes on where it was");
     assert!(accepted(rig.exec(ExecCommand::Stop)));
     let stopped = follow(&mut rig, TrajectoryState::Stop, 1_000);
-    // J-34: execution cannot start from a position in the middle of the path. J-51: only a host that has recently
-    // sent GetInfo receives the reason.
+    // J-34: execution cannot start from a position in the middle of the path. J-51: only a host that has recently sent
+    // GetInfo receives the reason of the rejection.
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::IncorrectValue);
     rig.ask(HOST, &fixed::GET_INFO);
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);
     assert_eq!(rig.exec(ExecCommand::Pause).data, DataStatus::NotAllowed);
 
-    // J-31: the arm moves to the start position and then executes the whole trajectory.
+    // J-31: the arm moves to the start position and then executes the complete trajectory.
     let here = rig.telemetry().joints.map(|j| j.set_position);
     rig.upload(&frames::there_and_back(&here, &[0.0; 6], 2.0, 1, 10)[..201], 10);
     assert!(accepted(rig.exec(ExecCommand::Execute)));
@@ -111,10 +112,10 @@ fn a_whole_session() {
         assert!(error < limit / 2.0, "{name}: {error} rad, the limit is {limit}");
     }
 
-    // J-25.
+    // J-25: after the last point, the controller can change to Teaching.
     rig.wait("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
-    // Teaching begins when the integral term of the controller has settled after the motion.
+    // Teaching begins when the integral term of the position controller has settled after the motion.
     rig.wait("Teaching", 3_000, |rig| rig.state() == ControllerState::Teaching);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
@@ -125,8 +126,8 @@ fn a_whole_session() {
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
-/// The arm lowers a load of 3.3 kg at the last link, which the controller knows. The Stop arrives in the position that
-/// needs 95 % of the shoulder's torque limit.
+/// The arm lowers a load of 3.3 kg at the last link. The arm model of the controller includes this load. The Stop
+/// arrives in the position that requires 95 % of the torque limit of the shoulder.
 #[test]
 fn j33_a_loaded_arm_stands_within_half_a_second() {
     const SHOULDER: usize = 1;
@@ -170,9 +171,9 @@ fn j33_a_loaded_arm_stands_within_half_a_second() {
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 
-/// J-40: with a host's own parameters, friction tables, exceeded limits and errors, every torque is bit-identical to
-/// the torque that a PC computes. The bytes of every frame and status are also identical. The rig compares these
-/// values in each tick; this test checks that all these cases have occurred.
+/// J-40: the host uploads its own parameters and friction tables, limits are exceeded, and errors occur. Every torque
+/// is bit-identical to the torque that a PC computes. The bytes of every frame and status are also identical. The rig
+/// compares these values in each tick; this test checks that all these cases have occurred.
 #[test]
 fn j40_torques_have_the_same_bits_as_on_a_pc() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -199,7 +200,7 @@ fn j40_torques_have_the_same_bits_as_on_a_pc() {
     assert_ne!(rig.status(HOST).joints[1].internal_occurred, 0, "of that joint");
 }
 
-/// A session works on the other boards and on the other line.
+/// A session works on all other boards and on the other serial line.
 #[test]
 fn a_short_session_on_every_board() {
     let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
@@ -213,7 +214,7 @@ fn a_short_session_on_every_board() {
     }
 }
 
-/// The firmware for fast lines behaves like the firmware for the default rate.
+/// The firmware for fast serial lines behaves like the firmware for the default bit rate.
 #[test]
 fn a_short_session_at_15_mbd() {
     let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
@@ -238,8 +239,8 @@ fn j12_older_drives_are_not_left_behind() {
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 
-/// J-12: in each millisecond, the bus carries one broadcast of the controller and the answers to it. The broadcast
-/// begins within microseconds of the tick.
+/// J-12: in each millisecond, the joint bus carries one broadcast of the controller and the answers to this broadcast.
+/// The broadcast begins within microseconds of the tick.
 #[test]
 fn j12_one_broadcast_a_tick_and_its_answers() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -253,8 +254,8 @@ fn j12_one_broadcast_a_tick_and_its_answers() {
         assert_eq!(own, 1, "ms {ms}");
         entries.extend(rig.bus.iter().cloned());
     }
-    // The frames are grouped by ticks, from one broadcast to the next. A tick does not need to begin at the start of
-    // a millisecond of this test.
+    // The test groups the frames by ticks, from one broadcast to the next. A tick does not need to begin at the start
+    // of a millisecond of this test.
     let first = entries.iter().position(|e| e.from_controller).expect("a broadcast");
     let rounds: Vec<_> = entries[first..].chunk_by(|_, next| !next.from_controller).collect();
     let mut starts = Vec::new();

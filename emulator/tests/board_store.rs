@@ -1,6 +1,6 @@
-//! J-54: tests of the stored arm. To simulate a loss of power, the test copies the flash contents of an emulated
-//! board to the next board. The test requests a store through the firmware's mailbox, which is accessible only to
-//! a test or a debugger.
+//! J-54: tests of the stored arm. To simulate a loss of power, the test copies the flash contents of an emulated board
+//! to the next board. The test requests a store through the mailbox of the firmware, which is accessible only to a test
+//! or a debugger.
 mod rig;
 
 use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
@@ -10,7 +10,7 @@ use openjtc_emulator::observe::ResetCause;
 use openjtc_emulator::{BoardConfig, FIRST_LINE, Machine, Port};
 use rig::{BOARDS, Rig, elf};
 
-/// Interrupt of the tick.
+/// Exception number of the tick interrupt.
 const TIM7: usize = FIRST_LINE + 55;
 const IMAGE_MAX: usize = jtc_core::slots::IMAGE_MAX;
 /// Flash addresses of the slots of the stored arm.
@@ -38,13 +38,13 @@ fn mailbox(machine: &Machine) -> Mailbox {
     Mailbox { state, length, sequence, failure, staging, loaded: [word(5), word(6), word(7)] }
 }
 
-/// Returns the image that the firmware found when it started, with its sequence number.
+/// Returns the image that the firmware found when it started, with the sequence number of the image.
 fn loaded(machine: &Machine) -> Option<(Vec<u8>, u32)> {
     let [address, length, sequence] = mailbox(machine).loaded;
     (address != 0).then(|| (machine.memory(address, length as usize).expect("memory"), sequence))
 }
 
-/// Requests a store in the way that a frame of a host does.
+/// Requests a store in the same way as a frame of a host.
 fn ask(machine: &mut Machine, image: &[u8]) {
     let at = machine.elf().symbol("ARM_STORE").expect("the mailbox").address;
     let staging = mailbox(machine).staging;
@@ -53,8 +53,8 @@ fn ask(machine: &mut Machine, image: &[u8]) {
     assert!(machine.poke(at, &ASKED.to_le_bytes()));
 }
 
-/// Returns a board with these flash contents, some ticks after its start. Erasing a sector takes only 100 ms here;
-/// tests that need the real time set it themselves.
+/// Returns a board with these flash contents, some ticks after its start. Erasing a sector takes only 100 ms on this
+/// board; tests that need the real erase time set it themselves.
 fn board(bank2: Bank2) -> Rig {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { bank2, ..Default::default() });
     rig.board.machine.chip().flash.erase_time = 100 * MILLISECOND;
@@ -84,7 +84,7 @@ fn working(rig: &Rig) -> bool {
     !matches!(mailbox(&rig.board.machine).state, DONE | FAILED)
 }
 
-/// Checks the conditions that must be true after every flash operation.
+/// Checks the conditions that must be true after every flash operation of a test.
 #[track_caller]
 fn clean(rig: &mut Rig) {
     let chip = rig.board.machine.chip();
@@ -137,8 +137,8 @@ fn j54_a_stored_image_outlasts_the_power() {
     assert_eq!(loaded(&rig.board.machine), Some((images[1].clone(), 6)));
 }
 
-/// J-50 to J-54: a host uploads an arm with frames and requests to store it. After a loss of power the board starts
-/// with this arm.
+/// J-50 to J-54: a host uploads an arm with frames and requests the board to store the arm. After a loss of power, the
+/// board starts with this arm.
 #[test]
 fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     const HOST: Port = Port::Usart3;
@@ -165,7 +165,7 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     rig.ask(HOST, &fixed::STORE_ARM);
     rig.wait("the arm is stored", 4_000, |rig| !working(rig));
     assert_eq!(mailbox(&rig.board.machine).state, DONE);
-    // The tick detects the result of the links when it runs next.
+    // The next tick detects that the links have stored the image.
     rig.run(2);
     rig.ask(HOST, &fixed::GET_INFO);
     rig.run(60);
@@ -189,8 +189,8 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     clean(&mut rig);
 }
 
-/// J-12: erasing a sector takes at least two seconds. During this time, every tick is on time and executes as
-/// many instructions as without a flash operation.
+/// J-12: erasing a sector takes at least two seconds. During this time, every tick is on time and executes as many
+/// instructions as a tick without a flash operation.
 #[test]
 fn j12_no_tick_is_late_while_the_flash_works() {
     let run = |ask_for: Option<&[u8]>| {
@@ -208,7 +208,7 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     let (idle, none) = run(None);
     let (storing, operations) = run(Some(&image(IMAGE_MAX, 5)));
     assert_eq!((none, operations), (0, 1 + IMAGE_MAX / WORD + 1), "all is stored in that time");
-    // The tick reads the progress of storing, which changes its number of instructions slightly.
+    // The tick reads the progress of storing, which slightly changes the number of its instructions.
     assert_eq!(idle.calls, storing.calls);
     for (idle, storing) in [(idle.min, storing.min), (idle.max, storing.max)] {
         assert!(idle.abs_diff(storing) <= 32, "instructions of the tick: {idle} and {storing}");
@@ -216,7 +216,7 @@ fn j12_no_tick_is_late_while_the_flash_works() {
 }
 
 /// J-54: the power fails before, during and after every operation of a store. The board then starts with either the
-/// complete old image or the complete new image, and can store the next image.
+/// complete old image or the complete new image, and can store another image.
 #[test]
 fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     let images = [image(200, 1), image(IMAGE_MAX, 2), image(260, 3)];
@@ -240,8 +240,8 @@ fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     }
 }
 
-/// Stores an image on a board with this flash. Returns the flash after the store. Also returns, each with a
-/// description, the flash contents after a loss of power before, during and after operations.
+/// Stores an image on a board with these flash contents. Returns the flash contents after the store. Also returns the
+/// flash contents after a loss of power before, during and after operations, each with a description.
 fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     let mut rig = board(bank);
     let mut cuts = vec![("before all".to_owned(), rig.board.machine.cut_power(0))];
@@ -254,9 +254,9 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
         let Some(operation) = operations.get(seen).copied() else { continue };
         seen += 1;
         let what = operation.kind;
-        // Most power losses occur during the first operation (erasing) and the last operation. A half-erased sector
-        // can have many different contents, and the last word, the header, determines if an image is valid. Tests of
-        // a few of the many data words are enough.
+        // Most power losses of this test occur during the first operation (erasing) and the last operation. A
+        // half-erased sector can have many different contents, and the last word, the header, determines if an image is
+        // valid. Tests of a few of the many data words are sufficient.
         let last = 1 + 1 + new.len().div_ceil(WORD);
         let times = match seen {
             1 => 24,
@@ -277,7 +277,7 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     (rig.board.machine.cut_power(0), cuts)
 }
 
-/// For the flash, a reset by the button or the watchdog in the middle of an operation has the same effect as a loss
+/// A reset by the button or the watchdog in the middle of a flash operation has the same effect on the flash as a loss
 /// of power.
 #[test]
 fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
@@ -296,15 +296,15 @@ fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// Returns the arm that a board with this flash uses after its start.
+/// Returns the arm that a board with these flash contents uses after its start.
 fn start(bank: Bank2) -> Option<Vec<u8>> {
     let mut rig = board(bank);
     clean(&mut rig);
     loaded(&rig.board.machine).map(|(image, _)| image)
 }
 
-/// J-54: an unreadable word in a slot does not cause a fault. The firmware does not use the contents of the slot. The
-/// slot can be overwritten.
+/// J-54: an unreadable word in a slot does not cause a fault. The firmware does not use the contents of this slot, and
+/// can overwrite the slot.
 #[test]
 fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     let mut rig = board(Bank2::default());
@@ -328,8 +328,8 @@ fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     }
 }
 
-/// If the flash reports an error, the firmware reports the error. The previous image remains, and the next attempt
-/// may succeed.
+/// If the flash reports an error, the firmware reports this error in its mailbox. The previous image remains in flash,
+/// and the next attempt may succeed.
 #[test]
 fn j54_a_failed_store_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));
@@ -340,7 +340,7 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // An erase operation takes a long time. Words are written within milliseconds, and writing of the
+            // An erase operation takes a long time. The firmware writes words within milliseconds, and writing of the
             // current or the next word fails.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
@@ -356,8 +356,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// The flash does not report the following failures: it no longer accepts keys, a word reads back differently, or
-/// an erase operation never ends.
+/// The flash does not report the following failures: the flash no longer accepts keys, a word reads back differently,
+/// or an erase operation never ends.
 #[test]
 fn j54_a_store_that_cannot_work_ends() {
     let fails = |mut rig: Rig, failure: u32| {

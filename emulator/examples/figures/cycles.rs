@@ -1,5 +1,5 @@
-//! Cycles of one control step, and of the flight recorder after the step. llvm-mca's model of the core estimates
-//! them from the sequence of executed instructions.
+//! Clock cycles of one control step, and of the flight recorder after the step. llvm-mca estimates the cycles from the
+//! sequence of executed instructions, with its model of the core.
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::Write;
@@ -11,7 +11,7 @@ use openjtc_emulator::{BoardConfig, Elf, Machine, RegisterARM};
 use crate::rig::{Rig, Version};
 use crate::session::Session;
 
-/// Measured functions: name, symbol, and maximum number of cycles.
+/// Measured functions: name, symbol, and maximum number of clock cycles.
 const PARTS: [(&str, &str, u64); 2] = [
     ("control step in Operate", "control_step", 12_000),
     ("tick of the flight recorder", "record_step", 500),
@@ -87,8 +87,8 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// Returns the executed instructions in order and without jumps, as input for an assembler. The machine executes
-/// an IT block in one step. All instructions of the block are included, because the hardware fetches all of them.
+/// Returns the executed instructions in order and without jumps, as input for an assembler. The machine executes an IT
+/// block in one step. The result includes all instructions of the block, because the hardware fetches all of them.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -97,7 +97,7 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
         let code = code.ok_or_else(|| format!("no instruction at {at:#010x}"))?;
         let name = code.split(' ').next().unwrap_or_default();
         if name.starts_with("it") {
-            // The model does not know IT, which the core executes together with the next instruction.
+            // The model of llvm-mca does not contain IT, which the core executes together with the next instruction.
             lines.extend(following.take(name.len() - 1).map(|code| unconditional(code)));
         } else {
             lines.push(without_target(code));
@@ -106,8 +106,8 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
     Ok(lines)
 }
 
-/// Replaces the target of a branch by a nearby address. A call becomes a branch, because llvm-mca does not model
-/// calls. According to its documentation, it assumes 100 cycles for each call.
+/// Replaces the target of a branch by a nearby address. A call becomes a branch, because llvm-mca does not model calls:
+/// according to its documentation, llvm-mca assumes 100 cycles for each call.
 fn without_target(code: &str) -> String {
     let (name, operands) = code.split_once(' ').unwrap_or((code, ""));
     let name = match name {
@@ -119,7 +119,8 @@ fn without_target(code: &str) -> String {
         let register = operands.split(',').next().unwrap_or_default();
         return format!("{name} {register}, #4");
     }
-    // The model does not know the comparison with zero. A comparison of two registers takes equally long.
+    // The model of llvm-mca does not contain the comparison with zero. A comparison of two registers takes equally
+    // long.
     if let Some(register) = operands.strip_suffix(", #0").filter(|_| name.starts_with("vcmp")) {
         return format!("{name} {register}, {}", register.trim());
     }
@@ -140,7 +141,7 @@ fn unconditional(code: &str) -> String {
     without_target(&format!("{plain}{width} {operands}"))
 }
 
-/// Returns the number of cycles that the model estimates for executing these instructions once.
+/// Returns the number of clock cycles that llvm-mca estimates for executing these instructions once.
 fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     let mut mca = tool("llvm-mca")?;
     mca.args(["-mtriple=thumbv7em-none-eabihf", "-mcpu=cortex-m7", "-iterations=1"]);
@@ -158,7 +159,7 @@ fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     }
 }
 
-/// Finds an LLVM program by its name with or without a version number.
+/// Finds an LLVM program whose name may end with a version number.
 fn tool(name: &str) -> Result<Command, Box<dyn Error>> {
     let versions = (14..=22).rev().map(|version| format!("{name}-{version}"));
     for program in std::iter::once(name.to_owned()).chain(versions) {

@@ -1,4 +1,4 @@
-//! The measured session, which reaches every state with continuous traffic on both lines.
+//! The measured session, which reaches every state of the controller with continuous traffic on both serial lines.
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -40,10 +40,10 @@ impl Steps {
     }
 }
 
-/// Number of ms that is longer than any ramp of the path time.
+/// Time that is longer than any ramp of the controller's path time, ms.
 const RAMP: u32 = 250;
 
-/// A rig that counts the instructions of control steps.
+/// A test rig that counts the instructions of control steps.
 pub struct Session {
     pub rig: Rig,
     counter: openjtc_emulator::Counter,
@@ -53,9 +53,9 @@ pub struct Session {
     recorded: Steps,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
-    /// Instruction counts of steps along the path at full speed, without other work.
+    /// Instruction counts of steps along the path at full speed, without a status and without a host event.
     on_path: Steps,
-    /// Index of the point of the last step, and number of consecutive steps in which the path time advanced
+    /// Index of the trajectory point of the last step, and number of consecutive steps in which the path time advanced
     /// by exactly one millisecond per tick.
     point: u32,
     steady: u32,
@@ -123,8 +123,8 @@ impl Session {
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
-    /// Pushes a joint during Teaching. The controller brings the arm to rest in the middle of its motion, without
-    /// a command (J-25).
+    /// Pushes a joint during Teaching. The controller brings the arm to rest during this motion, without a command
+    /// (J-25).
     fn lead_too_fast(&mut self) {
         let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
         self.rig.board.inject(push);
@@ -146,7 +146,7 @@ impl Session {
         });
     }
 
-    /// Uploads a motion that moves every joint, and starts it.
+    /// Uploads a trajectory that moves every joint, and starts it.
     pub fn execute(&mut self) {
         let goal = [0.6, 0.5, -0.6, 0.5, -0.4, 0.8];
         for segment in frames::trajectory(&frames::there_and_back(&[0.0; 6], &goal, 1.5, 1, 5), 5, 113) {
@@ -174,7 +174,7 @@ impl Session {
             self.calls = count.calls;
             self.recorded.add(self.rig.board.machine.counted(self.recorder).last);
             let (state, point) = (self.rig.flight.state, self.rig.flight.point);
-            // If a tick handles several events, the step is counted for the last event; the default value means no
+            // If a tick handles several host events, the step is counted for the last event; the default value means no
             // event.
             let event = self.rig.flight.events.last().copied().unwrap_or_default();
             self.steady = if point == self.point + 1 { self.steady + 1 } else { 0 };
@@ -192,7 +192,7 @@ impl Session {
         }
     }
 
-    /// Runs `ms` milliseconds.
+    /// Runs the session for `ms` milliseconds.
     pub fn run_ms(&mut self, ms: u64) {
         (0..ms).for_each(|_| self.step());
     }
@@ -207,8 +207,8 @@ impl Session {
         panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
     }
 
-    /// Returns the instruction counts of steps without a host event, with the name of the state and `true` if a
-    /// status was sent.
+    /// Returns the instruction counts of steps without a host event. Each entry also contains the name of the state,
+    /// and `true` if a status was sent.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
         self.steps
             .iter()
@@ -234,7 +234,7 @@ impl Session {
         })
     }
 
-    /// Runs one instruction at a time. Returns the largest number of consecutive instructions, outside the tick, for
+    /// Runs one instruction at a time. Returns the largest number of consecutive instructions outside the tick during
     /// which interrupts were masked.
     pub fn longest_mask(&mut self, ms: u64) -> u64 {
         let (mut masked, mut longest) = (0, 0);
@@ -246,7 +246,7 @@ impl Session {
                 let before = machine.instructions();
                 machine.run_until(machine.now() + cycle);
                 if machine.instructions() == before {
-                    // While the core sleeps, the check for the exception that wakes the core may be slightly late.
+                    // While the core sleeps, the machine may check slightly late for the exception that wakes the core.
                     machine.run_until(machine.now() + 100 * cycle);
                 }
                 let tick = machine.chip().core.contexts.contains(&TIM7);
@@ -259,7 +259,7 @@ impl Session {
         longest
     }
 
-    /// Returns the machine with its counts.
+    /// Returns the machine with its instruction counts.
     pub fn into_machine(self) -> Machine {
         self.rig.board.machine
     }

@@ -1,5 +1,5 @@
-//! Loads and stores of the core. Finds the peripheral register of each access, and makes the necessary checks after
-//! the access.
+//! Loads and stores of the core. This module finds the peripheral register of each access, and does the necessary
+//! checks after the access.
 use std::collections::BTreeMap;
 
 use super::map::{
@@ -84,7 +84,7 @@ impl Chip {
         if address >= 0xE000_0000 {
             let at = self.moment();
             let word = if size < 4 {
-                // Priorities can be written byte by byte.
+                // The program can write priorities byte by byte.
                 let mask = ((1u32 << (8 * size)) - 1) << shift;
                 self.scs.read(word_address, &self.nvic, at) & !mask | value << shift
             } else {
@@ -170,12 +170,12 @@ impl Chip {
         }
     }
 
-    /// Returns `true` if the protection unit blocks access to bank 2.
+    /// Returns `true` if the protection unit blocks access to flash bank 2.
     fn bank2_closed(&self) -> bool {
         !self.scs.protection(BANK2 + BANK2_SIZE - 1, false).allowed
     }
 
-    /// Checks an access of the core to bank 2; returns `false` if the access is refused. While the bank is busy,
+    /// Checks an access of the core to flash bank 2. Returns `false` if the access is rejected. While the bank is busy,
     /// the core waits.
     fn reach_bank2(&mut self, address: u32, faults_masked: bool) -> bool {
         let protection = self.scs.protection(address, faults_masked);
@@ -201,7 +201,7 @@ impl Chip {
         self.changed();
     }
 
-    /// Loads a value from bank 2 for the core.
+    /// Loads a value from flash bank 2 for the core.
     pub fn load_bank2(&mut self, address: u32, size: usize, faults_masked: bool) -> u32 {
         if !self.reach_bank2(address, faults_masked) {
             return 0;
@@ -213,7 +213,7 @@ impl Chip {
         value
     }
 
-    /// Stores a value to bank 2 for the core.
+    /// Stores a value to flash bank 2 for the core.
     pub fn store_bank2(&mut self, address: u32, size: usize, value: u32, faults_masked: bool) {
         if self.reach_bank2(address, faults_masked) {
             let (now, closed) = (self.now(), self.bank2_closed());
@@ -222,8 +222,8 @@ impl Chip {
         }
     }
 
-    /// Must be called after an access that may have changed interrupt lines or events. The main loop checks lines and
-    /// events before the next instruction.
+    /// This function must be called after an access that may have changed interrupt lines or events. The main loop then
+    /// checks lines and events before the next instruction.
     fn changed(&mut self) {
         self.update_lines();
         self.core.attention = true;

@@ -11,7 +11,7 @@ pub const IWDG1: u32 = 0x5800_4800;
 pub const IWDG1_END: u32 = 0x5800_4C00;
 pub const EXTI: u32 = 0x5800_0000;
 pub const EXTI_END: u32 = 0x5800_0400;
-/// SYSCFG_EXTICR1..4.
+/// Addresses of the registers SYSCFG_EXTICR1..4.
 pub const EXTICR: u32 = 0x5800_0408;
 pub const EXTICR_END: u32 = 0x5800_0418;
 /// Registers of the protection unit.
@@ -56,8 +56,8 @@ pub fn place(address: u32) -> Option<(Gate, Place)> {
     })
 }
 
-/// Returns `true` for blocks that are plain memory for the firmware: CRS, the other registers of SYSCFG, RTC, PWR,
-/// HSEM, DBGMCU.
+/// Returns `true` for blocks of registers that are plain memory for the firmware: CRS, the other registers of SYSCFG,
+/// RTC, PWR, HSEM, DBGMCU.
 pub fn is_plain(address: u32) -> bool {
     matches!(
         address & !0x3FF,
@@ -65,17 +65,17 @@ pub fn is_plain(address: u32) -> bool {
     )
 }
 
-/// Returns the bits that read as "ready" in blocks that are otherwise plain memory.
+/// Returns the bits that read as "ready" in blocks of registers that are otherwise plain memory.
 pub fn ready_bits(address: u32, plain: &Plain) -> u32 {
     let vos = plain.read(PWR + 0x18) & 0xC000;
     match address {
-        // The registers are CSR1 (ACTVOSRDY and the active voltage scale), CR3 (SDEXTRDY), D3CR (VOSRDY) and CCCSR
-        // (ready bit).
+        // The registers in this list are CSR1 (ACTVOSRDY and the active voltage scale), CR3 (SDEXTRDY), D3CR (VOSRDY)
+        // and CCCSR (ready bit).
         0x5802_4804 => 1 << 13 | vos,
         0x5802_480C => 1 << 16,
         0x5802_4818 => 1 << 13,
         0x5800_0420 => 1 << 8,
-        // A semaphore that is locked by a read belongs to core 1.
+        // If a read locks a semaphore, the semaphore belongs to core 1.
         0x5802_6480..0x5802_6500 => 0x8000_0300,
         _ => 0,
     }

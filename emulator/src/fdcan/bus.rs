@@ -1,5 +1,5 @@
-//! The bus line between the controller and the other nodes of the joint bus, with arbitration, frame times,
-//! acknowledgement and errors.
+//! The bus line between the CAN controller and the other nodes of the joint bus. The model includes arbitration, frame
+//! times, acknowledgement and errors.
 use std::collections::VecDeque;
 
 use can_link::CanFrame;
@@ -8,21 +8,21 @@ use crate::clock::{MICROSECOND, NEVER, Time, from_ns};
 
 /// Duration of a bit in the nominal phase on the bus.
 pub const NOMINAL_BIT: Time = MICROSECOND;
-/// Total duration of an error flag, its echo, the delimiter and the intermission.
+/// Total duration of an error flag, the error flags of the other nodes, the delimiter and the intermission.
 pub const ERROR_FRAME: Time = 20 * NOMINAL_BIT;
-/// Largest number of entries in the log.
+/// Largest number of entries in the log of the bus.
 const LOG: usize = 100_000;
 
-/// The other nodes of the bus.
+/// The other nodes of the joint bus.
 pub trait CanPeers {
-    /// Receives a frame that the controller has sent and that ended at `end`. Appends the answers to `answers`, each
-    /// with the time at which it is ready.
+    /// Receives a frame that the CAN controller has sent and that ended at `end`. Appends the answers of the other
+    /// nodes to `answers`, each with the time at which it is ready.
     fn receive(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>);
-    /// Returns `true` if a node acknowledges frames.
+    /// Returns `true` if one of the other nodes acknowledges frames.
     fn acknowledge(&self) -> bool;
 }
 
-/// Outcome of a frame.
+/// Outcome of a frame on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The frame was transmitted.
@@ -33,16 +33,16 @@ pub enum Outcome {
     NoAcknowledge,
 }
 
-/// A frame that was on the bus.
+/// Log entry of a frame that was on the bus.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusEntry {
-    /// Start of frame.
+    /// Time of the start of frame.
     pub start: Time,
-    /// End of intermission.
+    /// End of the intermission after the frame.
     pub end: Time,
-    /// The frame.
+    /// The frame that was on the bus.
     pub frame: CanFrame,
-    /// `true` if the controller sent the frame.
+    /// `true` if the CAN controller sent the frame.
     pub from_controller: bool,
     /// Outcome of the frame.
     pub outcome: Outcome,
@@ -51,11 +51,11 @@ pub struct BusEntry {
 /// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFault {
-    /// Number of next frames that an error destroys.
+    /// Number of the next frames on the bus that an error destroys.
     pub destroy_next: u32,
     /// `true` if errors destroy all frames.
     pub destroy_all: bool,
-    /// `true` if the controller's bus line is cut.
+    /// `true` if the bus line of the CAN controller is cut.
     pub cut: bool,
 }
 
@@ -64,30 +64,30 @@ struct Queued {
     frame: CanFrame,
 }
 
-/// A frame that is being sent.
+/// A frame that a node is sending.
 pub struct Transmission {
     /// Start, end and contents of the frame.
     pub entry: BusEntry,
-    /// Transmit buffer of the controller; `None` if another node is sending.
+    /// Transmit buffer of the CAN controller; `None` if another node is sending.
     pub buffer: Option<u32>,
 }
 
-/// The bus line.
+/// The line of the joint bus.
 #[derive(Default)]
 pub struct Wire {
-    /// The other nodes. Without other nodes, no frame is acknowledged.
+    /// The other nodes of the bus. Without other nodes, no frame is acknowledged.
     pub peers: Option<Box<dyn CanPeers>>,
     queue: Vec<Queued>,
     on_wire: Option<Transmission>,
     free: Time,
-    /// Current faults.
+    /// Current faults of the bus.
     pub fault: WireFault,
     log: VecDeque<BusEntry>,
     answers: Vec<(Time, CanFrame)>,
 }
 
 impl Wire {
-    /// Queues a frame of another node, which is sent as soon as possible after `ready`.
+    /// Queues a frame of another node. The node sends the frame as soon as possible after `ready`.
     pub fn put(&mut self, ready: Time, frame: CanFrame) {
         self.queue.push(Queued { ready, frame });
     }
@@ -102,19 +102,19 @@ impl Wire {
         &self.log
     }
 
-    /// Clears the log.
+    /// Clears the log of the bus.
     pub fn clear_log(&mut self) {
         self.log.clear();
     }
 
-    /// Removes the frame that the controller is sending, because the controller stops during the transmission.
+    /// Removes the frame that the CAN controller is sending, because the controller stops during the transmission.
     pub fn drop_controller(&mut self) {
         if self.on_wire.as_ref().is_some_and(|t| t.buffer.is_some()) {
             self.on_wire = None;
         }
     }
 
-    /// Returns the time of the next change on the bus line that occurs without an action of the controller.
+    /// Returns the time of the next change on the bus line that occurs without an action of the CAN controller.
     pub fn next_change(&self) -> Time {
         match &self.on_wire {
             Some(t) => t.entry.end,
@@ -133,26 +133,26 @@ impl Wire {
         Some(done)
     }
 
-    /// Returns the transmit buffer whose frame the controller is sending.
+    /// Returns the transmit buffer whose frame the CAN controller is sending.
     pub fn sending(&self) -> Option<u32> {
         self.on_wire.as_ref().and_then(|t| t.buffer)
     }
 
-    /// Returns `true` if a frame is on the wire.
+    /// Returns `true` if a frame is on the bus line.
     pub fn busy(&self) -> bool {
         self.on_wire.is_some()
     }
 
-    /// Returns the earliest time, not later than `now`, at which a frame can start. The controller could start its own
-    /// frame at `own`.
+    /// Returns the earliest time, not later than `now`, at which a frame can start. `own` is the time at which the CAN
+    /// controller could start its own frame.
     pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
         let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
         let start = first.max(self.free);
         (self.on_wire.is_none() && first != NEVER && start <= now).then_some(start)
     }
 
-    /// Arbitrates at `start`: the lowest identifier wins. `readable` means that the controller uses the rates of the
-    /// bus.
+    /// Arbitrates at `start`: the frame with the lowest identifier wins. `readable` means that the CAN controller uses
+    /// the bit rates of the bus.
     pub fn arbitrate(&mut self, start: Time, own: Option<(u32, CanFrame)>, readable: bool) {
         let best = (0..self.queue.len())
             .filter(|&i| self.queue[i].ready <= start)
@@ -179,7 +179,7 @@ impl Wire {
             (Outcome::Good, length)
         };
         if outcome != Outcome::Good && !from_controller {
-            // The sender will repeat the frame.
+            // The sender will send the frame again.
             self.queue.push(Queued { ready: start + length, frame });
         }
         let entry = BusEntry { start, end: start + length, frame, from_controller, outcome };
@@ -192,7 +192,7 @@ impl Wire {
         one || self.fault.destroy_all
     }
 
-    /// Delivers a frame of the controller to the other nodes.
+    /// Delivers a frame of the CAN controller to the other nodes.
     pub fn deliver(&mut self, end: Time, frame: &CanFrame) {
         let Some(peers) = &mut self.peers else { return };
         peers.receive(end, frame, &mut self.answers);
@@ -217,7 +217,8 @@ pub fn frame_time(frame: &CanFrame) -> Time {
     {
         return from_ns(u64::from(jtc_bus::duration_ns(&joint)));
     }
-    // The joint bus does not carry frames of this kind. For these frames, one stuff bit per ten bits is assumed.
+    // The joint bus does not transmit frames of this kind. For these frames, the model assumes one stuff bit per ten
+    // bits.
     let id_bits = if frame.is_extended() { 38 } else { 19 };
     let data_bits = 8 * frame.data().len() as u64;
     let bits = if !frame.is_fd() {

@@ -1,21 +1,21 @@
-//! Pending transmit requests.
+//! Pending transmit requests of FDCAN1.
 use crate::clock::{NEVER, Time};
 
-/// Transmit requests.
+/// Transmit requests and their states.
 #[derive(Default)]
 pub(super) struct Pending {
-    /// TXBRP.
+    /// Value of register TXBRP.
     pub requests: u32,
-    /// TXBTO and TXBCF.
+    /// Values of registers TXBTO and TXBCF.
     pub sent: u32,
     pub cancelled: u32,
-    /// Buffers whose transmission is cancelled when the current frame on the bus has ended.
+    /// Buffers whose transmission the controller cancels when the current frame on the bus has ended.
     pub cancel: u32,
-    /// Time at which the transmission of each buffer was requested.
+    /// Time at which the program requested the transmission of each buffer.
     pub times: [Time; 32],
-    /// Index of the FIFO element that is sent next.
+    /// Index of the FIFO element that the controller sends next.
     pub get: u32,
-    /// Index of the FIFO element that is written next.
+    /// Index of the FIFO element that the program writes next.
     pub put: u32,
 }
 

@@ -1,13 +1,13 @@
 //! Message RAM of the FDCAN, with filters, receive buffers, receive FIFOs and transmit buffers (RM0399 56.3.21).
 use can_link::{CanFrame, Id};
 
-/// Size in bytes.
+/// Size of the message RAM in bytes.
 pub const SIZE: usize = 10 * 1024;
 
-/// The RAM.
+/// The message RAM.
 pub struct MessageRam {
     words: Vec<u32>,
-    /// Number of accesses to elements outside the RAM.
+    /// Number of accesses to elements outside the message RAM.
     pub outside: u32,
 }
 
@@ -17,19 +17,19 @@ impl Default for MessageRam {
     }
 }
 
-/// Payload bytes for each code of RXESC and TXESC.
+/// Number of payload bytes for each code of RXESC and TXESC.
 pub const ELEMENT_SIZES: [u32; 8] = [8, 12, 16, 20, 24, 32, 48, 64];
-/// Payload bytes for each length code.
+/// Number of payload bytes for each data length code (DLC).
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
-/// Destination that the filters select for a frame.
+/// Destination that the filters select for a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// FIFO 0 or 1, with the index of the filter that matched, if any.
     Fifo(usize, Option<u32>),
     /// Dedicated receive buffer.
     Buffer(u32, u32),
-    /// The frame is rejected.
+    /// Rejection of the frame.
     Reject,
 }
 
@@ -47,8 +47,8 @@ impl MessageRam {
         }
     }
 
-    /// Returns the target of the first standard filter that matches (registers SIDFC and GFC). Filters of a receive
-    /// buffer with unread data, for which `busy` returns `true`, do not match.
+    /// Returns the target of the first standard filter that matches (registers SIDFC and GFC). If `busy` returns `true`
+    /// for a receive buffer, the buffer contains unread data, and its filters do not match.
     pub fn standard(&self, id: u32, sidfc: u32, gfc: u32, busy: impl Fn(u32) -> bool) -> Target {
         let start = sidfc & 0xFFFC;
         for index in 0..(sidfc >> 16 & 0xFF) {
@@ -100,7 +100,7 @@ impl MessageRam {
         unmatched(gfc >> 2)
     }
 
-    /// Stores a received frame in an element with `room` payload bytes.
+    /// Stores a received frame in an element that has space for `room` payload bytes.
     pub fn store(&mut self, start: u32, room: u32, frame: &CanFrame, filter: Option<u32>, time: u16) {
         let id = frame.id();
         let r0 = if id.is_extended() { 1 << 30 | id.value() } else { id.value() << 18 };
@@ -119,8 +119,8 @@ impl MessageRam {
         }
     }
 
-    /// Returns the frame of a transmit element with `room` payload bytes. Bytes beyond the element are 0xCC, as in the
-    /// hardware. `fd` and `brs` are the enable bits of CCCR.
+    /// Returns the frame of a transmit element that has space for `room` payload bytes. Payload bytes beyond the
+    /// element are 0xCC, as in the hardware. `fd` and `brs` are the enable bits of CCCR.
     pub fn load(&self, start: u32, room: u32, fd: bool, brs: bool) -> Option<CanFrame> {
         let (t0, t1) = (self.read(start), self.read(start + 4));
         let id =
@@ -148,8 +148,8 @@ fn matches(kind: u32, id: u32, first: u32, second: u32) -> bool {
     }
 }
 
-/// Returns the target of a filter's action. Returns `None` if the action is only a priority event, which this model
-/// does not generate. The search then continues with the next filter.
+/// Returns the target of a filter action. Returns `None` if the action is only a priority event, which this model does
+/// not generate. In this case, the search continues with the next filter.
 fn of_action(action: u32, index: u32) -> Option<Target> {
     match action {
         1 | 5 => Some(Target::Fifo(0, Some(index))),

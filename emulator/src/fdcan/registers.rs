@@ -1,10 +1,10 @@
-//! The registers, at address 0x4000_A000.
+//! The registers of FDCAN1, at address 0x4000_A000.
 use super::{Fdcan, Fifo, INTEGRATION, RECOVERY, cccr, lec};
 use crate::clock::{NEVER, Time};
 use crate::fdcan::pending::Pending;
 
 impl Fdcan {
-    /// Reads a word.
+    /// Reads a register of FDCAN1.
     pub fn read(&mut self, offset: u32, now: Time) -> u32 {
         self.advance(now);
         match offset {
@@ -22,7 +22,7 @@ impl Fdcan {
                     (_, true, Some(_)) => 3,
                 };
                 let value = self.psr & !0x18 | activity << 3;
-                // A read of the register sets the last error codes to "unchanged" and clears the receive flags.
+                // A read of PSR sets the last error codes to "unchanged" and clears the receive flags.
                 self.psr = self.psr & !0x7807 | lec::UNCHANGED;
                 self.psr = self.psr & !0x700 | lec::UNCHANGED << 8;
                 value
@@ -56,7 +56,7 @@ impl Fdcan {
         }
     }
 
-    /// Writes a word.
+    /// Writes a register of FDCAN1.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) {
         self.advance(now);
         let open = self.cccr & (cccr::INIT | cccr::CCE) == cccr::INIT | cccr::CCE;
@@ -107,7 +107,7 @@ impl Fdcan {
             next = next & !cccr::PROTECTED | value & cccr::PROTECTED;
             next = next & !4 | value & 4;
         }
-        // A clock stop request is acknowledged at once.
+        // The controller acknowledges a clock stop request at once.
         next |= (value & cccr::CSR) >> 1;
         self.cccr = next;
         if next & cccr::CCE != 0 && before & cccr::CCE == 0 {

@@ -22,8 +22,8 @@ impl Fdcan {
         self.ram.load(start, room, self.cccr & cccr::FDOE != 0, self.cccr & cccr::BRSE != 0)
     }
 
-    /// Returns the transmit buffer to be sent next, which is the buffer with the lowest identifier. Only the
-    /// oldest entry of a FIFO is considered.
+    /// Returns the transmit buffer that the controller sends next, which is the buffer with the lowest identifier. In a
+    /// FIFO, only the oldest entry can be sent.
     pub(super) fn next_buffer(&self) -> Option<u32> {
         let dedicated = self.dedicated();
         let queue = self.txbc >> 30 & 1 == 1;
@@ -50,7 +50,8 @@ impl Fdcan {
         }
     }
 
-    /// Handles a write to TXBCR. A frame already on the bus is cancelled only if its transmission fails.
+    /// Handles a write to TXBCR. The controller cancels a frame that is already on the bus only if its transmission
+    /// fails.
     pub(super) fn cancel(&mut self, bits: u32) {
         let bits = bits & self.tx.requests;
         for buffer in (0..32).filter(|b| bits >> b & 1 == 1) {
@@ -95,8 +96,8 @@ impl Fdcan {
         match outcome {
             Outcome::NoAcknowledge => {
                 self.last_error(lec::ACK);
-                // If a frame is not acknowledged, an error-passive node does not increase its error counter, because it
-                // may be the only node on the bus.
+                // If no node acknowledges a frame, an error-passive node does not increase its error counter, because
+                // this node may be the only node on the bus.
                 if self.tec < 128 {
                     self.tec += 8;
                 }
@@ -119,7 +120,7 @@ impl Fdcan {
         (self.tx.requests >> self.dedicated().min(31)).count_ones()
     }
 
-    /// Returns TXFQS.
+    /// Returns the value of register TXFQS.
     pub(super) fn fifo_status(&self) -> u32 {
         let size = self.fifo_size();
         let free = size.saturating_sub(self.fifo_fill());

@@ -3,11 +3,11 @@ use std::fmt;
 
 use super::OperationKind;
 
-/// First address of the bank.
+/// First address of flash bank 2.
 pub const BANK2: u32 = 0x0810_0000;
-/// Size of the bank in bytes.
+/// Size of flash bank 2 in bytes.
 pub const BANK2_SIZE: u32 = 0x10_0000;
-/// Bytes that are programmed together.
+/// Number of bytes that the flash programs together.
 pub const WORD: usize = 32;
 const WORDS: usize = BANK2_SIZE as usize / WORD;
 /// Number of words per sector.
@@ -15,9 +15,9 @@ const SECTOR_WORDS: usize = 128 * 1024 / WORD;
 /// State of a flash word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
-    /// All bits of the word are 1, and the word can be programmed.
+    /// All bits of the word are 1, and the program can program the word.
     Erased,
-    /// The word cannot be programmed.
+    /// The word contains data and cannot be programmed again.
     Programmed,
     /// A read of the word causes an error.
     Unreadable,
@@ -44,8 +44,8 @@ impl fmt::Debug for Bank2 {
 }
 
 impl Bank2 {
-    /// Creates a bank that begins with these bytes, as returned by [`Self::bytes`]. A word with all bits 1 is erased,
-    /// and no word is unreadable. Bytes beyond the bank are ignored.
+    /// Creates a bank that begins with these bytes, as returned by [`Self::bytes`]. If all bits of a word are 1, the
+    /// word is erased. No word is unreadable. Bytes beyond the bank are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut bank = Self::default();
         for (n, word) in bytes
@@ -65,7 +65,7 @@ impl Bank2 {
         self.bytes.as_flattened()[at..at + length].to_vec()
     }
 
-    /// Overwrites the bytes at an address, regardless of the old contents. Afterwards, the state of the words is
+    /// Overwrites the bytes at an address, regardless of the old contents. After this call, the state of the words is
     /// "programmed".
     pub fn put(&mut self, address: u32, bytes: &[u8]) {
         let at = (address - BANK2) as usize;
@@ -78,7 +78,7 @@ impl Bank2 {
         self.cells[(address - BANK2) as usize / WORD] = Cell::Unreadable;
     }
 
-    /// Simulates a loss of power in the middle of an operation, after which the affected words may have any value.
+    /// Simulates a loss of power in the middle of a flash operation, after which the affected words may have any value.
     pub fn tear(&mut self, kind: OperationKind, word: &[u8; WORD], rng: &mut fastrand::Rng) {
         match kind {
             OperationKind::Erase { sector } => {
@@ -105,12 +105,13 @@ impl Bank2 {
         }
     }
 
-    /// Erases a whole sector.
+    /// Erases a complete sector.
     pub fn erase_sector(&mut self, sector: usize) {
         (sector * SECTOR_WORDS..(sector + 1) * SECTOR_WORDS).for_each(|n| self.erase(n));
     }
 
-    /// Programs a word. If the word was not erased, the word becomes unreadable and the function returns `false`.
+    /// Programs a word. If the word was not erased before, the word becomes unreadable and the function returns
+    /// `false`.
     pub fn program(&mut self, n: usize, bytes: &[u8; WORD]) -> bool {
         let erased = self.cells[n] == Cell::Erased;
         self.bytes[n].iter_mut().zip(bytes).for_each(|(old, new)| *old &= new);

@@ -1,6 +1,6 @@
 //! Bits of the registers of a serial port.
 
-/// Bits of CR1.
+/// Bits of register CR1.
 pub mod cr1 {
     pub const UE: u32 = 1;
     pub const RE: u32 = 4;
@@ -14,7 +14,7 @@ pub mod cr1 {
     pub const FIFOEN: u32 = 1 << 29;
 }
 
-/// Bits of ISR.
+/// Bits of register ISR.
 pub mod isr {
     pub const FE: u32 = 2;
     pub const NE: u32 = 4;
@@ -29,6 +29,6 @@ pub mod isr {
     pub const REACK: u32 = 1 << 22;
     pub const TXFE: u32 = 1 << 23;
     pub const RXFF: u32 = 1 << 24;
-    /// Flags that ICR clears.
+    /// Flags of ISR that a write to ICR clears.
     pub const STICKY: u32 = FE | NE | ORE | IDLE | TC | RTOF | 1;
 }

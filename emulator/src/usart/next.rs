@@ -1,11 +1,11 @@
-//! Computes the time of a serial port's next event.
+//! Computes the time of the next event of a serial port.
 use super::bits::cr1;
 use super::{DMAR, DMAT, LOOK_AHEAD, Usart};
 use crate::clock::{NEVER, Time};
 use crate::dma::Dma;
 
 impl Usart {
-    /// Returns the time of the next event that causes an interrupt.
+    /// Returns the time of the next event of the serial port that causes an interrupt.
     pub fn next_event(&self, dma: &Dma) -> Time {
         self.next_receive(dma).min(self.next_send(dma))
     }
@@ -23,7 +23,8 @@ impl Usart {
             idle.min(timeout)
         };
         let Some(first) = self.rx_wire.front() else {
-            // Each of the two times may be in the past. A time in the past would be checked in every cycle.
+            // The start times of the idle line and of the timeout may be in the past. If their interrupts are disabled,
+            // these times must not be events, because the machine would check a past event in every cycle.
             let idle = self.idle_from.filter(|_| idle_on).map_or(NEVER, |from| from.saturating_add(frame));
             let timeout = self.timeout_from.filter(|_| self.cr1 & cr1::RTOIE != 0);
             return idle.min(timeout.map_or(NEVER, |from| from.saturating_add(self.timeout())));

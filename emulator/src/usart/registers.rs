@@ -1,4 +1,4 @@
-//! The registers that the core accesses, and the interrupt line that the registers control.
+//! The USART registers that the core accesses, and the interrupt line that the registers control.
 use super::bits::{cr1, isr};
 use super::{FIFO, Usart};
 use crate::clock::Time;
@@ -22,7 +22,7 @@ impl Usart {
             | bit(self.idle_from.is_some() && !self.rx_wire.is_empty(), isr::BUSY)
     }
 
-    /// Returns the level of the interrupt line.
+    /// Returns the level of the interrupt line of the USART.
     pub fn line(&self) -> bool {
         let status = self.status();
         let pairs = [
@@ -37,7 +37,7 @@ impl Usart {
                 || self.cr3 & EIE != 0 && status & (isr::FE | isr::NE | isr::ORE) != 0)
     }
 
-    /// Reads a word.
+    /// Reads a register of the USART.
     pub fn read(&mut self, offset: u32, now: Time, dma: &mut Dma, memory: &mut dyn Memory) -> u32 {
         self.advance(now, dma, memory);
         match offset {
@@ -59,7 +59,7 @@ impl Usart {
         }
     }
 
-    /// Writes a word.
+    /// Writes a register of the USART.
     pub fn write(&mut self, offset: u32, value: u32, now: Time, dma: &mut Dma, memory: &mut dyn Memory) {
         self.advance(now, dma, memory);
         match offset {

@@ -26,10 +26,10 @@ const BUS_OFF: u32 = 0x80;
 const FILTERS: u32 = 0;
 const RX: u32 = 0x100;
 const TX: u32 = 0x800;
-/// Size of an element with 24 payload bytes.
+/// Size of an element of the message RAM with 24 payload bytes.
 const ELEMENT: u32 = 32;
 
-/// Node that acknowledges frames and stores them.
+/// Bus node that acknowledges frames and stores them.
 #[derive(Clone, Default)]
 struct Listener(Rc<RefCell<Vec<(Time, CanFrame)>>>);
 
@@ -158,7 +158,7 @@ fn bus_off_ends_129_times_11_bits_after_init_is_cleared() {
     run(&mut machine, 10 * MILLISECOND);
     assert_eq!(machine.read_register(CCCR) & 1, 1, "INIT is set by bus-off");
     assert_ne!(machine.read_register(PSR) & BUS_OFF, 0);
-    // Each of the 32 errors adds 8, so the counter is 256.
+    // Each of the 32 errors adds 8 to the transmit error counter, so the counter is 256.
     assert_eq!(machine.chip().fdcan.wire.log().len(), 32);
     machine.chip().fdcan.wire.fault.destroy_all = false;
     machine.write_register(TXBCR, 1);

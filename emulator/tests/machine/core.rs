@@ -13,7 +13,7 @@ const CYCLE: u64 = SECOND / 64_000_000;
 fn f64_results_have_the_bits_of_the_pc() {
     const ROUNDS: usize = 500;
     let mut rng = fastrand::Rng::with_seed(7);
-    // Random numbers of all kinds except NaN, including subnormal numbers, infinities and zeros of both signs.
+    // Random numbers of all kinds except NaN. The kinds include subnormal numbers, infinities and zeros of both signs.
     let mut number = || match rng.u8(..) {
         0 => 0.0,
         1 => -0.0,
@@ -27,7 +27,7 @@ fn f64_results_have_the_bits_of_the_pc() {
         .take(ROUNDS)
         .collect();
     let mut machine = machine(FLOATS, &[]);
-    // The program runs once for each pair, because it writes its results over the memory of the next pair.
+    // The program runs once for each pair of numbers, because it writes its results over the memory of the next pair.
     for [a, b] in pairs {
         let mut one = 1u64.to_le_bytes().to_vec();
         one.extend(a.to_le_bytes());
@@ -50,8 +50,8 @@ fn f64_results_have_the_bits_of_the_pc() {
 #[test]
 fn an_exception_preserves_what_the_program_has() {
     let mut machine = machine(PRESERVE, &[(FIRST_LINE, CLOBBER)]);
-    // Checks the flags and registers of the main program. The floating-point unit is enabled without an instruction of
-    // the program.
+    // Checks the flags and registers of the main program. The test enables the floating-point unit without an
+    // instruction of the program.
     machine.run_until(5 * MICROSECOND);
     assert_eq!(result(&machine, 0), 1, "the handler ran once");
     let after: Vec<u32> = (0..9).map(|i| machine.word(RESULT + 0x100 + 4 * i).unwrap()).collect();
@@ -85,8 +85,8 @@ fn primask_holds_an_interrupt_until_the_very_instruction_that_clears_it() {
     machine.run_until(5 * MICROSECOND);
     assert_eq!((result(&machine, 1), result(&machine, 2)), (0, 1));
     let latency = machine.chip().observers.latencies[FIRST_LINE];
-    // The interrupt is pending at the end of the store. Four nop, a load, a store and cpsie are executed before the
-    // handler.
+    // The interrupt is pending at the end of the store instruction. The core then executes four nop, a load, a store
+    // and cpsie before the handler.
     assert_eq!((latency.entries, latency.worst), (1, 7 * CYCLE));
 }
 
@@ -147,7 +147,7 @@ fn a_requested_reset_keeps_ram_and_adds_its_flag() {
     let chip = machine.chip();
     let causes: Vec<ResetCause> = chip.observers.resets.iter().map(|r| r.cause).collect();
     assert_eq!(causes, [ResetCause::PowerOn, ResetCause::Software, ResetCause::Software]);
-    // SFTRSTF is set in addition to PORRSTF.
+    // The chip sets SFTRSTF in addition to PORRSTF.
     assert_eq!(chip.rcc.reset_flags() & (1 << 24 | 1 << 23), 1 << 24 | 1 << 23);
     machine.write_register(0x5802_44D0, 1 << 16);
     assert_eq!(machine.read_register(0x5802_44D0), 0);

@@ -77,14 +77,14 @@ fn a_word_is_programmed_once_and_only_as_a_whole() {
     let end = 130 * MICROSECOND;
     assert_eq!((sr(&mut flash, end), flash.overwrites), (0, 0));
     assert_eq!(flash.load(AT + 28, 4), (0x1234_5678, false));
-    // If a word is programmed again without being erased, it becomes unreadable.
+    // If a word is programmed again without being erased, the word becomes unreadable.
     program(&mut flash, AT, 0x1234_5678, end);
     assert_eq!((sr(&mut flash, 2 * end), flash.overwrites), (0, 1));
     assert!(flash.load(AT, 4).1);
     assert_eq!(sr(&mut flash, 2 * end), sr::DBECCERR);
     flash.write_register(CCR, sr::DBECCERR, 2 * end, true);
-    // Half of a flash word is in the write buffer. In this state it is an error to write another word, or to write
-    // these bytes again.
+    // Half of a flash word is in the write buffer. In this state it is an error to write to another word, or to write
+    // the same bytes again.
     flash.store(AT + 32, 4, 0, 2 * end, true);
     assert_eq!(sr(&mut flash, 2 * end), sr::WBNE);
     flash.store(AT + 64, 4, 0, 2 * end, true);
@@ -120,7 +120,7 @@ fn a_failed_operation_says_so() {
     assert_eq!(sr(&mut flash, MILLISECOND), sr::OPERR);
 }
 
-/// The core waits in the load instruction until the erase operation ends.
+/// The core waits in the load instruction until the erase operation of the flash ends.
 #[test]
 fn a_read_of_the_busy_bank_halts_the_core() {
     let mut machine = machine(ERASE_AND_READ, &[]);
@@ -175,7 +175,7 @@ fn an_unreadable_word_is_a_fault_and_outlasts_the_power() {
     assert_eq!(format!("{bank:?}"), "0 words programmed, 1 unreadable");
 }
 
-/// The bytes of a bank can be saved to a file and restored.
+/// The bytes of a flash bank can be saved to a file and restored.
 #[test]
 fn a_bank_of_the_bytes_that_another_had_is_that_bank() {
     let mut bank = Bank2::default();

@@ -1,4 +1,4 @@
-//! Compares the machine with the architecture and the reference manual, using programs of a few instructions.
+//! Compares the emulated machine with the architecture and the reference manual, using programs of a few instructions.
 mod bus;
 mod core;
 mod flash;
@@ -9,7 +9,7 @@ use openjtc_emulator::{Elf, Machine};
 
 /// Address of the main program of [`image`].
 const MAIN: u32 = 0x0800_0400;
-/// Address of the first result word of programs.
+/// Address of the first result word of each program.
 const RESULT: u32 = 0x2000_0000;
 
 /// Returns a flash image that contains the vector table, the main program, and handlers by exception number.
@@ -32,7 +32,7 @@ fn image(main: &[u16], handlers: &[(usize, &[u16])]) -> Elf {
     Elf::from_image(0x0800_0000, bytes)
 }
 
-/// Returns a machine with an image of [`image`]; its first result words are zero.
+/// Returns a machine that contains the flash image of [`image`]; its first result words are zero.
 fn machine(main: &[u16], handlers: &[(usize, &[u16])]) -> Machine {
     let mut machine = Machine::new(image(main, handlers), 1);
     assert!(machine.poke(RESULT, &[0; 64]));

@@ -1,4 +1,5 @@
-//! USART and DMA: the transmission of every byte takes the real time, and the byte is stored at the right address.
+//! USART and DMA: the transmission of every byte takes as long as on a real line, and DMA stores the byte at the right
+//! address.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::{FIRST_LINE, Machine};
 
@@ -18,11 +19,11 @@ const ON: u32 = 1 | 4 | 8 | 1 << 29;
 const IDLE: u32 = 0x10;
 const ORE: u32 = 8;
 const RXNE: u32 = 0x20;
-/// DMA1 stream 1.
+/// Address of DMA1 stream 1.
 const DMA: u32 = 0x4002_0000 + 0x10 + 0x18;
 const RING: u32 = 0x3000_0000;
 
-/// Returns a sleeping machine whose USART3 runs from the 64 MHz HSI with this divider.
+/// Returns a sleeping machine whose USART3 runs from the 64 MHz HSI. `brr` is the divider of the bit rate.
 fn with_divider(brr: u32, over8: bool) -> Machine {
     let mut machine = machine(SLEEP, &[(FIRST_LINE + 39, CLOBBER), (FIRST_LINE + 12, CLOBBER)]);
     machine.write_register(0x5802_44E8, 1 << 18);
@@ -114,7 +115,8 @@ fn a_dma_ring_takes_a_stream_and_wraps() {
     machine.chip().usarts[1].host_write(start, &(1..=19).collect::<Vec<u8>>());
     machine.run_until(start + 4 * 10 * MICROSECOND + MICROSECOND);
     assert_eq!(machine.memory(RING, 4).unwrap(), [1, 2, 3, 4]);
-    // Half of the DMA transfers are complete. The interrupt line remains high, because the flag is never cleared.
+    // Half of the DMA transfers are complete. The interrupt line remains high, because the handler never clears the
+    // flag.
     assert!(machine.chip().observers.latencies[FIRST_LINE + 12].entries > 0);
     machine.run_until(start + MILLISECOND);
     assert_eq!(machine.memory(RING, 8).unwrap(), [17, 18, 19, 12, 13, 14, 15, 16]);

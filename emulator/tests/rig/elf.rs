@@ -1,4 +1,4 @@
-//! The boards' firmware files, and the version record in them.
+//! The firmware files of the boards, and the version record in each file.
 use jtc_wire::Program;
 use openjtc_emulator::Elf;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// File names of the firmware of all boards.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Rate of the firmware that [`fast_elf`] returns, Bd.
+/// Bit rate of the firmware that [`fast_elf`] returns, Bd.
 pub const FAST: u32 = 15_000_000;
 
 fn directory() -> PathBuf {
@@ -26,12 +26,12 @@ fn load(file: &str) -> Elf {
     Elf::parse(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Returns the firmware of a board.
+/// Returns the firmware file of a board.
 pub fn elf(board: &str) -> Elf {
     load(&format!("{board}.elf"))
 }
 
-/// Returns the firmware of the first board for 15 MBd lines.
+/// Returns the firmware file of the first board for 15 MBd serial lines.
 pub fn fast_elf() -> Elf {
     load(&format!("{}-{FAST}.elf", BOARDS[0]))
 }
@@ -50,7 +50,7 @@ pub struct Version {
     pub core_hz: u32,
 }
 
-/// Reads the version record from the file; returns `None` if the file does not contain a record.
+/// Reads the version record from the firmware file. Returns `None` if the file does not contain a version record.
 pub fn version(elf: &Elf) -> Option<Version> {
     const ADDRESS: u32 = 0x0800_0400;
     let bytes = elf.segments.iter().find_map(|(start, data)| {
@@ -69,7 +69,7 @@ pub fn version(elf: &Elf) -> Option<Version> {
 }
 
 /// Returns the length and the CRC-32 of the program in flash bank 1 after this file is loaded into an erased chip. The
-/// CRC is computed bit by bit from its definition.
+/// function computes the CRC bit by bit from its definition.
 pub fn program(elf: &Elf) -> Program {
     const BANK1: std::ops::Range<u32> = 0x0800_0000..0x0810_0000;
     let mut flash = Vec::new();

@@ -1,9 +1,9 @@
-//! Decoder of the flight record, which works from the bytes like an external tool.
+//! Decoder of the flight record. The decoder works from the bytes of the record, like an external tool.
 use jtc_bus::Frame;
 use jtc_core::{BusState, HOST_LINES};
 use jtc_wire::{UrgentCommand, UrgentCommands};
 
-/// Size of the record, bytes.
+/// Size of the flight record, bytes.
 pub const FLIGHT_SIZE: usize = 848;
 /// Layout version that this module decodes.
 const LAYOUT: u16 = 3;
@@ -20,17 +20,17 @@ pub struct Flight {
     pub status_free: bool,
     pub wrong_format: u32,
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// Events passed to the controller, oldest first.
+    /// Host events that were passed to the controller, oldest first.
     pub events: Vec<Event>,
     pub received: Vec<Frame>,
     pub state: u8,
     pub trajectory: u8,
     pub safety_output: bool,
-    /// Number of events whose processing the controller has finished.
+    /// Number of host events whose processing the controller has finished.
     pub host_done: usize,
     /// Number of the serial line for which the status contains a response record.
     pub record_line: Option<usize>,
-    /// `true` if a status was sent.
+    /// `true` if the board sent a status in this tick.
     pub status: bool,
     pub sent: Option<Frame>,
     pub point: u32,
@@ -43,7 +43,7 @@ pub struct Flight {
 pub struct Event {
     /// Kind of the event: 1 is a frame, 2 an invalid frame, 3 noise.
     pub kind: u8,
-    /// `true` if an urgent command was received after the event.
+    /// `true` if the board received an urgent command after the event.
     pub overtaken: bool,
     /// `true` if the event arrived on a line without extensions.
     pub plain: bool,
@@ -81,12 +81,12 @@ impl Bytes<'_> {
 }
 
 impl Flight {
-    /// The inputs belong to the tick, and the outputs still belong to the previous tick.
+    /// The inputs in the record belong to the tick, and the outputs still belong to the previous tick.
     pub const PHASE_INPUTS: u32 = 1;
-    /// Inputs and outputs belong to the tick.
+    /// Inputs and outputs in the record belong to the tick.
     pub const PHASE_COMPLETE: u32 = 2;
 
-    /// Decodes a record. Returns `None` if the bytes are not a record, as after power-on.
+    /// Decodes a flight record. Returns `None` if the bytes are not a flight record, for example after power-on.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         assert_eq!(bytes.len(), FLIGHT_SIZE);
         let mut b = Bytes(bytes);

@@ -7,36 +7,36 @@ use openjtc_emulator::clock::Time;
 
 use super::flight::Event;
 
-/// A host.
+/// A simulated host on a serial line.
 #[derive(Default)]
 pub struct Host {
     /// All bytes that the host sent.
     pub sent: Vec<u8>,
-    /// Number of sent bytes up to the end of the last frame that the device has executed.
+    /// Number of sent bytes up to the end of the last frame that the board has executed.
     found: usize,
     /// Bytes that the host must receive next, which are the statuses of the shadow controller.
     pub expected: VecDeque<u8>,
     receiver: StatusReceiver,
-    /// The newest status.
+    /// The newest status that the host received.
     pub last: Option<Status>,
-    /// The newest Info.
+    /// The newest Info that the host received.
     pub info: Option<Info>,
-    /// Times at which the last byte of each status was received.
+    /// Times at which the host received the last byte of each status.
     pub times: Vec<Time>,
-    /// Records received, oldest first.
+    /// Response records that the host received, oldest first.
     pub records: Vec<Response>,
-    /// Number of bytes received.
+    /// Number of bytes that the host received.
     pub received: u64,
-    /// Time of a device reset; `None` when no received byte can be older than the reset.
+    /// Time of a board reset; `None` when no received byte can be older than the reset.
     reset: Option<Time>,
 }
 
 impl Host {
-    /// Receives bytes from the device. Each byte must equal the next byte of the shadow controller.
+    /// Receives bytes from the board. Each byte must equal the next byte of the shadow controller.
     pub fn receive(&mut self, bytes: &[WireByte]) {
         for byte in bytes {
             self.received += 1;
-            // Bytes that were on the line when the device was reset are lost.
+            // Bytes that were on the line when the board was reset are lost.
             if self.reset.is_some_and(|reset| byte.end < reset) {
                 continue;
             }
@@ -58,19 +58,19 @@ impl Host {
         }
     }
 
-    /// Returns how many statuses, invalid frames and invalid bytes were received.
+    /// Returns the numbers of statuses, invalid frames and invalid bytes that the host received.
     pub fn counters(&self) -> jtc_wire::StatusCounters {
         self.receiver.counters()
     }
 
-    /// Drops all bytes that are in transmission.
+    /// Drops all bytes that are in transmission, because the board was reset.
     pub fn device_was_reset(&mut self, time: Time) {
         self.reset = Some(time);
         self.expected.clear();
         self.receiver.clear();
     }
 
-    /// Returns the bytes of a frame that the device has recorded. The host must have sent these bytes after the last
+    /// Returns the bytes of a frame that the board has recorded. The host must have sent these bytes after the last
     /// recorded frame.
     pub fn frame(&self, event: &Event) -> Vec<u8> {
         let length = usize::from(event.len);
@@ -93,7 +93,7 @@ impl Host {
             .unwrap_or_else(|| panic!("the host sent no frame like {event:?}"))
     }
 
-    /// Records that the device has executed this frame.
+    /// Records that the board has executed this frame.
     pub fn done(&mut self, event: &Event) {
         let (at, bytes) = self.place(event);
         self.found += at + bytes.len();

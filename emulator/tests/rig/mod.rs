@@ -1,9 +1,9 @@
-//! A board under test, with the board's own ELF file, a simulated arm on its joint bus, and a host on each serial line.
-//! In parallel, the same controller runs on the PC (the shadow controller) with the inputs from the board's flight
-//! record. The outputs of both controllers must be equal.
+//! A board under test, with the firmware file of the board, a simulated arm on its joint bus, and a host on each serial
+//! line. In parallel, the same controller runs on the PC (the shadow controller) with the inputs from the flight record
+//! of the board. The outputs of both controllers must be equal.
 //!
-//! Every millisecond of every test is checked: no tick is missing, and the invariants of the simulator are
-//! true. Torques, frames and statuses are bit-identical to the outputs of the shadow controller.
+//! The rig checks every millisecond of every test: no tick is missing, and the invariants of the simulator are true.
+//! Torques, frames and statuses are bit-identical to the outputs of the shadow controller.
 #![allow(dead_code, reason = "each test uses its part")]
 
 mod elf;
@@ -28,13 +28,13 @@ pub use host::Host;
 pub use shadow::Shadow;
 use shadow::{LogMemory, Start, no_log};
 
-/// Exception number of the tick.
+/// Exception number of the tick interrupt.
 const TIM7: usize = FIRST_LINE + 55;
 
-/// Ports of both lines, in the order of the flight record.
+/// Ports of both serial lines, in the order of the flight record.
 pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
 
-/// Index of a port in arrays.
+/// Returns the index of a port in arrays of both ports.
 pub fn index(port: Port) -> usize {
     match port {
         Port::Usart2 => 0,
@@ -42,46 +42,46 @@ pub fn index(port: Port) -> usize {
     }
 }
 
-/// Board, hosts, and the shadow controller.
+/// Test rig with a board, its hosts, and the shadow controller.
 pub struct Rig {
     /// The emulated board.
     pub board: Board,
     /// Hosts with the bytes that they sent and received.
     pub hosts: [Host; 2],
-    /// The shadow controller; `None` until the board's first tick after a start.
+    /// The shadow controller; `None` from a start of the board until its first tick.
     pub shadow: Option<Shadow>,
     /// Last complete flight record of the board.
     pub flight: Flight,
-    /// Frames on the joint bus in the last millisecond.
+    /// Frames that were on the joint bus in the last millisecond.
     pub bus: Vec<BusEntry>,
     /// `true` if ticks may be missing, because the test makes the board hang.
     pub may_hang: bool,
     /// Number of ticks since the board started.
     pub ticks: u64,
-    /// Contents of the flight recorder at the board's reset.
+    /// Contents of the flight recorder when the board was reset.
     log: LogMemory,
     invariants: Invariants,
     flight_at: u32,
     mailbox_at: u32,
-    /// Address to which the firmware writes the length and CRC of its flash (J-67).
+    /// Address to which the firmware writes the length and CRC of its program in flash (J-67).
     program_at: u32,
     resets: usize,
-    /// Frames that the last ticks sent and that have not been on the bus yet.
+    /// Frames that the last ticks sent and that have not been on the joint bus yet.
     to_pass: Vec<jtc_bus::Frame>,
 }
 
 impl Rig {
-    /// Creates a board that has just been switched on.
+    /// Creates a test rig with a board that has just been switched on.
     pub fn new(board: &str) -> Self {
         Self::with(board, BoardConfig::default())
     }
 
-    /// Creates a board with another configuration.
+    /// Creates a test rig whose board has this configuration.
     pub fn with(board: &str, config: BoardConfig) -> Self {
         Self::of(elf(board), &config)
     }
 
-    /// Creates a board with this firmware.
+    /// Creates a test rig whose board has this firmware.
     pub fn of(elf: openjtc_emulator::Elf, config: &BoardConfig) -> Self {
         let flight_at = elf.symbol("FLIGHT").expect("the flight record").address;
         let mailbox_at = elf.symbol("ARM_STORE").expect("the mailbox").address;
@@ -105,13 +105,14 @@ impl Rig {
         }
     }
 
-    /// Advances the board, the arm and the hosts by one millisecond, and makes all checks.
+    /// Advances the board, the arm and the hosts by one millisecond, and does all checks.
     pub fn step(&mut self) {
         self.board.step();
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // The program restarts. Everything that runs in parallel restarts, too, except the log.
+            // The program of the board restarts. The shadow controller and the receivers of the hosts restart, too; the
+            // rig keeps the log.
             if let Some(shadow) = self.shadow.take() {
                 self.log = shadow.into_log();
             }
@@ -175,12 +176,12 @@ impl Rig {
         self.flight = flight;
     }
 
-    /// Returns the firmware's mailbox of the stored arm, with words in the order of `firmware/src/arm_store.rs`.
+    /// Returns the firmware's mailbox of the stored arm. Its words are in the order of `firmware/src/arm_store.rs`.
     fn mailbox(&self) -> [u32; 8] {
         core::array::from_fn(|n| self.board.machine.word(self.mailbox_at + 4 * n as u32).expect("memory"))
     }
 
-    /// Returns data about the board's start.
+    /// Returns the data about a start of the board.
     fn start(&self, cause: u32) -> Start {
         let [.., address, length, sequence] = self.mailbox();
         let arm = (address != 0).then(|| {
@@ -192,7 +193,8 @@ impl Rig {
         Start { cause, boots: self.resets as u32, version, program, arm, log: self.log.clone() }
     }
 
-    /// Checks that the frames of the controller are unchanged and in order on the bus. Frames may also be missing.
+    /// Checks that the frames of the controller appear on the joint bus unchanged and in order. Frames may also be
+    /// missing on the bus.
     fn take_bus(&mut self) {
         let wire = &mut self.board.machine.chip().fdcan.wire;
         self.bus = wire.log().iter().cloned().collect();
@@ -202,19 +204,19 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // The frame belongs to the tick that is running now, whose record is read later.
+                // The frame belongs to the tick that is running now. The rig reads the record of this tick later.
                 continue;
             };
             self.to_pass.drain(..=at);
         }
     }
 
-    /// Returns the flight record. If a tick extends over two milliseconds, waits for its end.
+    /// Returns the flight record. If a tick extends over two milliseconds, this function waits for the end of the tick.
     fn complete_flight(&mut self) -> Option<Flight> {
-        // The longest tick takes a third of a millisecond, when a model is received and all values that depend on
-        // it are computed.
+        // The longest tick takes a third of a millisecond. This tick receives a model and computes all values that
+        // depend on the model.
         for _ in 0..80 {
-            // A half-written record is not valid. The start of a tick may also be due at this time.
+            // A half-written flight record is not valid. The start of a tick may also be due at this time.
             if !self.in_tick() {
                 let flight = self.read_flight()?;
                 let due = self.ticks > 0 && !self.may_hang && flight.tick == self.ticks;
@@ -233,18 +235,18 @@ impl Rig {
         self.board.machine.chip().core.contexts.contains(&TIM7)
     }
 
-    /// Returns the current flight record; `None` if the memory does not contain a record.
+    /// Returns the current flight record. Returns `None` if the memory does not contain a flight record.
     pub fn read_flight(&mut self) -> Option<Flight> {
         let bytes = self.board.machine.memory(self.flight_at, FLIGHT_SIZE)?;
         Flight::parse(&bytes)
     }
 
-    /// Runs `ms` milliseconds.
+    /// Runs the board for `ms` milliseconds.
     pub fn run(&mut self, ms: u64) {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Runs until `done` returns `true`, at most `ms` milliseconds.
+    /// Runs the board until `done` returns `true`, at most `ms` milliseconds.
     #[track_caller]
     pub fn wait(&mut self, what: &str, ms: u64, mut done: impl FnMut(&mut Self) -> bool) {
         for _ in 0..=ms {
@@ -257,12 +259,12 @@ impl Rig {
         panic!("{what}: not within {ms} ms; {t:?}");
     }
 
-    /// Returns the telemetry of the shadow controller, which is bit-identical to the board's.
+    /// Returns the telemetry of the shadow controller, which is bit-identical to the telemetry of the board.
     pub fn telemetry(&self) -> Telemetry {
         self.shadow.as_ref().map(|s| s.telemetry()).unwrap_or_default()
     }
 
-    /// Returns the state of the controller.
+    /// Returns the state of the shadow controller.
     pub fn state(&self) -> ControllerState {
         self.telemetry().state
     }
@@ -273,7 +275,7 @@ impl Rig {
         self.board.write(port, bytes);
     }
 
-    /// Sends a frame and waits for its record, which must not be sent to another port.
+    /// Sends a frame and waits for its response record. The board must not send this record to another port.
     #[track_caller]
     pub fn response(&mut self, port: Port, frame: &[u8]) -> Response {
         for host in &mut self.hosts {
@@ -286,7 +288,7 @@ impl Rig {
         self.hosts[index(port)].records.remove(0)
     }
 
-    /// Sends a frame that must be accepted.
+    /// Sends a frame that the board must accept.
     #[track_caller]
     pub fn ask(&mut self, port: Port, frame: &[u8]) {
         let response = self.response(port, frame);
@@ -294,7 +296,7 @@ impl Rig {
         assert!(good, "refused: {response}");
     }
 
-    /// Returns the newest status at a port.
+    /// Returns the newest status that the host at a port received.
     pub fn status(&self, port: Port) -> Status {
         self.hosts[index(port)].last.expect("a status was received")
     }
@@ -308,8 +310,8 @@ impl Rig {
         self.wait_for_hold(12_000);
     }
 
-    /// Starts a trajectory from the current position to another position and back, which takes `seconds` in each
-    /// direction. Runs the board for `ms`.
+    /// Starts a trajectory from the current position to another position and back. The motion takes `seconds` in each
+    /// direction. After the start, runs the board for `ms` milliseconds.
     #[track_caller]
     pub fn set_off(&mut self, port: Port, seconds: f64, ms: u64) {
         let here = self.telemetry().joints.map(|j| j.set_position);
@@ -331,12 +333,12 @@ impl Rig {
         });
     }
 
-    /// Begins a fault.
+    /// Starts a simulated fault.
     pub fn inject(&mut self, kind: FaultKind) {
         self.board.inject(kind);
     }
 
-    /// Reads a register, as a debugger does.
+    /// Reads a register of the board, as a debugger does.
     pub fn register(&mut self, address: u32) -> u32 {
         self.board.machine.word(address).unwrap_or_else(|| panic!("no register at {address:#010x}"))
     }

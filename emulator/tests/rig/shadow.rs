@@ -1,4 +1,4 @@
-//! The shadow controller, which is the board's controller code running on the PC.
+//! The shadow controller, which is the controller code of the board running on the PC.
 use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::{RECORDER_BLOCKS, Worked};
@@ -16,7 +16,7 @@ const FAILED: [u32; 3] = [4, 5, 6];
 /// Memory of the flight recorder, divided into the same parts as on the board.
 pub type LogMemory = [Vec<Block>; 3];
 
-/// Creates the flight recorder memory in its state after a loss of power.
+/// Creates the memory of the flight recorder in its state after a loss of power.
 pub fn no_log() -> LogMemory {
     RECORDER_BLOCKS.map(|blocks| vec![[0; BLOCK_WORDS]; blocks])
 }
@@ -30,7 +30,7 @@ pub struct Shadow {
     program: Program,
 }
 
-/// Data about a board's start.
+/// Data about a start of the board.
 pub struct Start {
     /// Cause of the start, as the code in the flight record.
     pub cause: u32,
@@ -42,12 +42,12 @@ pub struct Start {
     pub program: Program,
     /// Arm that the board found in its flash, and its sequence number.
     pub arm: Option<(Vec<u8>, u32)>,
-    /// Previous contents of the flight recorder.
+    /// Contents of the flight recorder before the start.
     pub log: LogMemory,
 }
 
 impl Shadow {
-    /// Creates the controller for a board that has just started.
+    /// Creates the shadow controller for a board that has just started.
     pub fn new(start: Start) -> Self {
         let Start { cause, boots, version, program, arm, log } = start;
         let points = vec![RawPoint::default(); POINTS_MAX];
@@ -75,7 +75,7 @@ impl Shadow {
         Self { controller, recorder, program, worked: Vec::new() }
     }
 
-    /// Records that the board has read its flash.
+    /// Records that the board has finished reading its program in flash.
     pub fn flash_is_read(&mut self) {
         self.controller.set_program(Some(self.program));
     }
@@ -95,22 +95,22 @@ impl Shadow {
         self.recorder.into_memory()
     }
 
-    /// Returns the controller.
+    /// Returns the controller that runs on the PC.
     pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
         &self.controller
     }
 
-    /// Returns the telemetry of the last tick.
+    /// Returns the telemetry of the last tick of the shadow controller.
     pub fn telemetry(&self) -> Telemetry {
         self.controller.telemetry()
     }
 
-    /// Returns the settings.
+    /// Returns the settings of the shadow controller.
     pub fn config(&self) -> &Config {
         self.controller.config()
     }
 
-    /// Runs the tick that the board recorded. All outputs must be bit-identical to the board's.
+    /// Runs the tick that the board recorded. All outputs must be bit-identical to the outputs of the board.
     pub fn tick(&mut self, flight: &Flight, hosts: &mut [Host; 2]) {
         let bytes: Vec<Vec<u8>> = flight
             .events

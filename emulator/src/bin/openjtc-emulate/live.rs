@@ -1,4 +1,4 @@
-//! Main loop of the program, which connects the board, the terminal and the real-time clock.
+//! Main loop of `openjtc-emulate`, which connects the board, the terminal and the real-time clock.
 use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -13,9 +13,9 @@ use crate::pty::{Pty, PtyError};
 
 /// Largest number of host bytes that may wait for transmission on the serial line.
 const WAITING_MAX: usize = 4096;
-/// Longest time to wait until the host reads, if virtual time does not follow the clock.
+/// Longest time for which the loop waits until the host reads, if virtual time does not follow the real-time clock.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay after which virtual time still catches up with the clock.
+/// Largest delay after which virtual time still catches up with the real-time clock.
 const CATCH_UP: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(1);
 
@@ -28,18 +28,18 @@ pub enum Speed {
     Max,
 }
 
-/// State of the loop.
+/// State of the main loop.
 pub struct Live {
     board: Board,
     port: Port,
-    /// Rate of the host, bit/s; `None` means the rate of the firmware.
+    /// Bit rate of the host, bit/s; `None` means the rate of the firmware.
     baud: Option<u32>,
     pty: Pty,
     speed: Speed,
     log: Option<DefmtLog>,
     frames: Frames,
     incoming: Incoming,
-    /// Bytes that the terminal has not accepted yet.
+    /// Bytes of the board that the terminal has not accepted yet.
     rest: Vec<u8>,
     connected: bool,
     ready: bool,
@@ -48,7 +48,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Creates a board that has just been switched on, connected to this terminal.
+    /// Creates the state of the main loop for a board that has just been switched on and is connected to this terminal.
     pub fn new(
         board: Board,
         port: Port,
@@ -74,12 +74,12 @@ impl Live {
         }
     }
 
-    /// Returns the contents of flash bank 2 after a power failure at this moment.
+    /// Returns the contents of flash bank 2 after a power failure at the current virtual time.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.board.machine.cut_power(seed)
     }
 
-    /// Runs until `stop` is set.
+    /// Runs the main loop until `stop` is set.
     pub fn run(&mut self, stop: &AtomicBool) -> Result<(), Box<dyn Error>> {
         let (mut start, mut start_ms) = (Instant::now(), self.board.now_ms());
         while !stop.load(Ordering::Relaxed) {
@@ -92,7 +92,8 @@ impl Live {
                     continue;
                 }
                 if due > CATCH_UP {
-                    // After a longer delay, virtual time does not catch up. Virtual time continues from this moment.
+                    // After a longer delay, virtual time does not catch up with the real-time clock. Virtual time
+                    // continues from this moment.
                     (start, start_ms) = (Instant::now(), self.board.now_ms());
                 }
             }
@@ -136,9 +137,9 @@ impl Live {
         }
     }
 
-    /// Pauses virtual time briefly while the operating system may still delay bytes of a frame, because the board
-    /// would measure the delay as a gap. Does not pause while host bytes still wait for transmission. Returns
-    /// `true` after a pause.
+    /// Pauses virtual time briefly if the operating system may still delay bytes of a frame. Without the pause, the
+    /// board would measure the delay as a gap in the frame. Does not pause while host bytes still wait for
+    /// transmission. Returns `true` after a pause.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);
@@ -148,7 +149,7 @@ impl Live {
         Ok(true)
     }
 
-    /// Prints the firmware's log, resets and faults.
+    /// Prints the log of the firmware, and resets and faults of the machine.
     fn report(&mut self) -> Result<(), Box<dyn Error>> {
         let ms = self.board.now_ms();
         if let Some(log) = &mut self.log {
@@ -193,8 +194,8 @@ impl Live {
         Ok(())
     }
 
-    /// Writes the remaining bytes to the terminal. In real time the function never waits, because a host that does
-    /// not read must not delay the arm.
+    /// Writes the remaining bytes of the board to the terminal. In real time the function never waits, because a host
+    /// that does not read must not delay the arm.
     fn write_rest(&mut self) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

@@ -1,4 +1,4 @@
-//! The firmware's defmt log as text, decoded by the program `defmt-print`.
+//! The defmt log of the firmware as text, decoded by the program `defmt-print`.
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -19,7 +19,7 @@ impl DefmtLog {
         child.map(Self).map_err(|e| format!("defmt-print: {e}; install it with `cargo install defmt-print`"))
     }
 
-    /// Sends bytes to the decoder.
+    /// Sends log bytes to the decoder.
     pub fn print(&mut self, bytes: &[u8]) -> io::Result<()> {
         match &mut self.0.stdin {
             Some(input) if !bytes.is_empty() => input.write_all(bytes),

@@ -2,7 +2,7 @@
 #![forbid(unsafe_code)]
 
 #[path = "../../../../crates/jtc-cli/src/serve/frames.rs"]
-#[allow(dead_code)] // the simulator uses more of it
+#[allow(dead_code)] // the simulator uses more items of this module
 mod frames;
 mod live;
 mod log;
@@ -111,7 +111,7 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Returns bank 2 from the file of an earlier session, or an empty bank if the file does not exist.
+/// Returns the contents of bank 2 from the file of an earlier session, or an empty bank if the file does not exist.
 fn kept(path: &Path) -> Result<Bank2, String> {
     match std::fs::read(path) {
         Ok(bytes) if bytes.len() == BANK2_SIZE as usize => Ok(Bank2::from_bytes(&bytes)),

@@ -46,9 +46,9 @@ fn main() {
     }
 }
 
-/// Returns the commit that is built, followed by `+` if files were changed since. The text always has thirteen
-/// characters. Logging therefore takes the same time in every build, and measurements of builds can be
-/// compared.
+/// Returns the commit that is built, followed by `+` if files were changed after the commit. The text always has
+/// thirteen characters. Therefore logging takes the same time in every build, and measurements of different builds are
+/// comparable.
 fn build_id() -> String {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok()?;

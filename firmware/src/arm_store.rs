@@ -1,10 +1,10 @@
-//! The stored arm (J-54): an image of bytes that survives a loss of power, and the operations on the image that a
-//! host can request.
+//! The stored arm (J-54) is an image of bytes that survives a loss of power. A host can request operations on this
+//! image.
 //!
-//! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. When a host
-//! requests a store, the tick passes an image to [`begin`] and reads the result with [`progress`]. The loop that
-//! serves the links stores the image, one small step per pass ([`Store::step`]). No code waits for the flash, and
-//! interrupts are delayed by at most a few instructions.
+//! At program start, [`load`] finds the newest complete image and copies the image into memory, before the first tick.
+//! When a host requests a store, the tick passes an image to [`begin`] and reads the result with [`progress`]. The loop
+//! that serves the serial lines stores the image, one small step per pass ([`Store::step`]). No code waits for the
+//! flash, and storing delays interrupts by at most a few instructions.
 //!
 //! `jtc_core::slots` defines the contents of the slots and the order of the steps; [`bank2`] operates the flash itself.
 use core::cell::Cell;
@@ -23,7 +23,8 @@ pub type Buffer = [u8; IMAGE_MAX];
 const ERASE_MAX: Duration = Duration::from_secs(8);
 const PROGRAM_MAX: Duration = Duration::from_millis(50);
 
-/// Mailbox between tick and links. The order of its words is fixed, so that a debugger can read the mailbox.
+/// Mailbox through which the tick and the link loop exchange images. The order of its words is fixed, so that a
+/// debugger can read the mailbox.
 #[repr(C)]
 pub struct Mailbox {
     /// State of the store: [`Mailbox::IDLE`] or another constant of this type.
@@ -32,11 +33,11 @@ pub struct Mailbox {
     length: AtomicU32,
     /// Sequence number of the last stored image.
     sequence: AtomicU32,
-    /// Last [`Failure`].
+    /// Code of the last [`Failure`].
     failure: AtomicU32,
     /// Address of the buffer with the image to be stored.
     staging: AtomicU32,
-    /// Image that was found at the start, as address (0 if none), number of bytes and sequence number.
+    /// Image that was found at program start, as address (0 if none), number of bytes and sequence number.
     loaded: [AtomicU32; 3],
 }
 
@@ -48,7 +49,7 @@ impl Mailbox {
     const FAILED: u32 = 4;
 }
 
-/// The only mailbox.
+/// The only mailbox of the program.
 #[unsafe(no_mangle)]
 #[used]
 pub static ARM_STORE: Mailbox = Mailbox {
@@ -60,12 +61,12 @@ pub static ARM_STORE: Mailbox = Mailbox {
     loaded: [const { AtomicU32::new(0) }; 3],
 };
 
-/// Buffer for an image to be stored. The side that has taken the buffer out owns the buffer.
+/// Buffer for an image to be stored. The code that has taken the buffer out owns the buffer.
 static STAGING: Mutex<Cell<Option<&'static mut Buffer>>> = Mutex::new(Cell::new(None));
-/// Image that was found in flash at the start.
+/// Image that was found in flash at program start.
 static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));
 
-/// Image that was found in flash at the start.
+/// Image that was found in flash at program start.
 #[derive(Clone, Copy)]
 pub struct Loaded {
     /// Bytes of the image.
@@ -77,29 +78,29 @@ pub struct Loaded {
 /// Reason why an image is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// The last image is not stored yet.
+    /// The previous image is not stored yet.
     Busy,
     /// The image has more than [`IMAGE_MAX`] bytes.
     TooLong,
 }
 
-/// Progress of storing the last image.
+/// Progress of storing the newest image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// No image has been passed to [`begin`] since the start.
+    /// No image has been passed to [`begin`] since program start.
     Idle,
     /// The image is being stored.
     Busy,
-    /// The image is stored, and every later start finds it.
+    /// The image is stored, and every later program start finds it.
     Done {
         /// Sequence number of the image.
         sequence: u32,
     },
-    /// The image could not be stored. The previous image is still stored.
+    /// The image could not be stored. The flash still contains the previous image.
     Failed(Failure),
 }
 
-/// Reason why an image could not be stored. The log contains the flash's error flags.
+/// Reason why an image could not be stored. The log contains the error flags of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 #[repr(u8)]
 pub enum Failure {
@@ -130,7 +131,7 @@ pub fn begin(image: &[u8]) -> Result<(), Refused> {
     Ok(())
 }
 
-/// Returns the progress of storing the last image.
+/// Returns the progress of storing the newest image.
 pub fn progress() -> Progress {
     match ARM_STORE.state.load(Ordering::Acquire) {
         Mailbox::ASKED | Mailbox::BUSY => Progress::Busy,
@@ -146,7 +147,7 @@ pub fn progress() -> Progress {
     }
 }
 
-/// Returns the image that was found at the start. The image does not change until the next start.
+/// Returns the image that was found at program start. The image does not change until the next program start.
 pub fn loaded() -> Option<Loaded> {
     critical_section::with(|cs| LOADED.borrow(cs).get())
 }
@@ -169,7 +170,7 @@ fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
     header
 }
 
-/// Finds the stored image. Must be called once, before the first tick and before the watchdog starts.
+/// Finds the stored image. This function must be called once, before the first tick and before the watchdog starts.
 pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     let [first, second] = buffers;
     let headers = [read(0, first), read(1, second)];
@@ -191,7 +192,7 @@ pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     Store { slots, job: None }
 }
 
-/// The part of the store that the links execute.
+/// The part of the store that the link loop executes.
 pub struct Store {
     slots: Slots,
     job: Option<Job>,
@@ -207,7 +208,7 @@ struct Job {
 }
 
 impl Store {
-    /// Carries out one step of storing, if an image is being stored. Takes a few microseconds.
+    /// Executes one step of storing, if an image is being stored. The step takes a few microseconds.
     pub fn step(&mut self) {
         let Some(job) = &mut self.job else {
             if ARM_STORE.state.load(Ordering::Acquire) == Mailbox::ASKED {
@@ -222,12 +223,12 @@ impl Store {
         }
     }
 
-    /// Takes an image out of the mailbox.
+    /// Takes the image to be stored out of the mailbox.
     fn start(&mut self) {
         let Some(image) = critical_section::with(|cs| STAGING.borrow(cs).take()) else { return };
         ARM_STORE.state.store(Mailbox::BUSY, Ordering::Relaxed);
         let length = (ARM_STORE.length.load(Ordering::Relaxed) as usize).min(IMAGE_MAX);
-        // `begin` has checked the length, so a slot is always found.
+        // `begin` has checked the length, so `Storing::begin` always finds a slot.
         let Some(storing) = Storing::begin(&mut self.slots, &image[..length]) else { return };
         self.job = Some(Job { image, length, storing, begun: None });
         if bank2::busy() {
@@ -240,8 +241,8 @@ impl Store {
     fn end(&mut self, result: Result<(), Failure>) {
         let Some(Job { image, length, storing, .. }) = self.job.take() else { return };
         let flags = bank2::errors();
-        // If the bank is still busy, it is not accessed, and reads of the bank remain blocked. The next attempt
-        // checks the bank again.
+        // If flash bank 2 is still busy, this code does not access it, and the memory protection still blocks reads of
+        // the bank. The next attempt to store an image checks the bank again.
         if !bank2::busy() {
             bank2::lock();
         }
@@ -270,8 +271,8 @@ impl Job {
         self.storing.action(self.image.get(..self.length).unwrap_or(&[]))
     }
 
-    /// Checks if the flash has finished its operation, and begins the next action. Returns `true` when the image is
-    /// stored.
+    /// Checks if the flash has finished its operation, and begins the next action. Returns `true` when the complete
+    /// image is stored.
     fn step(&mut self) -> Result<bool, Failure> {
         if let Some(begun) = self.begun {
             let limit = if matches!(self.action(), Action::Erase { .. }) { ERASE_MAX } else { PROGRAM_MAX };
@@ -292,7 +293,7 @@ impl Job {
         Ok(false)
     }
 
-    /// Checks that the flash has carried out the action.
+    /// Checks that the flash has executed the last action.
     fn check(&self) -> Result<(), Failure> {
         let failed = bank2::errors() != 0;
         match self.action() {

@@ -1,10 +1,11 @@
-//! Flash bank 2, whose last two sectors contain the stored arm (J-54). Erasing and programming never block, and a read
-//! of a damaged word does not cause a fault.
+//! Flash bank 2, whose last two sectors contain the stored arm (J-54). Erasing and programming never block the program,
+//! and a read of a damaged word does not cause a fault.
 //!
-//! A read of the bank during erasing or programming would halt the processor until the operation ends. An operation
-//! takes up to two seconds, but the watchdog allows only 4.5 ms. The memory protection unit therefore blocks every
-//! access, including speculative reads and cache line fills ([`memory::bank2`]). Only this module permits accesses to
-//! the bank, as memory that is neither cached nor prefetched. Code and constants are in bank 1, which remains readable.
+//! A read of bank 2 during erasing or programming would halt the processor until the flash operation ends. A flash
+//! operation takes up to two seconds, but the watchdog allows only 4.5 ms. Therefore the memory protection unit blocks
+//! every access to bank 2, including speculative reads and cache line fills ([`memory::bank2`]). Only this module
+//! permits accesses to the bank. During these accesses, the bank is memory that is neither cached nor prefetched. Code
+//! and constants are in bank 1, which remains readable.
 use core::arch::asm;
 
 use cortex_m::peripheral::SCB;
@@ -19,7 +20,7 @@ use crate::memory;
 const SECTORS: [u8; SLOTS] = [6, 7];
 const SECTOR_BYTES: u32 = 128 * 1024;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// Programs 32 bits at once, which is permitted at every supply voltage of the boards.
+/// Code for programming of 32 bits at once, which is permitted at every supply voltage of the boards.
 const PSIZE: u8 = 0b10;
 /// BFHFNMIGN in the register CCR of the core.
 const IGNORE_BUS_FAULTS: u32 = 1 << 8;
@@ -31,12 +32,12 @@ const READ_ERRORS: u32 = 1 << 23 | 1 << 24 | 1 << 26;
 /// Flags that are cleared together with the errors: end of operation, and corrected one-bit error.
 const REMARKS: u32 = 1 << 16 | 1 << 25;
 
-/// Returns the registers of the bank.
+/// Returns the registers of flash bank 2.
 fn bank() -> Bank {
     pac::FLASH.bank(1)
 }
 
-/// Unlocks the registers. Returns `false` if the registers remain locked until the next reset.
+/// Unlocks the flash registers. Returns `false` if the registers remain locked until the next reset.
 pub fn unlock() -> bool {
     if bank().cr().read().lock() {
         KEYS.into_iter().for_each(|key| bank().keyr().write_value(key));
@@ -44,13 +45,14 @@ pub fn unlock() -> bool {
     !bank().cr().read().lock()
 }
 
-/// Ends an operation and locks the registers. After this call, no operation can begin until [`unlock`] is called.
+/// Ends a flash operation and locks the flash registers. After this call, no operation can begin until [`unlock`] is
+/// called.
 pub fn lock() {
     end();
     bank().cr().modify(|w| w.set_lock(true));
 }
 
-/// Returns `true` while an operation is in progress.
+/// Returns `true` while a flash operation is in progress.
 pub fn busy() -> bool {
     let sr = bank().sr().read();
     sr.bsy() || sr.qw()
@@ -61,7 +63,7 @@ pub fn end() {
     bank().cr().write(|w| w.set_psize(PSIZE));
 }
 
-/// Returns the errors that have occurred since the operation began, as bits of FLASH_SR2.
+/// Returns the errors that have occurred since the flash operation began, as bits of FLASH_SR2.
 pub fn errors() -> u32 {
     bank().sr().read().0 & ERRORS
 }
@@ -74,7 +76,7 @@ fn address(slot: usize, word: usize) -> u32 {
     memory::BANK2 + u32::from(SECTORS[slot]) * SECTOR_BYTES + (word * WORD) as u32
 }
 
-/// Begins to erase a slot, which takes seconds.
+/// Begins to erase a slot; erasing takes seconds.
 pub fn erase(slot: usize) {
     clear();
     let sector = SECTORS[slot];
@@ -86,7 +88,7 @@ pub fn erase(slot: usize) {
     bank().cr().modify(|w| w.set_start(true));
 }
 
-/// Begins to program a word, which takes a fraction of a millisecond.
+/// Begins to program a word; programming takes a fraction of a millisecond.
 pub fn program(slot: usize, word: usize, bytes: &Word) {
     clear();
     bank().cr().write(|w| {
@@ -96,29 +98,31 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
     let (words, _) = bytes.as_chunks::<4>();
     let at = address(slot, word) as *mut u32;
     let write = |n: usize| {
-        // SAFETY: the address is within a sector that only this module uses; stores to it go to the flash's write
-        // buffer.
+        // SAFETY: the address is within a sector that only this module uses; stores to this sector go to the write
+        // buffer of the flash.
         unsafe { at.add(n).write_volatile(u32::from_le_bytes(words[n])) }
     };
     let last = words.len() - 1;
     memory::bank2(true);
     (0..last).for_each(write);
-    // The write of the last 32 bits starts programming. Interrupts are masked until the bank is closed again.
+    // The write of the last 32 bits starts programming. Interrupts are masked until accesses to the bank are blocked
+    // again.
     critical_section::with(|_| {
         write(last);
         memory::bank2(false);
     });
 }
 
-/// Reads a word; returns `None` if it cannot be read. Must not be called while the bank is busy.
+/// Reads a word. Returns `None` if the word cannot be read. This function must not be called while flash bank 2 is
+/// busy.
 ///
-/// If programming or erasing a word was interrupted, the word may have more wrong bits than the flash can correct.
-/// A read of such a word causes a bus fault, which the core ignores here. Instead, this function checks the error
-/// flag of the flash.
+/// If programming or erasing a word was interrupted, the word may have more wrong bits than the flash can correct. A
+/// read of such a word causes a bus fault. The core ignores this bus fault here, and this function checks the error
+/// flag of the flash instead.
 pub fn read(slot: usize, word: usize) -> Option<Word> {
     clear();
-    // SAFETY: a register of the core. No other code changes this bit, and the bit has an effect only while faults are
-    // masked.
+    // SAFETY: this code only changes a register of the core. No other code changes this bit, and the bit has an effect
+    // only while faults are masked.
     let ignore = |on: bool| unsafe {
         (*SCB::PTR).ccr.modify(|ccr| if on { ccr | IGNORE_BUS_FAULTS } else { ccr & !IGNORE_BUS_FAULTS });
     };
@@ -134,12 +138,12 @@ pub fn read(slot: usize, word: usize) -> Option<Word> {
     (bank().sr().read().0 & READ_ERRORS == 0).then_some(bytes)
 }
 
-/// Loads one word with faults masked. Each load is masked separately, so that the tick waits for one load at most.
+/// Loads one word with faults masked. Each load masks faults separately, so that the tick waits for one load at most.
 fn load(address: u32) -> u32 {
     let value: u32;
-    // SAFETY: an aligned load from flash. With FAULTMASK and BFHFNMIGN set, the core ignores a bus fault of this load;
-    // the barrier waits for it. The protection unit stays active while faults are masked (HFNMIENA, `memory`), so the
-    // load is neither cached nor prefetched.
+    // SAFETY: this code is an aligned load from flash. With FAULTMASK and BFHFNMIGN set, the core ignores a bus fault
+    // of this load, and the barrier waits until the load is complete. The protection unit stays active while faults are
+    // masked (HFNMIENA, `memory`), so the load is neither cached nor prefetched.
     unsafe {
         asm!(
             "cpsid f",

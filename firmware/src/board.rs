@@ -14,11 +14,11 @@ pub use nucleo_144::wire;
 
 /// A board whose pins are assigned to their functions.
 pub struct Board {
-    /// RS422 and USB.
+    /// The serial lines RS422 and USB.
     pub lines: [Line; 2],
     /// Safety wires and LEDs.
     pub pins: Pins,
-    /// Watchdog.
+    /// Watchdog that the tick feeds.
     pub watchdog: Peri<'static, IWDG1>,
 }
 
@@ -28,7 +28,7 @@ pub struct Pins {
     pub safety_input: SafetyInput,
     /// Safety output: 0 means an error (J-22).
     pub safety_output: Output<'static>,
-    /// LED1, LED2, LED3.
+    /// The three LEDs of the board: LED1, LED2, LED3.
     pub leds: [Output<'static>; 3],
 }
 
@@ -46,7 +46,7 @@ impl Pins {
         }
     }
 
-    /// Shows the state on the LEDs as the manual describes.
+    /// Shows the state of the controller on the LEDs as the manual describes.
     pub fn show(&mut self, state: ControllerState) {
         let lit = match state {
             ControllerState::Start => [false, false, false],
@@ -61,19 +61,19 @@ impl Pins {
     }
 }
 
-/// Returns an LED that is off.
+/// Configures an LED pin and switches the LED off.
 fn led(pin: Peri<'static, impl Pin>) -> Output<'static> {
     Output::new(pin, embassy_stm32::gpio::Level::Low, Speed::Low)
 }
 
-/// Assigns a pin to a peripheral permanently.
+/// Assigns a pin to a peripheral permanently, as an output.
 fn transmit(pin: Peri<'static, impl Pin>, function: u8) {
     let mut pin = Flex::new(pin);
     pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::High));
     core::mem::forget(pin);
 }
 
-/// Like `transmit`, but for an input. The pin is pulled up to the level of an idle line, so that an unconnected
+/// Like `transmit`, but for an input. The pull-up drives the pin to the level of an idle line, so that an unconnected
 /// input does not receive bytes.
 fn receive(pin: Peri<'static, impl Pin>, function: u8) {
     let mut pin = Flex::new(pin);
@@ -88,13 +88,13 @@ const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } 
 /// still apply the torque that the program commanded before the reset.
 pub fn safety_output_low_at_start() {
     pac::RCC.ahb4enr().modify(|w| w.set_gpioden(true));
-    // The read of the register ensures that the clock is running.
+    // The read of the clock enable register ensures that the clock of the port is running.
     pac::RCC.ahb4enr().read();
     safety_output_low();
     pac::GPIOD.moder().modify(|w| w.set_moder(SAFETY_OUTPUT_BIT, pac::gpio::vals::Moder::OUTPUT));
 }
 
-/// Drives the safety output to 0. Can be called from any context and in any state of the program.
+/// Drives the safety output to 0. The function can be called from any context and in any state of the program.
 pub fn safety_output_low() {
     pac::GPIOD.bsrr().write(|w| w.set_br(SAFETY_OUTPUT_BIT, true));
 }

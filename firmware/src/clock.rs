@@ -1,24 +1,25 @@
-//! The clock tree and the rates derived from it: 85 MHz for the bus, 1 kHz for the tick, 15 MBd for the host.
+//! The clock tree and the rates derived from it: 85 MHz for the joint bus, 1 kHz for the tick, 15 MBd for the serial
+//! lines.
 //!
-//! All clocks come from the 8 MHz of the ST-LINK (bypass), because CAN FD needs a more accurate clock than the internal
-//! oscillator.
+//! All clocks are derived from the 8 MHz clock of the ST-LINK (bypass), because CAN FD needs a more accurate clock than
+//! the internal oscillator.
 use jtc_bus::timing;
 
 /// Frequency at OSC_IN, Hz.
 pub const HSE_HZ: u32 = 8_000_000;
 
-/// `true` if Vcore comes from the SMPS, as wired when the board is delivered. With the SMPS, the highest voltage scale
+/// `true` if Vcore comes from the SMPS, which is the wiring of a new board. With the SMPS, the highest voltage scale
 /// and the highest frequency are not permitted.
 pub const SMPS: bool = cfg!(feature = "nucleo-h745zi-q");
 
 /// Settings of an output of a phase-locked loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Pll {
-    /// Divider before the phase-locked loop.
+    /// Divider of the PLL's input clock.
     pub m: u32,
-    /// Multiplier.
+    /// Multiplier of the PLL.
     pub n: u32,
-    /// Divider after the phase-locked loop.
+    /// Divider of the PLL's output clock.
     pub divide: u32,
 }
 
@@ -28,12 +29,12 @@ impl Pll {
         HSE_HZ / self.m * self.n
     }
 
-    /// Frequency of the output, Hz.
+    /// Frequency of the PLL's output, Hz.
     pub const fn hz(&self) -> u32 {
         self.vco() / self.divide
     }
 
-    /// Returns `true` if the settings satisfy the reference manual's rules for the wide-range oscillator and every
+    /// Returns `true` if the settings satisfy the rules of the reference manual for the wide-range oscillator and every
     /// division is exact.
     const fn valid(&self) -> bool {
         let reference = HSE_HZ / self.m;
@@ -55,25 +56,25 @@ pub const CAN: Pll = Pll { m: 4, n: 170, divide: 4 };
 /// PLL3, whose output Q is the clock of both serial lines.
 pub const SERIAL: Pll = Pll { m: 4, n: 180, divide: 3 };
 
-/// Core, Hz.
+/// Frequency of the core, Hz.
 pub const CORE_HZ: u32 = CORE.hz();
 /// Frequency of buses and memories, which is half of the core frequency.
 pub const AHB_HZ: u32 = CORE_HZ / 2;
-/// Frequency of the peripherals, which is half of the bus frequency.
+/// Frequency of the peripherals, which is half of the frequency of buses and memories.
 pub const APB_HZ: u32 = AHB_HZ / 2;
-/// Frequency of the timers, which is twice the frequency of their bus.
+/// Frequency of the timers, which is twice the frequency of their peripheral bus.
 pub const TIMER_HZ: u32 = 2 * APB_HZ;
 
 /// Ticks of the controller per second.
 pub const TICK_HZ: u32 = 1_000;
-/// TIM7 counts microseconds.
+/// Prescaler of TIM7, so that TIM7 counts microseconds.
 pub const TICK_PRESCALER: u32 = TIMER_HZ / 1_000_000;
-/// Microseconds per tick.
+/// Duration of a tick, µs.
 pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
 
 const _: () = {
     assert!(CORE.valid() && CAN.valid() && SERIAL.valid());
-    // Highest frequencies that are permitted for the voltage scale, which is VOS1 with the SMPS and VOS0 with the
+    // Highest frequencies that are permitted for the voltage scale. The scale is VOS1 with the SMPS and VOS0 with the
     // LDO.
     assert!(CORE_HZ <= if SMPS { 400_000_000 } else { 480_000_000 });
     assert!(APB_HZ <= if SMPS { 100_000_000 } else { 120_000_000 });
@@ -88,14 +89,14 @@ const _: () = {
 /// Settings of a USART for a baud rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Baud {
-    /// Register BRR.
+    /// Value of the register BRR.
     pub brr: u32,
-    /// Oversampling by 8.
+    /// `true` if the USART oversamples by 8, otherwise by 16.
     pub over8: bool,
 }
 
 impl Baud {
-    /// Returns the settings for `rate` Bd; `None` if the clock cannot produce the rate within 1 %.
+    /// Returns the settings for `rate` Bd. Returns `None` if the clock cannot produce the rate within 1 %.
     pub const fn new(rate: u32) -> Option<Self> {
         let clock = SERIAL.hz();
         if rate == 0 || rate > clock / 8 {
@@ -109,7 +110,7 @@ impl Baud {
         if divider < 16 || divider > 0xFFFF || error > rate / 100 {
             return None;
         }
-        // With oversampling by 8 the lowest four bits are shifted down by one.
+        // With oversampling by 8, the lowest four bits of the divider are shifted right by one.
         let brr = if over8 { divider & 0xFFF0 | (divider & 0xF) >> 1 } else { divider };
         Some(Self { brr, over8 })
     }
@@ -119,7 +120,7 @@ impl Baud {
 mod tests {
     use super::*;
 
-    /// Computes the baud rate of the line with the formula of the reference manual.
+    /// Computes the baud rate of a serial line with the formula of the reference manual.
     fn rate(baud: Baud) -> f64 {
         let clock = f64::from(SERIAL.hz());
         if baud.over8 {
@@ -139,7 +140,7 @@ mod tests {
         {
             let baud = Baud::new(wanted).unwrap_or_else(|| panic!("{wanted} Bd"));
             let error = rate(baud) / f64::from(wanted) - 1.0;
-            // The total error of both ends may be about 3 %, so at most 1 % is permitted for each end.
+            // The total error of both ends of a serial line may be about 3 %, so at most 1 % is permitted for each end.
             assert!(error.abs() < 0.01, "{wanted} Bd: {error}");
         }
         assert_eq!(Baud::new(15_000_000), Some(Baud { brr: 0x10, over8: true }));

@@ -1,4 +1,4 @@
-//! Supply and clocks, with the values of [`openjtc_firmware::clock`]. The steps have the same order as in the HAL.
+//! Sets supply and clocks to the values of [`openjtc_firmware::clock`]. The steps have the same order as in the HAL.
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk,
@@ -11,7 +11,7 @@ use openjtc_firmware::clock;
 /// Priority of every interrupt except the tick.
 pub const LOW: Priority = Priority::P8;
 
-/// Returns the settings of output P or Q of a phase-locked loop.
+/// Returns the HAL settings for output P or Q of a phase-locked loop.
 fn pll(from: clock::Pll, p: bool) -> Pll {
     // The registers contain the multiplier minus one and the divider minus one.
     let divide = PllDiv::from_bits((from.divide - 1) as u8);
@@ -27,7 +27,7 @@ fn pll(from: clock::Pll, p: bool) -> Pll {
     }
 }
 
-/// Starts supply, clocks and the HAL.
+/// Starts the power supply, the clocks and the HAL.
 pub fn init() -> Peripherals {
     let mut config = Config::default();
     // Without this setting, the DMA interrupts would have the priority of the tick.
@@ -63,8 +63,8 @@ pub fn init() -> Peripherals {
         #[unsafe(link_section = ".sram4")]
         static SHARED: MaybeUninit<SharedData> = MaybeUninit::uninit();
 
-        // Only the first write after power-on has an effect; a wrong value makes the board unreachable
-        // (docs/board.md).
+        // Only the first write of the supply configuration after power-on has an effect. A wrong value makes the board
+        // unreachable (docs/board.md).
         config.rcc.supply_config = if clock::SMPS { SupplyConfig::DirectSMPS } else { SupplyConfig::LDO };
         embassy_stm32::init_primary(config, &SHARED)
     }

@@ -1,6 +1,6 @@
-//! Handling of a failed program. The safety output becomes 0, the drives get a last frame with zero torque, the cause
-//! is recorded, and the processor is reset. After a reset, this module also reads the data that the program recorded
-//! before the reset.
+//! Handling of a program failure. The safety output becomes 0, the drives get a last frame with zero torque, the module
+//! records the cause, and the processor is reset. After a reset, this module also reads the data that the program
+//! recorded before the reset.
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -13,15 +13,15 @@ use openjtc_firmware::reset::{self, Cause, Failure};
 
 use crate::{board, fdcan};
 
-/// Memory whose contents survive a reset. The memory is tightly coupled, so that a write does not pass through a
-/// cache.
+/// Memory whose contents survive a reset. The memory is tightly coupled, so that writes bypass the cache.
 #[repr(transparent)]
 pub struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
 
-// SAFETY: `boot` creates the only reference. A fault writes through a pointer, and no other code runs after it.
+// SAFETY: `boot` creates the only reference. A fault handler writes through a pointer, and no other code runs after the
+// handler.
 unsafe impl<T: Send> Sync for Kept<T> {}
 
-/// Record of the last tick, whose layout is defined in [`openjtc_firmware::flight`].
+/// Inputs and outputs of the last tick; [`openjtc_firmware::flight`] defines the layout.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.FLIGHT")]
 #[used]
@@ -39,7 +39,7 @@ pub static LAST_WORDS: Kept<LastWords> = Kept(UnsafeCell::new(MaybeUninit::unini
 #[used]
 pub static BOOTS: Kept<u32> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Position in the source code or in the program memory at which the previous program run ended.
+/// Position in the source code or in program memory at which the previous program run failed.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct LastWords {
@@ -47,10 +47,10 @@ pub struct LastWords {
     magic: u32,
     /// Line of the source code at which the program panicked.
     line: u32,
-    /// Program counter and return address of a hard fault, 0 if unknown.
+    /// Program counter and return address of a hard fault; 0 if unknown.
     pc: u32,
     lr: u32,
-    /// Registers CFSR and HFSR of a hard fault, and the fault address if it is valid.
+    /// Registers CFSR and HFSR of a hard fault, and the fault address if the processor marks it as valid.
     cfsr: u32,
     hfsr: u32,
     address: u32,
@@ -79,27 +79,29 @@ impl LastWords {
 
 /// Cause of this program start, and data of the previous program run.
 pub struct Boot {
-    /// Cause of the start.
+    /// Cause of this program start.
     pub cause: Cause,
     /// Number of this program start, counted since power-on.
     pub boots: u32,
     /// `true` if the power was off before this start.
     pub lost_power: bool,
-    /// Record of the failure that ended the previous program run, and its last tick if the flight record is valid.
+    /// Record of the failure that ended the previous program run.
     last_words: LastWords,
+    /// Last tick of the previous program run: its number, phase and state. `None` if the flight record is not valid.
     last_flight: Option<(u64, u32, u8)>,
     /// Flight record that this program run writes.
     pub flight: &'static mut Flight,
 }
 
-/// Reads the data that the previous program run left. Must be called once, as the first call in the program.
+/// Reads the data that the previous program run recorded. This function must be called once, as the first call in the
+/// program.
 pub fn boot() -> Boot {
     let rsr = pac::RCC.rsr().read().0;
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
     let lost_power = reset::lost_power(rsr);
-    // SAFETY: no other reference to the three exists yet, and this function is called once. After power-on their
-    // contents are random, with wrong check bits, so they are written before they are read. Otherwise they contain
-    // integers and floats, for which all bit patterns are valid.
+    // SAFETY: no other reference to these three statics exists yet, and this function is called once. After power-on
+    // the contents of the statics are random, with wrong check bits, so this function writes the statics before it
+    // reads them. Otherwise the statics contain integers and floats, for which all bit patterns are valid.
     let (words, flight, boots) = unsafe {
         let (words, flight) = (&mut *LAST_WORDS.0.get(), &mut *FLIGHT.0.get());
         let boots = &mut *BOOTS.0.get();
@@ -118,7 +120,7 @@ pub fn boot() -> Boot {
     Boot { cause, boots: *boots, lost_power, last_words, last_flight, flight }
 }
 
-/// Logs the cause of the start.
+/// Logs the cause of this program start.
 pub fn log(boot: &Boot) {
     let words = &boot.last_words;
     match boot.cause {
@@ -143,8 +145,8 @@ pub fn log(boot: &Boot) {
     }
 }
 
-/// Drives the safety output to 0, writes the failure record, sends zero torque to the drives if the bus still works, and
-/// resets the processor. Interrupts stay disabled.
+/// Drives the safety output to 0, writes the failure record, and resets the processor. Before the reset, the function
+/// sends zero torque to the drives if the joint bus still works. Interrupts stay disabled.
 fn end(words: LastWords) -> ! {
     cortex_m::interrupt::disable();
     board::safety_output_low();
@@ -159,7 +161,8 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     let mut words = LastWords { magic: LastWords::PANIC, ..LastWords::NONE };
     if let Some(place) = info.location() {
         words.line = place.line();
-        // If the file name is too long, its end is kept because it is the most useful part.
+        // If the file name is too long, the record contains the end of the name, because the end is the most useful
+        // part.
         let name = place.file().as_bytes();
         let name = &name[name.len().saturating_sub(words.file.len())..];
         for (to, from) in words.file.iter_mut().zip(name) {
@@ -172,7 +175,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 /// Handles every unexpected interrupt, including the non-maskable interrupt.
 ///
 /// # Safety
-/// Only the processor may call it.
+/// Only the processor may call this handler.
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(number: i16) {
     let mut words =
@@ -183,8 +186,8 @@ unsafe fn DefaultHandler(number: i16) {
     end(words)
 }
 
-/// Entry of the hard fault, to which all other faults are escalated. The stack may be the cause of the failure, so
-/// the stack pointer is reset. The address of the old stack is passed in the first argument.
+/// Entry of the hard fault, to which all other faults are escalated. The stack may be the cause of the failure, so this
+/// function resets the stack pointer. The function passes the address of the old stack to `hard_fault_with_stack`.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
@@ -203,7 +206,7 @@ unsafe extern "C" {
 }
 
 extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
-    // Indices of words in the stack frame that the processor pushed, which contains r0..r3, r12, lr, pc and xpsr.
+    // Word indices in the stack frame that the processor pushed. The frame contains r0..r3, r12, lr, pc and xpsr.
     const LR: usize = 5;
     const PC: usize = 6;
     let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);
@@ -212,8 +215,8 @@ extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
         if at < bottom || at + 4 > top || !at.is_multiple_of(4) {
             return 0;
         }
-        // SAFETY: the address is within the stack and aligned. If the old stack was nearly empty, the new one may have
-        // overwritten it; the value is then wrong, but harmless.
+        // SAFETY: the address is within the stack and aligned. If the old stack was nearly empty, the new stack may
+        // have overwritten the old stack frame. The value read is then wrong, but harmless.
         unsafe { (at as *const u32).read_volatile() }
     };
     let (pc, lr) = (word(PC), word(LR));

@@ -1,9 +1,9 @@
-//! Driver of the joint bus, which uses FDCAN1 with dedicated buffers (J-10). Only the tick uses the joint bus, and
-//! the controller does not cause interrupts.
+//! Driver of the joint bus, which uses FDCAN1 with dedicated buffers (J-10). Only the tick uses the joint bus, and the
+//! CAN controller does not cause interrupts.
 //!
-//! At most one frame is sent per tick. There are two transmit buffers, which are used alternately. If a frame is
-//! still unsent when the next tick runs, the tick cancels it. A transmission that has already begun is
-//! completed, but the frame is never sent later. A cancelled frame is reported as unacknowledged.
+//! At most one frame is sent per tick. The driver uses two transmit buffers alternately. If a frame is still unsent
+//! when the next tick runs, the tick cancels the frame. A transmission that has already begun is completed; otherwise
+//! the cancelled frame is never sent. The driver reports a cancelled frame as unacknowledged.
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use embassy_stm32::pac::can::Fdcan as Registers;
@@ -18,26 +18,27 @@ use openjtc_firmware::message_ram as ram;
 
 const CAN: Registers = FDCAN1;
 
-/// Number of times that a register is read while waiting for a change that should take a few clock periods.
+/// Largest number of reads of a register while the driver waits for a change. The change should take a few clock
+/// periods.
 const PATIENCE: u32 = 10_000;
-/// Like `PATIENCE`, for waits within a tick, which must be short. The next tick checks the register again a
+/// Like `PATIENCE`, for waits within a tick, which must be short. The next tick checks the register again one
 /// millisecond later.
 const PATIENCE_IN_TICK: u32 = 100;
 
-/// Frames received since the last tick.
+/// Frames that the joint bus received since the last tick.
 pub struct ReceivedFrames {
     frames: [Frame; ram::RX],
     count: usize,
 }
 
 impl ReceivedFrames {
-    /// Creates an empty list.
+    /// Creates an empty list of frames.
     pub const fn new() -> Self {
         const NONE: Frame = Frame::new(0, &[]).expect("an empty frame is allowed");
         Self { frames: [NONE; ram::RX], count: 0 }
     }
 
-    /// Returns the frames, ordered by identifier.
+    /// Returns the received frames, ordered by identifier.
     pub fn frames(&self) -> &[Frame] {
         self.frames.get(..self.count).unwrap_or(&[])
     }
@@ -50,16 +51,16 @@ impl ReceivedFrames {
     }
 }
 
-/// Error counters of the controller, for the log.
+/// Error counters of the CAN controller, for the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counters {
     /// Transmit error counter.
     pub transmit: u8,
     /// Receive error counter.
     pub receive: u8,
-    /// Number of frames that were cancelled because the next tick had begun.
+    /// Number of frames that were cancelled because the next tick had begun, or not sent because the buffer was in use.
     pub cancelled: u32,
-    /// Number of times that the controller went bus-off.
+    /// Number of times that the CAN controller went bus-off.
     pub bus_off: u32,
     /// Number of received frames that were not CAN FD frames with an 11-bit identifier (J-15).
     pub wrong_format: u32,
@@ -72,9 +73,9 @@ impl Counters {
     }
 }
 
-/// The joint bus.
+/// Driver of the joint bus.
 pub struct Fdcan {
-    /// Transmit buffer of the last frame.
+    /// Number of the transmit buffer that contains the last frame.
     last: usize,
     /// `true` if the last tick wrote a frame into the transmit buffer.
     sent: bool,
@@ -83,7 +84,7 @@ pub struct Fdcan {
 }
 
 impl Fdcan {
-    /// Configures the controller and connects it to the bus.
+    /// Configures the CAN controller and connects it to the joint bus.
     pub fn start() -> Self {
         rcc::enable_and_reset::<peripherals::FDCAN1>();
         CAN.cccr().modify(|w| w.set_init(true));
@@ -99,7 +100,7 @@ impl Fdcan {
         });
         set_timing();
 
-        // The message memory and its check bits are random after power-on.
+        // The contents of the message memory and its check bits are random after power-on.
         for word in 0..ram::BYTES / 4 {
             FDCANRAM.ram(word).write_value(0);
         }
@@ -107,7 +108,7 @@ impl Fdcan {
             FDCANRAM.ram(ram::FILTERS + n).write_value(ram::filter(n));
         }
         CAN.gfc().write(|w| {
-            // Rejects frames that match no filter, and remote frames.
+            // The CAN controller rejects frames that match no filter, and remote frames.
             w.set_anfs(3);
             w.set_anfe(3);
             w.set_rrfs(true);
@@ -129,8 +130,8 @@ impl Fdcan {
         Self { last: 0, sent: false, recovering: false, counters: Counters::new() }
     }
 
-    /// Takes the frames received since the last tick, and returns the state of the bus. Must be called once per tick,
-    /// before `send`.
+    /// Takes the frames received since the last tick, and returns the state of the joint bus. This function must be
+    /// called once per tick, before `send`.
     pub fn poll(&mut self, frames: &mut ReceivedFrames) -> BusState {
         let acknowledged = self.finish_last();
         let off = self.recover();
@@ -149,7 +150,7 @@ impl Fdcan {
         BusState { acknowledged, bus_off: off }
     }
 
-    /// Requests transmission of this tick's frame. Drops the frame while the controller is bus-off.
+    /// Requests transmission of the frame of this tick. Drops the frame while the CAN controller is bus-off.
     pub fn send(&mut self, frame: &Frame) {
         if self.recovering {
             return;
@@ -168,7 +169,8 @@ impl Fdcan {
         self.counters
     }
 
-    /// Returns `true` if the last frame was acknowledged. Cancels the frame if it is still waiting.
+    /// Returns `true` if the last frame was acknowledged. Cancels the last frame if it is still waiting for
+    /// transmission.
     fn finish_last(&mut self) -> bool {
         let sent = core::mem::take(&mut self.sent);
         let bit = 1 << self.last;
@@ -180,17 +182,17 @@ impl Fdcan {
         sent && CAN.txbto().read().0 & bit != 0
     }
 
-    /// Restarts a controller that is bus-off. According to ISO 11898-1, the controller may send again after 129 times
-    /// 11 recessive bits, counted from the restart. Returns `true` while the controller cannot send. During this time
-    /// no frame is sent, and the drives apply their last commanded torque.
+    /// Restarts a CAN controller that is bus-off. According to ISO 11898-1, the CAN controller may send again after 129
+    /// times 11 recessive bits, counted from the restart. Returns `true` while the CAN controller cannot send. During
+    /// this time no frame is sent, and the drives apply their last commanded torque.
     fn recover(&mut self) -> bool {
         let control = CAN.cccr().read();
-        // If INIT is set, the controller has stopped itself. If ASM is set, the controller could not access its
+        // If INIT is set, the CAN controller has stopped itself. If ASM is set, the CAN controller could not access its
         // message memory, and now only listens.
         if control.init() || control.asm() {
             CAN.cccr().modify(|w| w.set_init(true));
             wait(PATIENCE_IN_TICK, || CAN.cccr().read().init());
-            // All transmit requests are cleared when access to the configuration is enabled.
+            // The CAN controller clears all transmit requests when access to its configuration is enabled.
             CAN.cccr().modify(|w| {
                 w.set_cce(true);
                 w.set_asm(false);
@@ -207,7 +209,7 @@ impl Fdcan {
 }
 
 fn set_timing() {
-    // The registers contain these values minus one.
+    // The timing registers contain these values minus one.
     let BitTiming { prescaler, segment1, segment2, jump_width } = timing::NOMINAL;
     CAN.nbtp().write(|w| {
         w.set_nbrp(prescaler - 1);
@@ -229,7 +231,7 @@ fn set_timing() {
     });
 }
 
-/// Leaves the initialisation mode. The bit is cleared in another clock domain and must read 0 before it may be set
+/// Leaves the initialisation mode. The bit INIT is cleared in another clock domain and must read 0 before it may be set
 /// again.
 fn leave_init(patience: u32) {
     CAN.cccr().modify(|w| {
@@ -239,12 +241,12 @@ fn leave_init(patience: u32) {
     wait(patience, || !CAN.cccr().read().init());
 }
 
-/// Calls `done` up to `patience` times until it returns `true`; returns `false` if `done` never returned `true`.
+/// Calls `done` up to `patience` times until it returns `true`. Returns `false` if `done` never returned `true`.
 fn wait(patience: u32, done: impl Fn() -> bool) -> bool {
     (0..patience).any(|_| done())
 }
 
-/// Returns the frame in receive buffer `n`; `None` if the joint bus does not use the format of the frame.
+/// Returns the frame in receive buffer `n`. Returns `None` if the joint bus does not use the format of the frame.
 fn received(n: usize) -> Option<Frame> {
     let word = |i: usize| FDCANRAM.ram(ram::rx(n) + i).read();
     let (head, about) = (word(0), word(1));
@@ -260,8 +262,8 @@ fn received(n: usize) -> Option<Frame> {
     Frame::from_dlc((head >> 18 & 0x7FF) as u16, (about >> 16 & 0xF) as u8, &data)
 }
 
-/// Writes a frame into transmit buffer `n` and requests its transmission. Returns `false` if the buffer is still in
-/// use.
+/// Writes a frame into transmit buffer `n` and requests its transmission. Returns `false` if the transmit buffer is
+/// still in use.
 fn request(n: usize, frame: &Frame) -> bool {
     const FD: u32 = 1 << 21;
     const BIT_RATE_SWITCH: u32 = 1 << 20;
@@ -283,10 +285,10 @@ fn request(n: usize, frame: &Frame) -> bool {
     true
 }
 
-/// Sends zero torque to the drives after a failure of the program, if the bus still works. Stops trying after about a
-/// millisecond. Called from a fault handler, when the state of all other parts is unknown.
+/// Sends zero torque to the drives after a program failure, if the joint bus still works. Stops trying after about one
+/// millisecond. A fault handler calls this function when the state of all other parts of the program is unknown.
 pub fn last_frame() {
-    /// A frame takes 0.1 ms, and up to seven answers of drives may be sent before it.
+    /// Largest number of reads. A frame takes 0.1 ms, and the drives may send up to seven answers before this frame.
     const LOOKS: u32 = 20_000;
     if !embassy_stm32::pac::RCC.apb1henr().read().fdcanen() || CAN.cccr().read().init() {
         return;

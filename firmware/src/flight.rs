@@ -2,11 +2,11 @@
 //!
 //! The record is in memory that survives a reset, under the symbol `FLIGHT`. Every tick writes its inputs before the
 //! controller runs, and its outputs afterwards. A tool that reads the record after every tick can repeat these ticks on
-//! a PC, and must compute bit-identical outputs. For host frames, the record contains only type, length and CRC. The
-//! bytes of the frames are known only to the host.
+//! a PC, and must compute bit-identical outputs. For host frames, the record contains only type, length and CRC. Only
+//! the host knows the bytes of these frames.
 //!
-//! All numbers are little-endian, as in the processor's memory. The structures below define the layout and have no
-//! hidden padding. [`Flight::LAYOUT`] changes if the layout changes.
+//! All numbers in the record are little-endian, as in the memory of the processor. The structures in this module define
+//! the layout and have no hidden padding. If the layout changes, [`Flight::LAYOUT`] must change.
 use jtc_bus::{Frame, MAX_LEN};
 use jtc_core::{BusState, HOST_LINES, HostEvent, Inputs, JOINTS, Telemetry};
 use jtc_wire::{EVENTS_MAX, LinkEvent, UrgentCommand, UrgentCommands};
@@ -17,7 +17,7 @@ use crate::message_ram::RX;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightFrame {
-    /// Identifier.
+    /// Identifier of the frame.
     pub id: u16,
     /// Number of payload bytes.
     pub len: u16,
@@ -40,19 +40,18 @@ impl FlightFrame {
         Self { id: frame.id, len: payload.len() as u16, data }
     }
 
-    /// Returns the frame; `None` for [`NO_FRAME`].
+    /// Returns the frame. Returns `None` if `id` is [`NO_FRAME`].
     pub fn frame(&self) -> Option<Frame> {
         Frame::new(self.id, self.data.get(..self.len.into())?)
     }
 }
 
-/// Event from the host.
+/// Event that a host has caused.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
     /// Kind of the event: 0 is no event, 1 a valid frame, 2 an invalid frame, 3 noise. Bit 6 is set if the event
-    /// arrived on a line without extensions. Bit 7 is set if the controller received an urgent command after the
-    /// event.
+    /// arrived on a line without extensions. Bit 7 is set if the controller received Stop or Pause after the event.
     pub kind: u8,
     /// Serial line on which the event arrived: 0 is RS422, 1 is USB.
     pub line: u8,
@@ -60,14 +59,14 @@ pub struct FlightEvent {
     pub frame_type: u8,
     /// Frame status that the controller will report.
     pub status: u8,
-    /// Length of the frame in bytes, 0 if unknown.
+    /// Length of the frame in bytes; 0 if unknown.
     pub len: u16,
-    /// CRC of the frame if it is valid, otherwise 0.
+    /// CRC of the frame; 0 if the frame is invalid.
     pub crc: u16,
 }
 
-/// Urgent commands that arrived on a line: pairs of kind (1 is Stop, 2 is Pause) and count. The kind that was
-/// received last is at the end.
+/// Urgent commands that arrived on a line: pairs of kind (1 is Stop, 2 is Pause) and count. The kind that was received
+/// last is the last pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightUrgent(pub [[u8; 2]; 2]);
@@ -81,7 +80,7 @@ impl FlightUrgent {
         Self(all)
     }
 
-    /// Returns the commands.
+    /// Returns the urgent commands.
     pub fn commands(&self) -> UrgentCommands {
         let mut commands = UrgentCommands::NONE;
         for [command, count] in self.0 {
@@ -96,9 +95,9 @@ impl FlightUrgent {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Flight {
-    /// [`Flight::MAGIC`].
+    /// Identification of the record, which is [`Flight::MAGIC`].
     pub magic: u32,
-    /// [`Flight::LAYOUT`].
+    /// Layout version of the record, which is [`Flight::LAYOUT`].
     pub layout: u16,
     /// Size of the record, bytes.
     pub size: u16,
@@ -106,7 +105,7 @@ pub struct Flight {
     pub phase: u32,
     /// Cause of the start of this program, as the code of a [`crate::reset::Cause`].
     pub cause: u32,
-    /// Number of the tick, counted from 1.
+    /// Number of the tick; the first tick is 1.
     pub tick: u64,
 
     // Inputs:
@@ -114,22 +113,23 @@ pub struct Flight {
     pub bus_state: u8,
     /// Level of the safety input.
     pub safety_input: u8,
-    /// Value 1 if both lines could accept a status, otherwise 0.
+    /// 1 if both serial lines could accept a status, otherwise 0.
     pub status_free: u8,
     /// Number of frames in `received`.
     pub received_count: u8,
-    /// Number of frames with a wrong format that arrived since the start (J-15). These frames are not in `received`.
+    /// Number of frames with a wrong format that arrived since program start (J-15). These frames are not in
+    /// `received`.
     pub wrong_format: u32,
-    /// Stop and Pause commands that arrived on each line.
+    /// Stop and Pause commands that arrived on each serial line.
     pub urgent: [FlightUrgent; HOST_LINES],
     /// Number of host events that were passed to the controller.
     pub event_count: u8,
     reserved: u8,
-    /// Number of ticks before this one that were missed or late.
+    /// Number of ticks directly before this tick that were missed or late.
     pub missed_ticks: u16,
     /// The host events, oldest first.
     pub events: [FlightEvent; EVENTS_MAX],
-    /// Frames received since the last tick.
+    /// Frames that the joint bus received since the last tick.
     pub received: [FlightFrame; RX],
 
     // Outputs:
@@ -139,7 +139,7 @@ pub struct Flight {
     pub trajectory: u8,
     /// Level of the safety output.
     pub safety_output: u8,
-    /// Value 1 if a status was sent, otherwise 0.
+    /// 1 if the controller sent a status, otherwise 0.
     pub status: u8,
     /// Frame that was sent on the joint bus.
     pub sent: FlightFrame,
@@ -159,17 +159,17 @@ pub struct Flight {
 const _: () = assert!(size_of::<Flight>() == 848 && core::mem::offset_of!(Flight, torque) == 800);
 
 impl Flight {
-    /// First word of a record, which contains "JTCF".
+    /// First word of a record, which contains the letters "JTCF".
     pub const MAGIC: u32 = u32::from_le_bytes(*b"JTCF");
     /// Version of the layout of the record.
     pub const LAYOUT: u16 = 3;
     /// Value of `record_line` for a status without a response record.
     pub const NO_LINE: u8 = 0xFF;
-    /// No tick has begun yet.
+    /// Progress: no tick has begun yet.
     pub const PHASE_NONE: u32 = 0;
-    /// The inputs belong to tick number `tick`, the outputs to the previous tick.
+    /// Progress: the inputs belong to tick number `tick`, the outputs to the previous tick.
     pub const PHASE_INPUTS: u32 = 1;
-    /// Inputs and outputs belong to tick number `tick`.
+    /// Progress: inputs and outputs belong to tick number `tick`.
     pub const PHASE_COMPLETE: u32 = 2;
 
     /// Creates the record before the first tick.
@@ -212,7 +212,7 @@ impl Flight {
             && usize::from(self.size) == size_of::<Self>()
     }
 
-    /// Records the inputs of the next tick.
+    /// Records the inputs of the tick that begins.
     pub fn begin(&mut self, inputs: &Inputs<'_>, wrong_format: u32) {
         self.phase = Self::PHASE_INPUTS;
         self.tick += 1;

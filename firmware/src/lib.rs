@@ -1,8 +1,9 @@
-//! The parts of the firmware that do not depend on hardware: clock arithmetic, the memory layout of the CAN
-//! controller, the statuses for two serial lines, the causes of a reset, and the records that tools read.
+//! This library contains the parts of the firmware that do not depend on hardware. These parts are clock arithmetic,
+//! the memory layout of the CAN controller, the statuses for two serial lines, the causes of a reset, and the records
+//! that tools read.
 //!
-//! The program itself is in `main.rs` and its modules, and is built only for the board. This library is also built
-//! and tested on the PC with `cargo test --target x86_64-unknown-linux-gnu`.
+//! The program itself is in `main.rs` and its modules, and is built only for the board. This library is also built for
+//! the PC, and tested on the PC with `cargo test --target x86_64-unknown-linux-gnu`.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

@@ -1,12 +1,12 @@
-//! Statuses for the two serial lines of one controller. A response record is sent on the line on which its
-//! frame arrived. The status on the other line does not contain the record (J-04).
+//! Statuses for the two serial lines of one controller. The controller sends a response record on the line on which the
+//! answered frame arrived. The status on the other line does not contain the record (J-04).
 use jtc_wire::{STATUS_LEN, crc16, field::status as field};
 
-/// Serial lines.
+/// Number of serial lines.
 pub const LINES: usize = jtc_core::HOST_LINES;
-/// RS422.
+/// Index of the RS422 line.
 pub const RS422: usize = 0;
-/// The virtual serial port of the ST-LINK.
+/// Index of the USB line, which is the virtual serial port of the ST-LINK.
 pub const USB: usize = 1;
 
 /// Returns a copy of the status without its response record.

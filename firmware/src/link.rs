@@ -1,9 +1,10 @@
-//! The links, which convert received bytes to frames. Each serial line has its own parser, whose events are
-//! passed to the tick in batches, through one slot.
+//! The links, which convert received bytes to frames. Each serial line has its own parser. The link loop passes the
+//! events of the parsers to the tick in batches, through one slot.
 //!
-//! A batch is a copy, so that a parser can accept more bytes while the tick executes a long frame in slices. If bytes
-//! arrive faster than the tick executes frames, the parser's buffer becomes full, then the ring. After that, bytes
-//! are lost. Stop and Pause are not lost, because the tick itself searches the received bytes for these commands.
+//! A batch is a copy of the events, so that a parser can accept more bytes while the tick executes a long frame in
+//! slices. If bytes arrive faster than the tick executes frames, first the buffer of the parser becomes full, then the
+//! DMA ring. When the ring is full, bytes are lost. Stop and Pause are not lost, because the tick itself searches the
+//! received bytes for these commands.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -19,33 +20,33 @@ use crate::uart;
 
 /// Inter-byte timeout, µs. A frame ends if the line is silent for this time (J-03).
 pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
-/// Largest number of bytes that are passed to a parser in one call.
+/// Largest number of bytes that the link loop passes to a parser in one call.
 const CHUNK: usize = 1024;
-/// Largest number of passes of the loop before the links wait for the next tick.
+/// Largest number of passes of the link loop before the loop waits for the next tick.
 const ROUNDS: usize = 64;
-/// Largest number of bytes by which the links may lag DMA. DMA overwrites bytes that are older than the length of
-/// the ring, and DMA continues while the links read.
+/// Largest number of bytes by which DMA may be ahead of the link loop. DMA overwrites bytes that are older than the
+/// length of the ring, and DMA continues while the link loop reads.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
-/// Number of passes of the links. The tick reads this number to detect that the links have stopped.
+/// Number of passes of the link loop. The tick reads this number to detect that the link loop has stopped.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
-/// Number of bytes received on each line, modulo 2³², at the last tick.
+/// Number of bytes that each line had received at the last tick, modulo 2³².
 pub static RECEIVED: [AtomicU32; lines::LINES] = [const { AtomicU32::new(0) }; lines::LINES];
 
-/// A cell through which links and tick pass the slot to each other. Only the side that owns the reference may use the
-/// slot.
+/// A cell through which the link loop and the tick pass the slot to each other. Only the side that owns the reference
+/// may use the slot.
 type Place = Mutex<Cell<Option<&'static mut EventBatch>>>;
 static FULL: Place = Mutex::new(Cell::new(None));
 static EMPTY: Place = Mutex::new(Cell::new(None));
 
-/// The links' side of the slot, with the batch that the links fill.
+/// The side of the slot that belongs to the link loop, with the batch that the loop fills.
 pub struct SlotIn(Option<&'static mut EventBatch>);
 
-/// The tick's side of the slot, with the batch that the tick executes.
+/// The side of the slot that belongs to the tick, with the batch that the tick executes.
 pub struct SlotOut(Option<&'static mut EventBatch>);
 
-/// Creates both sides of the slot, which is empty at first.
+/// Creates both sides of the slot. The slot is empty at first.
 pub fn slot(memory: &'static mut EventBatch) -> (SlotIn, SlotOut) {
     critical_section::with(|cs| EMPTY.borrow(cs).set(Some(memory)));
     (SlotIn(None), SlotOut(None))
@@ -69,7 +70,7 @@ impl SlotIn {
 }
 
 impl SlotOut {
-    /// Returns the batch until all of its events are processed.
+    /// Returns the batch until all events of the batch are processed.
     pub fn batch(&mut self) -> Option<&EventBatch> {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
@@ -77,7 +78,7 @@ impl SlotOut {
         self.0.as_deref()
     }
 
-    /// Marks the oldest `count` events as processed.
+    /// Marks the oldest `count` events of the batch as processed.
     pub fn done(&mut self, count: usize) {
         if let Some(batch) = &mut self.0 {
             batch.done(count);
@@ -88,18 +89,18 @@ impl SlotOut {
     }
 }
 
-/// A serial line and its parser.
+/// Link of a serial line, with the parser of the line.
 pub struct Link {
     line: usize,
     uart: uart::Receiver,
     parser: Receiver<&'static mut [u8]>,
     /// Number of bytes taken from the line, including lost bytes.
     taken: u64,
-    /// Number of bytes that were lost.
+    /// Number of received bytes that were lost.
     lost: u64,
-    /// Time at which the ring was last checked, µs.
+    /// Time at which the DMA ring was last checked, µs.
     looked_us: u64,
-    /// Number of bytes that were in the ring at the last check.
+    /// Number of bytes that were in the DMA ring at the last check.
     left: usize,
 }
 
@@ -110,11 +111,11 @@ impl Link {
         Self { line, uart, parser, taken: 0, lost: 0, looked_us: 0, left: 0 }
     }
 
-    /// Takes the bytes that have arrived and searches for an event. Returns `true` if the function must be called
-    /// again at once.
+    /// Takes the received bytes out of the DMA ring and searches them for an event. Returns `true` if this function
+    /// must be called again at once.
     fn receive(&mut self) -> bool {
-        // The clock is read before the bytes. Otherwise, if a byte arrives between the two reads, the measured
-        // silence before this byte would be too long.
+        // The clock is read before the bytes. If the clock were read after the bytes, and a byte arrived between the
+        // two reads, the measured silence before this byte would be too long.
         let now = Instant::now().as_micros();
         self.catch_up();
         let waiting = self.uart.waiting();
@@ -137,11 +138,11 @@ impl Link {
         self.taken += count as u64;
     }
 
-    /// Drops all waiting bytes if DMA may have overwritten bytes that were not taken yet.
+    /// Drops all waiting bytes if DMA may have overwritten some of them.
     fn catch_up(&mut self) {
         let received = RECEIVED[self.line].load(Ordering::Relaxed);
         let behind = received.wrapping_sub(self.taken as u32);
-        // The difference is negative if bytes were taken since the last tick.
+        // The difference is negative if the link loop took bytes after the last tick.
         if behind > BEHIND && behind < 1 << 31 {
             self.lost += u64::from(behind);
             self.taken += u64::from(behind);
@@ -151,8 +152,9 @@ impl Link {
         }
     }
 
-    /// Passes the first of `new` bytes to the parser, with its time of arrival, which determines if there was a gap
-    /// before it. The time is `now` minus the duration of `new` bytes, but not before the last check of the ring.
+    /// Passes the first of `new` bytes to the parser, with the time of arrival of this byte. The time determines if
+    /// there was a gap before the byte. The time is `now` minus the transmission time of `new` bytes, but not before
+    /// the last check of the DMA ring.
     fn begin(&mut self, now: u64, new: usize) {
         let first = (now.saturating_sub(duration_us(new))).max(self.looked_us);
         let mut byte = [0];
@@ -160,7 +162,7 @@ impl Link {
         self.take(taken);
     }
 
-    /// Adds the parser's event to the batch if there is space.
+    /// Adds the event of the parser to the batch if the batch has space.
     fn hand_over(&mut self, slot: &mut SlotIn) -> bool {
         let moved = self.parser.received(self.line).is_some_and(|received| slot.push(&received));
         if moved {
@@ -170,15 +172,16 @@ impl Link {
     }
 }
 
-/// Returns the transmission time of `bytes`, with ten bits per byte.
+/// Returns the transmission time of `bytes` in µs, with ten bits per byte.
 fn duration_us(bytes: usize) -> u64 {
     bytes as u64 * 10_000_000 / u64::from(BAUD)
 }
 
-/// Serves both lines, stores arms, and computes the checksum of the program in flash. Never returns.
+/// Serves both serial lines, stores arms, and computes the checksum of the program in flash. This function never
+/// returns.
 pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
-    // Line that is served next. The lines alternate, so that a line that fills the slot does not block the other
-    // line.
+    // Line that is served next. The loop alternates between the lines, so that a line that fills the slot does not
+    // block the other line.
     let mut turn = 0;
     let mut report = Report::new();
     let mut program = program::Reader::new();
@@ -208,8 +211,8 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: S
     }
 }
 
-/// Logs changes, at most once a second. Each log line contains only one number. Interrupts are masked while a line is
-/// written, and the tick must begin in time.
+/// Logs changes, at most once a second. Each log line contains only one number, because interrupts are masked while a
+/// line is written, and the tick must begin in time.
 struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],

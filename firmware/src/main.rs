@@ -1,13 +1,15 @@
 //! Firmware of the joint trajectory controller.
 //!
 //! Two parts share the processor. The *tick* ([`tick`]) is an interrupt with the highest priority that runs a thousand
-//! times per second. The tick owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed
-//! by more than a few instructions. The *links* ([`link`]) run in the remaining time, take bytes from both serial lines
-//! and split them into frames. The links pass frames to the tick in batches, through one slot. The tick passes statuses
-//! directly to the DMA of the lines. Stop and Pause do not depend on the links or the slot, because the tick searches
-//! the received bytes for these commands. The links also write the stored arm ([`arm_store`]), one step per pass.
+//! times per second. The tick owns the controller, the joint bus, the safety wires and the LEDs. The start of a tick is
+//! never delayed by more than a few instructions. The *links* ([`link`]) run in the remaining time, take bytes from
+//! both serial lines and split the bytes into frames. The links pass frames to the tick in batches, through one slot.
+//! The tick passes statuses directly to the DMA of the serial lines. Stop and Pause do not depend on the links or the
+//! slot, because the tick searches the received bytes for these commands. The links also write the stored arm
+//! ([`arm_store`]), one step per pass.
 //!
-//! All code that does not access hardware is in the library of this package and in `jtc-core`, and is tested on a PC.
+//! All code that does not access hardware is in the library of this package and in `jtc-core`. This code is tested on a
+//! PC.
 #![no_std]
 #![no_main]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -65,7 +67,8 @@ async fn main(_spawner: Spawner) {
     let memory::Memory { points, rings, statuses, receive, batch, arms, recorder } =
         memory::take(boot.lost_power);
     let store = arm_store::load(arms);
-    // Reads the complete memory of the recorder. This read is slow, so it must be done before the watchdog starts.
+    // `Recorder::new` reads the complete memory of the flight recorder. Reading this memory is slow, so it must be done
+    // before the watchdog starts.
     let recorder = Recorder::new(recorder, boot.cause.failed());
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;

@@ -1,7 +1,8 @@
-//! Layout of the CAN controller's message memory, with the filters and the position of each buffer (J-10).
+//! Layout of the message memory of the CAN controller, with the filters and the position of each buffer (J-10).
 //!
 //! Each of the 21 possible answers of the nodes has a dedicated buffer. The buffers are in the order of the
-//! identifiers. The controller rejects all other frames. A buffer that was not read is not overwritten.
+//! identifiers. The CAN controller rejects all other frames, and never overwrites a buffer that the program has not
+//! read yet.
 use jtc_bus::{MAX_LEN, NODES, id};
 
 /// Size of the message memory, bytes.
@@ -11,7 +12,7 @@ pub const RX: usize = 3 * NODES;
 /// Number of transmit buffers. The two buffers are for the frame of this tick, and for the frame of the last tick
 /// while it is being cancelled.
 pub const TX: usize = 2;
-/// Number of words per buffer: two words for the header, and the other words for the payload.
+/// Number of words per buffer: two words for the frame header, and the other words for the payload.
 pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;
 /// Code of a 24-byte payload in RXESC and TXESC.
 pub const SIZE_CODE: u8 = 4;
@@ -22,23 +23,23 @@ pub const FILTERS: usize = 0;
 pub const RX_BUFFERS: usize = FILTERS + RX;
 /// Index of the first word of the transmit buffers.
 pub const TX_BUFFERS: usize = RX_BUFFERS + RX * BUFFER_WORDS;
-/// Number of words of the message memory that are used.
+/// Number of words of the message memory that the program uses.
 pub const END: usize = TX_BUFFERS + TX * BUFFER_WORDS;
 
 const _: () = {
     assert!(END * 4 <= BYTES);
-    // The codes 0..4 mean 8, 12, 16, 20 and 24 bytes.
+    // The size codes 0..4 mean 8, 12, 16, 20 and 24 bytes.
     assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
-    // All receive buffers must have their new-data flags in a single register.
+    // The new-data flags of all receive buffers must be in a single register.
     assert!(RX <= 32 && TX <= 32);
 };
 
-/// Returns the first word of receive buffer `n`.
+/// Returns the index of the first word of receive buffer `n`.
 pub const fn rx(n: usize) -> usize {
     RX_BUFFERS + n * BUFFER_WORDS
 }
 
-/// Returns the first word of transmit buffer `n`.
+/// Returns the index of the first word of transmit buffer `n`.
 pub const fn tx(n: usize) -> usize {
     TX_BUFFERS + n * BUFFER_WORDS
 }

@@ -13,7 +13,7 @@ pub enum Cause {
     Software = 3,
     /// The tick did not complete in time.
     Watchdog = 4,
-    /// A hard fault of the processor occurred.
+    /// The processor took a hard fault.
     HardFault = 5,
     /// The program panicked: it reached a state that should be impossible.
     Panic = 6,
@@ -39,12 +39,12 @@ impl Cause {
     }
 }
 
-/// Kind of failure that ended the program; survives the reset.
+/// Kind of failure that ended the program. The record of the failure survives the reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// Hard fault.
+    /// The processor took a hard fault.
     HardFault,
-    /// Panic.
+    /// The program panicked.
     Panic,
 }
 
@@ -59,10 +59,10 @@ pub const fn lost_power(rsr: u32) -> bool {
     rsr & (POWER_ON | BROWN_OUT) != 0
 }
 
-/// Determines the cause from the register RCC_RSR and from the data of the previous program run.
+/// Determines the cause of the start from the register RCC_RSR and from the data of the previous program run.
 ///
-/// Every reset pulls the reset pin, so the pin's flag is checked last. `failure` is used only if the program itself
-/// requested the reset, or if the watchdog caused the reset before the request.
+/// Every reset pulls the reset pin, so the function checks the pin's flag last. The function uses `failure` only if the
+/// program itself requested the reset, or if the watchdog caused the reset before the program could request it.
 pub const fn cause(rsr: u32, failure: Option<Failure>) -> Cause {
     match failure {
         _ if lost_power(rsr) => Cause::PowerOn,
@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn each_cause_is_told_from_the_others() {
-        // Flags that the chip reports; every cause except a wake-up also sets the flag of the reset pin.
+        // The arguments are combinations of flags that the chip reports. Every cause except a wake-up also sets the
+        // flag of the reset pin.
         assert_eq!(cause(POWER_ON | BROWN_OUT | PIN, None), Cause::PowerOn);
         assert_eq!(cause(BROWN_OUT | PIN, None), Cause::PowerOn);
         assert_eq!(cause(PIN, None), Cause::Pin);

@@ -14,7 +14,7 @@ pub struct Summary {
     pub errors: u16,
     /// Error counters of the joint bus.
     pub bus: Counters,
-    /// Number of ticks that were skipped because the tick before took too long.
+    /// Number of ticks that were skipped because the previous tick took too long.
     pub left_out: u32,
 }
 
@@ -24,7 +24,7 @@ impl Summary {
         Self { state: 0, errors: 0, bus: Counters::new(), left_out: 0 }
     }
 
-    /// Logs the values that have changed since `last`, one line per value.
+    /// Logs the values that have changed since `last`, with one log line per value.
     pub fn log(&self, last: &Self) {
         let (bus, before) = (&self.bus, &last.bus);
         if self.state != last.state {

@@ -1,6 +1,6 @@
-//! The tick, which is the interrupt of TIM7 with the highest priority, a thousand times per second. The tick owns the
-//! controller and all hardware that moves or stops the arm. The tick shares only the slot and a summary for the log
-//! with the other parts of the program.
+//! The tick, which is the interrupt of TIM7. The interrupt has the highest priority and occurs a thousand times per
+//! second. The tick owns the controller and all hardware that moves or stops the arm. The tick shares only the slot and
+//! a summary for the log with the other parts of the program.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -30,40 +30,41 @@ use crate::program;
 use crate::summary::{self, Summary};
 use crate::uart::{self, Lookahead, Transmitter};
 
-/// The controller; the trajectory is in separate memory.
+/// The trajectory controller, whose trajectory is in separate memory.
 type Jtc = Controller<&'static mut [RawPoint]>;
 
-/// The flight recorder; its blocks are in separate memory.
+/// The flight recorder, whose blocks are in separate memory.
 pub type FlightRecorder = Recorder<&'static mut [Block], 3>;
 
-/// Largest number of bytes of a line that a tick searches. At 15 MBd, fewer bytes arrive in two ticks.
+/// Largest number of received bytes of one line that a tick searches. At 15 MBd, fewer bytes arrive in two ticks.
 const LOOK_MAX: usize = 4096;
 
-/// Number of ticks without activity of the links after which the arm is stopped, because a host could not stop it then.
+/// Number of ticks without a pass of the links after which the tick stops the arm. Without the links, the tick receives
+/// no frames of a host except Stop and Pause.
 const LINKS_SILENT_ERROR: u32 = 100;
-/// Number of ticks without activity of the links after which the tick stops feeding the watchdog, so that the watchdog
+/// Number of ticks without a pass of the links after which the tick stops feeding the watchdog. The watchdog then
 /// resets the processor.
 const LINKS_SILENT_RESET: u32 = 200;
 
-/// Parts of the firmware that a tick needs.
+/// Parts of the firmware that the tick needs.
 pub struct Parts {
     /// Memory for the trajectory.
     pub points: &'static mut [RawPoint],
-    /// Joint bus.
+    /// Driver of the joint bus.
     pub can: Fdcan,
-    /// Safety wires and LEDs.
+    /// Safety pins and LEDs.
     pub pins: Pins,
     /// Readers that search the received bytes for Stop and Pause.
     pub ahead: [Lookahead; lines::LINES],
     /// Slot with the events of the hosts.
     pub slot: SlotOut,
-    /// RS422, USB.
+    /// Transmitters of the serial lines RS422 and USB.
     pub lines: [Transmitter; lines::LINES],
     /// Watchdog that resets the processor if no tick completes in time.
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
-    /// The flight recorder, which contains the records from before this program start.
+    /// Flight recorder, which contains the records from before this program start.
     pub recorder: FlightRecorder,
-    /// Cause and data of this start.
+    /// Cause of this program start, and data of the previous program run.
     pub boot: Boot,
 }
 
@@ -81,14 +82,14 @@ struct Tick {
     recorder: FlightRecorder,
     links: Links,
     left_out: u32,
-    /// Result of the last attempt to store an arm, and the number of the attempt.
+    /// Result of the last attempt to store an arm, and the number of that attempt.
     stored: arm_store::Progress,
     stored_number: u32,
     /// Time at which the last tick began.
     began: Option<Instant>,
 }
 
-/// Checks that the links are active.
+/// Monitor that detects if the links have stopped.
 #[derive(Default)]
 struct Links {
     rounds: u32,
@@ -96,7 +97,7 @@ struct Links {
 }
 
 impl Links {
-    /// Returns the number of ticks since the last activity of the links.
+    /// Returns the number of ticks since the last pass of the links.
     fn silent(&mut self) -> u32 {
         let rounds = link::ROUNDS_DONE.load(Ordering::Relaxed);
         self.silent = if rounds == self.rounds { self.silent.saturating_add(1) } else { 0 };
@@ -105,18 +106,18 @@ impl Links {
     }
 }
 
-/// Data that only the tick uses. The interrupt takes the data out while it runs.
+/// Data that only the tick uses. The interrupt handler takes the data out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
-/// Creates the controller in its static memory. Not inlined, because the controller is large and is created on the
-/// stack. After this function returns, its stack is free again.
+/// Creates the trajectory controller in its static memory. The function is not inlined, because the controller is large
+/// and is created on the stack. After this function returns, that part of the stack is free again.
 #[inline(never)]
 fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
     static PLACE: StaticCell<Jtc> = StaticCell::new();
     PLACE.init_with(|| Controller::new(Config::default(), points))
 }
 
-/// Starts the ticks. Not inlined, so that the stack of this function is free again after it returns.
+/// Starts the timer of the ticks. The function is not inlined, so that its stack is free again after it returns.
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
@@ -156,19 +157,19 @@ pub fn start(parts: Parts) {
     rcc::enable_and_reset::<TIM7>();
     pac::TIM7.psc().write_value((clock::TICK_PRESCALER - 1) as u16);
     pac::TIM7.arr().write(|w| w.set_arr((clock::TICK_US - 1) as u16));
-    // Prescaler and period take effect at an update event, which must not cause a tick.
+    // Prescaler and period of the timer take effect at an update event, which must not cause a tick.
     pac::TIM7.egr().write(|w| w.set_ug(true));
     pac::TIM7.sr().write(|w| w.set_uif(false));
     pac::TIM7.dier().write(|w| w.set_uie(true));
     interrupt::TIM7.set_priority(Priority::P0);
-    // By default, the interrupt of the HAL's time driver has the priority of the tick.
+    // By default, the interrupt of the HAL's time driver has the same priority as the tick.
     interrupt::TIM5.set_priority(crate::clocks::LOW);
     // SAFETY: everything that the interrupt handler uses is initialised.
     unsafe { interrupt::TIM7.enable() };
     pac::TIM7.cr1().write(|w| w.set_cen(true));
 }
 
-/// Uses the stored arm from the start (J-54).
+/// Passes the stored arm to the controller at program start (J-54).
 #[inline(never)]
 fn load_arm(controller: &mut Jtc) {
     match arm_store::loaded() {
@@ -223,8 +224,8 @@ impl Tick {
         if let Some(frame) = &outputs.bus {
             self.can.send(frame);
         }
-        // The record is written before the executed frames are returned to the links, and after all actions on which
-        // the arm depends.
+        // The tick writes the record after all actions that affect the arm, and before it returns the executed frames
+        // to the links.
         record_step(&mut self.recorder, self.controller, &inputs, &outputs);
         self.slot.done(outputs.host_done);
         if outputs.status {
@@ -243,7 +244,7 @@ impl Tick {
         if silent == LINKS_SILENT_ERROR {
             self.controller.raise_internal();
         }
-        // The tick is complete. Only this line of code prevents the watchdog from resetting the processor.
+        // The tick is complete. Only this call of `pet` prevents the watchdog from resetting the processor.
         if silent < LINKS_SILENT_RESET {
             self.watchdog.pet();
         }
@@ -283,8 +284,8 @@ impl Tick {
         }
     }
 
-    /// Computes, from the microseconds between two ticks, how many ticks were missed between them or were late by
-    /// half a tick or more.
+    /// Returns the number of ticks since the last call that were missed, or were late by at least half a tick. The
+    /// function computes this number from the time between two ticks.
     fn missed_ticks(&mut self) -> u16 {
         let now = Instant::now();
         let before = self.began.replace(now).unwrap_or(now);
@@ -293,7 +294,8 @@ impl Tick {
         u16::try_from(periods.saturating_sub(1)).unwrap_or(u16::MAX)
     }
 
-    /// Skips a tick that is already due, because drives must not receive two frames without a pause (J-12).
+    /// Skips a tick that is already due, because the drives must not receive two frames without a pause between the
+    /// frames (J-12).
     fn leave_out_late_tick(&mut self) {
         if pac::TIM7.sr().read().uif() {
             pac::TIM7.sr().write(|w| w.set_uif(false));
@@ -302,22 +304,22 @@ impl Tick {
     }
 }
 
-/// Runs one step of the controller. The function is separate, so that its instructions can be counted by its symbol.
+/// Runs one step of the controller. The function is separate, so that tools can count its instructions by its symbol.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
     controller.tick(inputs)
 }
 
-/// Runs the flight recorder after the step. The function is separate, so that its instructions can be counted by its
-/// symbol.
+/// Runs the flight recorder after the step of the controller. The function is separate, so that tools can count its
+/// instructions by its symbol.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn record_step(recorder: &mut FlightRecorder, controller: &mut Jtc, inputs: &Inputs<'_>, outputs: &Outputs) {
     recorder.record(controller, inputs, outputs);
 }
 
-/// Value for array elements without an event.
+/// Initial value of array elements that contain no event.
 const NO_EVENT: HostEvent<'_> = HostEvent {
     line: lines::RS422,
     overtaken: false,
@@ -325,7 +327,7 @@ const NO_EVENT: HostEvent<'_> = HostEvent {
     event: LinkEvent::Noise(Response::NONE),
 };
 
-/// Converts the events of the batch for the controller; returns their number.
+/// Converts the events of the batch to host events of the controller. Returns the number of these host events.
 fn collect<'a>(
     batch: &'a EventBatch,
     watch: &UrgentWatch<{ lines::LINES }>,
@@ -341,7 +343,7 @@ fn collect<'a>(
     count
 }
 
-/// Sends a status on both lines. Only the status on the line of the answered frame contains the response record
+/// Sends a status on both serial lines. Only the status on the line of the answered frame contains the response record
 /// (J-04).
 fn send(lines: &mut [Transmitter; lines::LINES], record_line: Option<usize>, status: &[u8; STATUS_LEN]) {
     let other = if record_line.is_some() { lines::without_record(status) } else { *status };

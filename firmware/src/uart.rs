@@ -1,8 +1,8 @@
-//! A serial line. DMA writes received bytes into a ring and never stops, even after line errors. Statuses are sent
-//! by DMA, which the tick starts.
+//! Driver of a serial line. DMA writes received bytes into a ring and never stops, even after line errors. The tick
+//! starts the DMA that sends statuses.
 //!
-//! Bytes do not cause interrupts. The tick searches the ring for Stop and Pause. The links check the ring after
-//! every tick, and immediately if the line becomes idle.
+//! Received bytes do not cause interrupts. The tick searches the ring for Stop and Pause. The links check the ring
+//! after every tick, and immediately when the line becomes idle.
 use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
@@ -23,10 +23,10 @@ use openjtc_firmware::clock::Baud;
 
 use crate::clocks;
 
-/// Event that wakes the links when a tick has ended or a line has become idle.
+/// Event that wakes the links when a tick has ended or a serial line has become idle.
 pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Number of bytes per ring, which is enough for about 21 ms at 15 MBd.
+/// Number of bytes per DMA ring, which is enough for about 21 ms at 15 MBd.
 pub const RING: usize = 32 * 1024;
 
 /// A USART and the streams of DMA1 that transfer its bytes.
@@ -38,7 +38,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// USART2.
+    /// Returns USART2 as a serial line.
     pub fn usart2(_usart: Peri<'static, USART2>) -> Self {
         rcc::enable_and_reset::<USART2>();
         Self {
@@ -49,7 +49,7 @@ impl Line {
         }
     }
 
-    /// USART3.
+    /// Returns USART3 as a serial line.
     pub fn usart3(_usart: Peri<'static, USART3>) -> Self {
         rcc::enable_and_reset::<USART3>();
         Self {
@@ -61,11 +61,11 @@ impl Line {
     }
 }
 
-/// Stream of DMA1, and the multiplexer request that starts its transfers.
+/// Stream of DMA1, and the multiplexer request that starts the transfers of the stream.
 #[derive(Clone, Copy)]
 struct Stream {
     registers: St,
-    /// Register that clears the flags of the stream, and bit mask of these flags.
+    /// Register that clears the flags of the DMA stream, and bit mask of these flags.
     clear: Reg<Ixr, W>,
     flags: Ixr,
     multiplexer: Reg<Ccr, RW>,
@@ -74,7 +74,7 @@ struct Stream {
 
 impl Stream {
     const fn new(number: usize, request: u8) -> Self {
-        // Each DMA stream has five flags; four streams share a register.
+        // Each DMA stream has five flags, and four streams share a register.
         const SHIFT: [u32; 4] = [0, 6, 16, 22];
         Self {
             registers: DMA1.st(number),
@@ -85,7 +85,7 @@ impl Stream {
         }
     }
 
-    /// Configures transfers of bytes between a register and memory. `start` starts the transfers.
+    /// Configures a DMA stream for transfers of bytes between a register and memory. `start` starts the transfers.
     fn configure(self, direction: Dir, register: *mut (), memory: *mut u8, ring: bool) {
         self.multiplexer.write(|w| w.set_dmareq_id(self.request));
         let stream = self.registers;
@@ -97,20 +97,20 @@ impl Stream {
             w.set_minc(true);
             w.set_psize(Size::BITS8);
             w.set_msize(Size::BITS8);
-            // Reception must not wait, so its priority is higher than the priority of transmission.
+            // Reception must not wait, so its DMA stream has a higher priority than the stream for transmission.
             w.set_pl(if ring { Pl::VERY_HIGH } else { Pl::LOW });
-            // A USART needs buffered transfers, because without buffered transfers the stream can lock up.
+            // A USART needs buffered transfers, because without buffered transfers the DMA stream can lock up.
             w.set_trbuff(true);
         });
     }
 
-    /// Transfers `count` bytes. Must be called only when the stream has stopped.
+    /// Transfers `count` bytes. This function must be called only when the DMA stream has stopped.
     fn start(self, count: usize) {
-        // A stream does not start while flags of its last transfer are set.
+        // A DMA stream does not start while flags of its last transfer are set.
         self.clear.write_value(self.flags);
         let stream = self.registers;
         stream.ndtr().write(|w| w.set_ndt(count as u16));
-        // The data must be in memory before the stream reads it.
+        // The data must be in memory before the DMA stream reads them.
         fence(Ordering::SeqCst);
         cortex_m::asm::dmb();
         stream.cr().modify(|w| w.set_en(true));
@@ -120,13 +120,13 @@ impl Stream {
         self.registers.cr().read().en()
     }
 
-    /// Returns the number of bytes still to be transferred.
+    /// Returns the number of bytes that the DMA stream must still transfer.
     fn remaining(self) -> usize {
         self.registers.ndtr().read().ndt().into()
     }
 }
 
-/// Starts a line.
+/// Starts a serial line.
 pub fn open(
     line: Line,
     ring: &'static mut [u8; RING],
@@ -142,7 +142,7 @@ pub fn open(
     });
     usart.cr1().write(|w| {
         w.set_over8(if baud.over8 { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
-        // Because of the FIFO, DMA may be delayed by the time of 16 bytes.
+        // Because the USART has a FIFO, DMA may be delayed by the transmission time of 16 bytes.
         w.set_fifoen(true);
         w.set_te(true);
         w.set_re(true);
@@ -159,7 +159,7 @@ pub fn open(
     usart.cr1().modify(|w| w.set_ue(true));
 
     line.interrupt.set_priority(clocks::LOW);
-    // SAFETY: the handler only accesses the line's flags and wakes the links.
+    // SAFETY: the interrupt handler only accesses the flags of the serial line and wakes the links.
     unsafe { line.interrupt.enable() };
     (
         Receiver { usart, ring: Ring { stream: line.receive, bytes: ring.as_ptr(), next: 0 }, errors: 0 },
@@ -168,29 +168,30 @@ pub fn open(
     )
 }
 
-/// Reader of the ring that DMA fills. Each line has two independent readers.
+/// Reader of the ring that DMA fills. Each serial line has two independent readers.
 struct Ring {
     stream: Stream,
-    /// Pointer to the ring. DMA writes the ring, so no Rust reference to it may exist.
+    /// Pointer to the DMA ring. DMA writes the ring, so no Rust reference to the ring may exist.
     bytes: *const u8,
-    /// Position of the first byte that was not taken yet.
+    /// Position of the first byte that this reader has not taken yet.
     next: usize,
 }
 
 impl Ring {
-    /// Returns the number of bytes that have arrived and were not taken yet. The result is valid only if fewer bytes
-    /// are waiting than the size of the ring.
+    /// Returns the number of bytes that have arrived and that this reader has not taken yet. The result is valid only
+    /// if the number of waiting bytes is smaller than the size of the ring.
     fn waiting(&self) -> usize {
         let end = RING - self.stream.remaining();
         (end + RING - self.next) % RING
     }
 
-    /// Copies the oldest bytes without taking them. Copies as many bytes as are contiguous and fit into the buffer.
+    /// Copies the oldest waiting bytes without taking them. Copies as many bytes as are contiguous and fit into the
+    /// buffer.
     fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         let count = self.waiting().min(into.len()).min(RING - self.next);
         cortex_m::asm::dmb();
-        // SAFETY: `next + count` is at most the length of the ring. DMA has written these bytes, and overwrites them
-        // only after all other bytes of the ring.
+        // SAFETY: `next + count` is at most the length of the ring. DMA has written these bytes, and does not overwrite
+        // them before it has overwritten all other bytes of the ring.
         unsafe { core::ptr::copy_nonoverlapping(self.bytes.add(self.next), into.as_mut_ptr(), count) };
         &into[..count]
     }
@@ -200,14 +201,15 @@ impl Ring {
     }
 }
 
-/// The tick's reader of a line, which receives every byte, independently of the links.
+/// The reader that the tick uses for a serial line. This reader returns every received byte, independently of the
+/// links.
 pub struct Lookahead(Ring);
 
-// SAFETY: it reads a register and memory that only DMA writes; both are possible from any context.
+// SAFETY: the reader reads a register and memory that only DMA writes; both reads are possible from any context.
 unsafe impl Send for Lookahead {}
 
 impl Lookahead {
-    /// Passes the bytes that have arrived since the last call to `look`, in pieces. Passes at most `most` bytes. The
+    /// Passes the bytes that have arrived since the last call to `look`, in pieces. Passes at most `most` bytes; the
     /// next call passes the bytes after them.
     pub fn read(&mut self, most: usize, mut look: impl FnMut(&[u8])) {
         let mut left = self.0.waiting().min(most);
@@ -230,17 +232,18 @@ impl Lookahead {
 pub struct Receiver {
     usart: Usart,
     ring: Ring,
-    /// Number of overruns, framing errors and noise errors since the start.
+    /// Number of checks since program start that found an overrun, a framing error or a noise error.
     errors: u32,
 }
 
 impl Receiver {
-    /// Returns the number of bytes that have arrived and were not taken yet.
+    /// Returns the number of bytes that have arrived and that this receiver has not taken yet.
     pub fn waiting(&self) -> usize {
         self.ring.waiting()
     }
 
-    /// Copies the oldest bytes without taking them. Copies as many bytes as are contiguous and fit into the buffer.
+    /// Copies the oldest waiting bytes without taking them. Copies as many bytes as are contiguous and fit into the
+    /// buffer.
     pub fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         self.ring.peek(into)
     }
@@ -250,12 +253,13 @@ impl Receiver {
         self.ring.take(count);
     }
 
-    /// Continues reading at byte `position`, counted from the first received byte.
+    /// Continues reading at byte `position`, counted from the first byte that the line received.
     pub fn jump(&mut self, position: u64) {
         self.ring.next = (position % RING as u64) as usize;
     }
 
-    /// Returns the number of line errors since the start. Reception continues, because the parser detects wrong bytes.
+    /// Checks the line for errors. Returns the number of checks since program start that found an error. Reception
+    /// continues, because the parser detects wrong bytes.
     pub fn errors(&mut self) -> u32 {
         let flags = self.usart.isr().read();
         if flags.ore() || flags.fe() || flags.ne() {
@@ -273,11 +277,11 @@ impl Receiver {
 /// Transmitter of a serial line.
 pub struct Transmitter {
     stream: Stream,
-    /// Buffer for transmission, which DMA reads while the stream runs.
+    /// Buffer for transmission, which DMA reads while the DMA stream runs.
     buffer: &'static mut [u8; ANSWER_MAX],
 }
 
-// SAFETY: the registers can be used from any context, and only this value owns the buffer.
+// SAFETY: the registers can be used from any context, and only this transmitter owns the buffer.
 unsafe impl Send for Transmitter {}
 
 impl Transmitter {
@@ -286,8 +290,8 @@ impl Transmitter {
         !self.stream.running()
     }
 
-    /// Sends a frame. Does not send the frame if the last frame is still being sent, or if the frame is longer than
-    /// the buffer.
+    /// Sends a frame. Does not send the frame if the last frame is still being sent, or if the frame is longer than the
+    /// transmit buffer.
     pub fn send(&mut self, frame: &[u8]) {
         if self.is_free()
             && let Some(place) = self.buffer.get_mut(..frame.len())
@@ -308,7 +312,7 @@ fn USART3() {
     idle(pac::USART3);
 }
 
-/// Handles the idle interrupt, which occurs when the line has been silent for the duration of a byte.
+/// Handles the idle interrupt, which occurs when the serial line has been silent for the duration of a byte.
 fn idle(usart: Usart) {
     usart.icr().write(|w| w.set_idle(true));
     WORK.signal(());

@@ -1,5 +1,5 @@
-//! Version record of this firmware at a fixed address in flash, for tools that can only read the file or the
-//! memory.
+//! Version record of this firmware at a fixed address in flash. Tools that can only read the file or the memory of the
+//! firmware find the version record at this address.
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 use crate::{BAUD, BOARD, clock};
@@ -9,16 +9,16 @@ pub const ADDRESS: usize = 0x0800_0400;
 /// First bytes of the version record.
 pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
 
-/// The version record, which is little-endian like all data of this processor. Texts in the record are padded with
-/// zeros.
+/// The version record. Numbers in the record are little-endian, like all data of this processor. Texts in the record
+/// are padded with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Version {
-    /// [`MAGIC`].
+    /// Identification of the record, which is [`MAGIC`].
     pub magic: [u8; 8],
-    /// Layout version of this record: 1.
+    /// Layout version of the version record, which is 1.
     pub layout: u16,
-    /// Size of this record, bytes.
+    /// Size of the version record, bytes.
     pub size: u16,
     /// Version of the firmware, for example `0.1.0`.
     pub version: [u8; 12],
@@ -32,7 +32,7 @@ pub struct Version {
     pub segments: u32,
     /// Largest number of points of a segment.
     pub segment_points: u32,
-    /// Ticks per second.
+    /// Number of ticks per second.
     pub tick_hz: u32,
     /// Rate of the serial lines, Bd.
     pub baud: u32,
@@ -41,7 +41,7 @@ pub struct Version {
 }
 
 impl Version {
-    /// Returns the record of this build.
+    /// Returns the version record of this build.
     pub const fn this() -> Self {
         Self {
             magic: MAGIC,

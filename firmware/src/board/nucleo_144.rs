@@ -7,10 +7,10 @@ use crate::uart::Line;
 
 /// Assigns a function to every pin.
 pub fn wire(p: Peripherals) -> Board {
-    // FDCAN1
+    // FDCAN1 is the joint bus.
     receive(p.PD0, 9);
     transmit(p.PD1, 9);
-    // USART2: RS422
+    // USART2 is the RS422 line.
     transmit(p.PD5, 7);
     receive(p.PD6, 7);
     // USART3 is the virtual serial port of the ST-LINK.

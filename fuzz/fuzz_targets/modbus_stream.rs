@@ -1,5 +1,6 @@
 #![no_main]
-// Includes only the modules that read the bytes, so that the fuzzer need not build the agent with its web server.
+// Includes only the modules that read Modbus bytes, so that the fuzzer does not need to build the agent with its web
+// server.
 #[path = "../../crates/jtc-agent/src/modbus/fuzzing.rs"]
 mod fuzzing;
 #[expect(dead_code, reason = "an agent has more to refuse")]

@@ -1,5 +1,5 @@
-//! `cargo xtask bench`: measures performance figures and reference values of other software (anchors) in one run on
-//! one computer.
+//! `cargo xtask bench`: measures performance figures of this project and reference values of other software (anchors)
+//! in one run on one computer.
 mod load;
 mod table;
 mod tracking;
@@ -16,14 +16,14 @@ use load::{Load, OTHERS_MAX};
 use crate::python;
 use crate::shell::{self, cargo, command, root, run};
 
-/// Time of Pinocchio's inverse dynamics, ns, measured with an equal kind of build on the computer for which the
-/// absolute targets were set.
+/// Execution time of Pinocchio's inverse dynamics, ns, on the computer for which the absolute targets were set. The
+/// measurement used the same kind of build.
 const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 
-/// Figures by name.
+/// Performance figures by name.
 type Figures = BTreeMap<String, f64>;
 
-/// Runs the command. `arguments` is `tracking`, or any of `--json FILE` and `--quick`.
+/// Runs `cargo xtask bench`. `arguments` is `tracking`, or any of `--json FILE` and `--quick`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     if let Some(("tracking", rest)) = arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
         return tracking::main(rest);
@@ -38,7 +38,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let frames = work.join("ucom-frames.log");
     let kernels = dynamics_program(&work)?;
     let rounds = if quick { 1 } else { 5 };
-    // All programs are built first, so that builds do not disturb the measurements.
+    // The command builds all programs first, so that builds do not disturb the measurements.
     let mut skipped = Vec::new();
     anchors(&work, &kernels, 0, &mut skipped)?;
     for Example { package, name, .. } in EXAMPLES {
@@ -60,7 +60,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
-    // The longest tick is measured only once, because the minimum of several maxima would not be a maximum.
+    // The command measures the longest tick only once, because the minimum of several maxima would not be a maximum.
     figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
@@ -101,7 +101,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
 }
 
 /// Keeps the better of two measurements of each figure, which is the smaller time or size or the greater throughput. The better value
-/// is valid, because other programs can only make a measurement worse.
+/// is valid, because other programs on the computer can only make a measurement worse.
 fn keep_best(figures: &mut Figures, samples: Figures) {
     for (name, value) in samples {
         let throughput = ["_gb_s", "_frames_s"].iter().any(|end| name.ends_with(end));
@@ -110,7 +110,8 @@ fn keep_best(figures: &mut Figures, samples: Figures) {
     }
 }
 
-/// Returns a copy of the timing program of jtc-dynamics, because other crates have an example with the same name.
+/// Copies the timing program of jtc-dynamics and returns the path of the copy, because other crates have an example
+/// with the same name.
 fn dynamics_program(work: &Path) -> Result<PathBuf> {
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-dynamics", "--example", "time"]))?;
     let program = work.join("dynamics_time");
@@ -118,12 +119,13 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Failed measurements. Each entry contains the prefixes of the names of its figures, and the cause.
+/// Failed measurements. Each entry contains the name prefixes of the figures that the measurement yields, and the cause
+/// of the failure.
 #[derive(Default)]
 pub(crate) struct Failed(Vec<(&'static [&'static str], String)>);
 
 impl Failed {
-    /// Runs a measurement. If the measurement fails, stores the cause and returns an empty list.
+    /// Runs a measurement. If the measurement fails, stores the cause and returns an empty list of figures.
     fn attempt(
         &mut self,
         figures: &'static [&'static str],
@@ -140,26 +142,26 @@ impl Failed {
         self.0.push((figures, why));
     }
 
-    /// Returns in one line the reason why this figure could not be measured.
+    /// Returns the reason why this figure could not be measured, in one line.
     pub(crate) fn why(&self, figure: &str) -> Option<&str> {
         let (_, why) = self.0.iter().find(|(names, _)| names.iter().any(|name| figure.starts_with(name)))?;
         why.lines().map(str::trim).rfind(|line| !line.is_empty())
     }
 
-    /// Returns all causes, one line for each.
+    /// Returns the causes of all failed measurements, one line for each.
     fn causes(&self) -> Vec<String> {
         self.0.iter().map(|(figures, why)| format!("{}: {why}", figures.join(", "))).collect()
     }
 }
 
-/// Prefixes of the names of figures that are measured with the anchors.
+/// Name prefixes of the figures that the command measures together with the anchors.
 const ANCHORS: &[&str] = &["ours.", "pinocchio", "casadi", "mujoco", "kdl", "rbdl", "libm_sin_cos_6"];
 
-/// Program that measures a crate.
+/// Program that measures the performance of a crate.
 struct Example {
     package: &'static str,
     name: &'static str,
-    /// Prefixes of the names of the figures that the program prints.
+    /// Name prefixes of the figures that the program prints.
     figures: &'static [&'static str],
 }
 
@@ -175,7 +177,8 @@ const EXAMPLES: [Example; 4] = [
 ];
 
 impl Example {
-    /// Runs the program and returns its figures. The program writes the UCoM frames that it has decoded to `frames`.
+    /// Runs the program and returns the figures that it prints. The program writes the UCoM frames that it has decoded
+    /// to `frames`.
     fn measure(&self, frames: &Path) -> Result<Figures> {
         let Self { package, name, .. } = *self;
         let mut example =
@@ -203,7 +206,7 @@ fn cantools(frames: &Path) -> Result<Figures> {
     Ok(Figures::from([("cantools_frames_s".to_owned(), rate)]))
 }
 
-/// Measures planned motions of our planner, toppra and Ruckig.
+/// Measures planned motions of our planner, and of the planners toppra and Ruckig.
 fn planned() -> Result<Figures> {
     let mut script = command(python::environment("requirements.txt")?);
     script.arg(root().join("references/plan/bench_plan.py")).arg(shell::target().join("dist/examples/plans"));
@@ -211,7 +214,7 @@ fn planned() -> Result<Figures> {
     object(&shell::read(&mut script)?)
 }
 
-/// Measures, under each load, the time until an agent has sent a Stop on its line.
+/// Measures the time until an agent has sent a Stop on its serial line, under each load.
 fn stops(quick: bool, failed: &mut Failed) -> Figures {
     const LOADS: [(&str, &[&str]); 3] = [
         ("idle", &["stop.idle_", "bare.idle_"]),
@@ -234,20 +237,20 @@ fn stops(quick: bool, failed: &mut Failed) -> Figures {
     figures
 }
 
-/// Returns the numbers in the text of a JSON object.
+/// Returns the numbers in a JSON object, which is given as text.
 fn object(text: &str) -> Result<Figures> {
     let value: Value =
         serde_json::from_str(text.trim()).with_context(|| format!("no JSON object: {text}"))?;
     Ok(numbers(&value))
 }
 
-/// Returns the numbers in the object `value`.
+/// Returns the numbers in the JSON object `value`.
 fn numbers(value: &Value) -> Figures {
     let pairs = value.as_object().into_iter().flatten();
     pairs.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
 }
 
-/// Returns the figures in lines with a name and a number.
+/// Returns the figures in lines that consist of a name and a number.
 fn lines(text: &str) -> Figures {
     text.lines()
         .filter_map(|line| {
@@ -258,7 +261,7 @@ fn lines(text: &str) -> Figures {
 }
 
 /// Measures the dynamics of this project and of other libraries alternately, with the same arm and states. If `rounds` is
-/// 0, only builds the programs.
+/// 0, the function only builds the programs.
 fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) -> Result<Figures> {
     for (header, package) in [
         ("/usr/include/eigen3/Eigen/Core", "libeigen3-dev"),
@@ -293,7 +296,7 @@ fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) 
     Ok(figures)
 }
 
-/// Prints the errors of each joint for our control law with and without feed-forward.
+/// Prints the position errors of each joint for our control law with and without feed-forward.
 fn print_tracking(figures: &Figures) {
     let figure = |name: String| figures.get(&name).map_or("?".into(), |value| format!("{value:.2}"));
     println!("\ntracking, mrad (RMS, largest) | ours | straight lines, PID and gravity only");

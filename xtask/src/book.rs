@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, Scratch, cargo, files, root, run};
 
-/// `arguments`: `--out DIR`.
+/// Runs `cargo xtask book`. `arguments` may contain `--out DIR`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let out = shell::option(&mut arguments, "--out")?;
@@ -17,8 +17,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a cargo command for the program that builds the book. The program is in a separate workspace, so that a build of
-/// the project does not include mdbook.
+/// Returns a cargo command for the program that builds the book. This program is in a separate workspace, so that a build
+/// of the project does not include mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));
@@ -26,26 +26,26 @@ fn tool(words: &[&str]) -> Command {
     cargo
 }
 
-/// Builds the program that builds the book, and its tests.
+/// Builds the program that builds the book, and the tests of this program.
 pub(crate) fn build() -> Result<()> {
     run(&mut tool(&["build"]))?;
     run(&mut tool(&["test", "--no-run"]))
 }
 
-/// Builds the book in a folder.
+/// Builds the HTML book in a folder.
 pub(crate) fn make(out: &Path) -> Result<()> {
     run(tool(&["run"]).arg("--").arg(root()).arg(out))
 }
 
-/// Tests the program, builds the book, and checks all links of the book.
+/// Tests the program that builds the book, builds the book, and checks all links of the book.
 pub(crate) fn made() -> Result<()> {
     run(&mut tool(&["test"]))?;
     let scratch = Scratch::new("book")?;
     make(&scratch.path().join("book"))
 }
 
-/// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. Also checks that
-/// the tests execute every block of commands, or that the block states the reason why it is not executed.
+/// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. The function
+/// also checks that the tests execute every block of commands, or that the page states why they do not execute the block.
 pub(crate) fn check() -> Result<()> {
     let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).context("docs/SUMMARY.md")?;
@@ -89,7 +89,7 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// Returns the targets of the links in a page, except links in fenced blocks.
+/// Returns the targets of the links in a page, without the links in fenced blocks.
 fn targets(page: &str) -> impl Iterator<Item = &str> {
     prose(page).flat_map(|line| line.split("](").skip(1)).filter_map(|rest| Some(rest.split_once(')')?.0))
 }
@@ -104,7 +104,7 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Returns the names of the headings of a page, in the form that is used in links.
+/// Returns the names of the headings of a page, in the form that links use.
 fn anchors(page: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for heading in prose(page).filter(|line| line.starts_with('#')) {
@@ -130,7 +130,7 @@ enum Block {
     Forgotten,
 }
 
-/// Returns the blocks of commands in a page, with the line number at which each block begins.
+/// Returns the blocks of commands in a page, with the line number of the first line of each block.
 fn blocks(page: &str) -> Vec<(usize, Block)> {
     let mut found = Vec::new();
     let (mut named, mut generated, mut fenced, mut above) = (false, false, false, "");

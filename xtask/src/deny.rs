@@ -1,5 +1,5 @@
-//! Checks cargo's dependency resolution against deny.toml, which contains rules for licences, sources and banned
-//! crates.
+//! Checks the dependencies that cargo has resolved against deny.toml, which contains rules for licences, sources and
+//! banned crates.
 //!
 //! The installation of cargo-deny takes minutes, so only `cargo xtask dist` runs cargo-deny. The checks in this module read deny.toml
 //! directly.
@@ -18,7 +18,7 @@ const CARGO_DENY: &str = "0.20.2";
 
 /// Workspaces whose crates are part of a release.
 const SHIPPED: [&str; 2] = ["Cargo.toml", "firmware/Cargo.toml"];
-/// All lock files. The sources of the dependencies in each workspace are checked.
+/// All lock files of the project. The check covers the sources of the dependencies in each workspace.
 const LOCKS: [&str; 5] =
     ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock", "book/Cargo.lock"];
 
@@ -65,7 +65,7 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// Runs cargo-deny itself. Installs cargo-deny below the build folder if it is missing.
+/// Runs cargo-deny itself. If cargo-deny is missing, the function installs it in the build folder.
 pub(crate) fn with_cargo_deny() -> Result<()> {
     let folder = shell::target().join("tools");
     let program = folder.join("bin/cargo-deny");
@@ -84,7 +84,8 @@ pub(crate) fn with_cargo_deny() -> Result<()> {
         run(install.arg(&folder))?;
     }
     for manifest in SHIPPED {
-        // cargo-deny reads the sources for every target, but builds for this computer have fetched only a part of them.
+        // cargo-deny reads the source code for every target, but builds for this computer have downloaded only a part
+        // of this source code.
         run(&mut shell::cargo(&["fetch", "--quiet", "--locked", "--manifest-path", manifest]))?;
         let mut deny = shell::command(&program);
         deny.args(["--offline", "--manifest-path", manifest, "--config"]).arg(root().join("deny.toml"));
@@ -102,7 +103,7 @@ fn targets(rules: &Table) -> Vec<String> {
     strings(graph.and_then(|graph| graph.get("targets"))).map(str::to_owned).collect()
 }
 
-/// Returns an error if the licence of a crate is not allowed.
+/// Returns an error if the rules do not allow the licence of a crate.
 fn licence(rules: &Table, found: &Crate) -> Result<()> {
     let label = format!("{} {}", found.name, found.version);
     let text = found.licence.as_deref().with_context(|| format!("{label} names no licence"))?;
@@ -122,7 +123,7 @@ fn licence(rules: &Table, found: &Crate) -> Result<()> {
     Ok(())
 }
 
-/// Returns the reason why a crate is banned; `None` if it is not banned.
+/// Returns the reason why a crate is banned. Returns `None` if the crate is not banned.
 fn banned(rules: &Table, name: &str) -> Option<String> {
     let bans = rules.get("bans")?.get("deny")?.as_array()?;
     let ban = bans.iter().find(|ban| ban.get("crate").and_then(Value::as_str) == Some(name))?;
@@ -130,7 +131,7 @@ fn banned(rules: &Table, name: &str) -> Option<String> {
     Some(format!("{name} is banned: {reason}"))
 }
 
-/// Returns the crates of a lock file whose source is not allowed.
+/// Returns the crates of a lock file whose source the rules do not allow.
 fn sources(rules: &Table, lock: &Table) -> Vec<String> {
     let allowed: BTreeSet<String> =
         strings(rules.get("sources").and_then(|table| table.get("allow-registry")))
@@ -145,8 +146,8 @@ fn sources(rules: &Table, lock: &Table) -> Vec<String> {
     packages.filter_map(elsewhere).collect()
 }
 
-/// Adds the dependencies of a manifest that have no version. Path dependencies are not added, because they are the
-/// project's own crates.
+/// Adds the dependencies of a manifest that have no version. The function does not add path dependencies, because they
+/// are crates of this project.
 fn wildcards(table: &Table, found: &mut Vec<String>) {
     for (key, value) in table {
         let Some(inner) = value.as_table() else { continue };

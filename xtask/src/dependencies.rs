@@ -21,7 +21,7 @@ fn direct(manifest: &str) -> BTreeSet<String> {
             }
         } else if inside && let Some((key, _)) = line.split_once('=') {
             let name = key.trim().split('.').next().unwrap_or_default();
-            // Comments and continuation lines of a value do not contain names.
+            // Comments and continuation lines of a value do not contain names of dependencies.
             let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if !name.is_empty() && name.chars().all(is_name) {
                 names.insert(name.to_owned());
@@ -31,7 +31,7 @@ fn direct(manifest: &str) -> BTreeSet<String> {
     names
 }
 
-/// Returns the names in the first column of the page's tables (`` | `name` | … ``).
+/// Returns the names in the first column of the tables on the page (`` | `name` | … ``).
 fn documented(page: &str) -> BTreeSet<String> {
     page.lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))
@@ -39,7 +39,8 @@ fn documented(page: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Returns an error that lists entries that are missing on the page, and entries that are not dependencies.
+/// Returns an error that lists dependencies that are missing on the page, and entries of the page that are not
+/// dependencies.
 pub(crate) fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/dependencies.md")).context("docs/dependencies.md")?;

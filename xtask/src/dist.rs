@@ -26,7 +26,7 @@ use crate::shell::{self, Scratch};
 use packages::{Made, Release};
 use programs::PLATFORMS;
 
-/// Runs the command. `arguments` may contain `--out DIR`, `--quick`, `--made`, `--twice` and `--check`.
+/// Runs `cargo xtask dist`. `arguments` may contain `--out DIR`, `--quick`, `--made`, `--twice` and `--check`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let out = shell::option(&mut arguments, "--out")?;
@@ -53,7 +53,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Creates all files of a release in an empty folder. Returns the parts that were omitted, with the reasons.
+/// Creates all files of a release in an empty folder. Returns the parts that the command has omitted, with the reasons.
 fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let mut left_out = Vec::new();
     empty(out)?;
@@ -113,7 +113,7 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
             }
         }
     }
-    // The files are written only after all of them are ready, so a failed run leaves an empty folder.
+    // The command writes the files only after all of them are ready, so a failed run leaves an empty folder.
     for Made { name, bytes } in made {
         std::fs::write(out.join(&name), bytes).with_context(|| name.clone())?;
     }
@@ -129,8 +129,8 @@ fn version() -> Result<String> {
     Ok(version.context("the workspace has no version")?.to_owned())
 }
 
-/// Creates the folder, or removes the files of an earlier release that are in its list. If the folder contains any other file,
-/// returns an error and does not change the folder.
+/// Creates the folder, or removes the files of an earlier release that are listed in its checksum file. If the folder contains
+/// any other file, returns an error and does not change the folder.
 fn empty(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let list = std::fs::read_to_string(out.join(tree::SUMS)).unwrap_or_default();

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use crate::book;
 use crate::shell::{self, Scratch, cargo, root, run};
 
-/// No arguments.
+/// Runs `cargo xtask docs`, which has no arguments.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(arguments)?;
     let scratch = Scratch::new("docs")?;
@@ -22,7 +22,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         cargo(&["test", "--release", "--package", "jtc-core", "--test", "suite", "reactions::"]);
     run(reactions.env("UPDATE_DOCS", "1"))?;
     println!("wrote the table of reactions of docs/safety.md");
-    // Both commands write to one page, so they run one after the other.
+    // Both commands write to the same page, so they run one after the other.
     let drawn =
         ["test", "--release", "--package", "jtc-core", "--lib", "--", "the_diagram_is", "--test-threads=1"];
     let mut drawn = cargo(&drawn);

@@ -1,5 +1,5 @@
-//! `cargo xtask emulate`: runs the boards' programs in an emulator of the chip, for tests, for measurements, or as a
-//! live controller on a serial port.
+//! `cargo xtask emulate`: runs the firmware of the boards in an emulator of the chip. The command is for tests, for
+//! measurements, and for a live controller on a serial port.
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -10,11 +10,11 @@ use crate::suite::{self, count_results};
 use crate::tally::{Counts, Outcome, Tally};
 use crate::{firmware, python, size};
 
-/// File with measurements of the boards' programs. The file is in the repository, so that every change of a
-/// measurement is reviewed.
+/// File with measurements of the firmware. The file is in the repository, so that every change of a measurement is
+/// reviewed.
 const FIGURES: &str = "docs/board-figures.txt";
 
-/// Runs the command. `arguments` is `--update`, or `--serial PATH` and arguments of the emulator itself.
+/// Runs `cargo xtask emulate`. `arguments` is `--update`, or `--serial PATH` and arguments of the emulator itself.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     if arguments.iter().any(|a| a.starts_with("--serial")) {
         return live(arguments);
@@ -42,7 +42,8 @@ pub(crate) fn steps(tally: &mut Tally, update: bool) {
     tally.step("board: figures", || figures(update).map(|()| Outcome::Passed));
 }
 
-/// Unicorn is built from C code, which needs cmake, and its bindings need libclang.
+/// Installs the tools that the build of the emulator needs. Unicorn is built from C code, which needs cmake, and its
+/// bindings need libclang.
 fn install_tools() -> Result<()> {
     if !works(shell::command("cmake").arg("--version")) {
         shell::apt_install(&["cmake"])?;
@@ -53,7 +54,7 @@ fn install_tools() -> Result<()> {
     Ok(())
 }
 
-/// Returns `true` if bindgen can find libclang, either in the folders of Debian or with LIBCLANG_PATH.
+/// Returns `true` if bindgen can find libclang, either in the folders of Debian or through LIBCLANG_PATH.
 fn has_libclang() -> bool {
     let entries = |place: &Path| std::fs::read_dir(place).into_iter().flatten().flatten();
     let of_llvm = entries(Path::new("/usr/lib")).map(|entry| entry.path().join("lib"));
@@ -67,8 +68,8 @@ fn has_libclang() -> bool {
     std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
 }
 
-/// Returns a cargo command in `emulator/`. Warnings are errors, also in crates from `crates/`, whose features in
-/// `emulator/` differ from the workspace.
+/// Returns a cargo command in `emulator/`. Warnings are errors, also for crates from `crates/`, because their features
+/// in `emulator/` differ from their features in the workspace.
 fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = shell::cargo(arguments);
     cargo.current_dir(shell::root().join("emulator"));
@@ -78,7 +79,7 @@ fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Builds all programs that the emulated sessions run, except the host program.
+/// Builds all programs that the sessions with an emulated board need, except the host program.
 pub(crate) fn programs() -> Result<()> {
     install_tools()?;
     firmware::build_fast()?;
@@ -106,7 +107,7 @@ fn tests() -> Result<Outcome> {
     Ok(Outcome::Counted(counts, String::new()))
 }
 
-/// Checks the steps from a robot description to a motion, with the program that is flashed to a board.
+/// Checks the steps from a robot description to a motion, with the firmware file that is flashed to a board.
 fn driving() -> Result<Outcome> {
     let jtc = suite::programs()?.join("jtc");
     run(&mut cargo(&["build", "--release"]))?;
@@ -118,7 +119,7 @@ fn driving() -> Result<Outcome> {
     run(script.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 
-/// Measures and prints the figures, and compares them with the stored figures.
+/// Measures and prints the figures of the firmware, and compares them with the stored figures.
 fn figures(update: bool) -> Result<()> {
     install_tools()?;
     let mut text = String::new();
@@ -152,14 +153,14 @@ fn compare(kept: &Path, text: &str) -> Result<()> {
 }
 
 /// Returns the lines that are equal in every build. The latency of an interrupt depends on the exact time of bytes
-/// relative to ticks, so this function removes the latency. The program that measures the latency compares it with
-/// its limit.
+/// relative to ticks, so this function removes the line with the latency. The program that measures the latency
+/// compares it with its limit.
 fn lasting(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().filter(|line| !line.contains("interrupts are masked"));
     lines.map(|line| line.split(", begins at most").next().unwrap_or_default())
 }
 
-/// Runs an emulated board that a host program can open, until the command is interrupted.
+/// Runs an emulated board that a host program can open, until the user interrupts the command.
 fn live(arguments: &[String]) -> Result<ExitCode> {
     install_tools()?;
     let elf = firmware::build(firmware::BOARDS[0])?;

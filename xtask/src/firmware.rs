@@ -1,4 +1,5 @@
-//! `cargo xtask firmware`: builds the ELF of each board, prints its sizes by region, and checks that the tick cannot reach a panic.
+//! `cargo xtask firmware`: builds the firmware ELF of each board, prints its sizes by memory region, and checks that the tick
+//! cannot reach a panic.
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -11,13 +12,13 @@ use crate::shell::{self, run};
 use crate::suite::count_results;
 use crate::tally::{Counts, Outcome};
 
-/// Target for which the board's code is compiled.
+/// Compiler target of the firmware.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Names of the boards, which are also the names of the features that select them.
+/// Names of the boards. These names are also the names of the cargo features that select the boards.
 pub(crate) const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Functions that run at the priority of the tick. The second function wakes the links; it is the only function that the tick
+/// Functions that run at the priority of the tick. The second function wakes the links, and is the only function that the tick
 /// calls through a register.
 const ROOTS: [&str; 2] = ["TIM7", "embassy_executor::raw::waker::wake"];
 
@@ -33,9 +34,9 @@ const REGIONS: [(&str, u64, u64); 8] = [
     ("SRAM4", 0x3800_0000, 64 * 1024),
 ];
 
-/// Adds the compiler's target for the board if rustup manages the toolchain.
+/// Adds the compiler target of the firmware if rustup manages the toolchain.
 pub(crate) fn add_target() -> Result<()> {
-    // If rustup does not manage the toolchain, the toolchain contains its own targets.
+    // If rustup does not manage the toolchain, the toolchain already contains its targets.
     if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
         && !installed.lines().any(|target| target == TARGET)
     {
@@ -50,22 +51,22 @@ fn cargo_for(board: &str, subcommand: &str) -> Result<Command> {
         shell::cargo(&[subcommand, "--locked", "--release", "--no-default-features", "--features", board]);
     cargo.current_dir(shell::root().join("firmware"));
     cargo.env("CARGO_TARGET_DIR", directory());
-    // Paths of this computer in the program would change the size of the program.
+    // If the firmware contained paths of this computer, these paths would change the size of the firmware.
     cargo.arg("--config").arg(paths::remapped(TARGET)?);
     Ok(cargo)
 }
 
-/// Returns the build folder of the boards' programs.
+/// Returns the build folder of the firmware.
 pub(crate) fn directory() -> PathBuf {
     shell::target().join("firmware")
 }
 
-/// Returns the path of a board's program after its build.
+/// Returns the path of a board's firmware ELF after its build.
 pub(crate) fn elf(board: &str) -> PathBuf {
     directory().join(format!("{board}.elf"))
 }
 
-/// Builds the ELF of a board and returns its path.
+/// Builds the firmware ELF of a board and returns its path.
 pub(crate) fn build(board: &str) -> Result<PathBuf> {
     add_target()?;
     run(&mut cargo_for(board, "build")?)?;
@@ -75,11 +76,11 @@ pub(crate) fn build(board: &str) -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest rate of J-01.
+/// Bit rate of both serial lines in the firmware that [`build_fast`] builds, Bd: the highest rate of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program with the fastest lines, which tests need in addition to the programs that are flashed. The
-/// build uses a separate folder, so that it does not invalidate the build of the flashed programs.
+/// Builds the firmware of the first board with the fastest serial lines. Tests need this firmware in addition to the firmware
+/// that is flashed. The build uses a separate folder, so that it does not invalidate the build of the flashed firmware.
 pub(crate) fn build_fast() -> Result<PathBuf> {
     add_target()?;
     let target = directory().join("fast");
@@ -90,8 +91,8 @@ pub(crate) fn build_fast() -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// Returns the bytes of static data in each region, in the order of [`REGIONS`]. Each entry contains name, used bytes
-/// and size.
+/// Returns the bytes of static data in each memory region, in the order of [`REGIONS`]. Each entry contains name, used
+/// bytes and size of the region.
 pub(crate) fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
     let bytes = std::fs::read(elf)?;
     let file = object::File::parse(&*bytes)?;
@@ -118,7 +119,7 @@ pub(crate) fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
     Ok(used.into_iter().filter(|(_, bytes, _)| *bytes > 0).collect())
 }
 
-/// Runs all checks of a board's ELF and prints the results.
+/// Runs all checks of the firmware ELF of a board and prints the results.
 pub(crate) fn check(board: &str, elf: &Path) -> Result<()> {
     for (name, bytes, size) in used(elf)? {
         println!("{board}: {name}: {bytes} of {size} B");
@@ -131,7 +132,8 @@ pub(crate) fn check(board: &str, elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Lints the board's code. Every `unsafe` block must be explained. Prints the number of `unsafe` blocks.
+/// Lints the firmware code. Every `unsafe` block must have a comment that explains it. Prints the number of `unsafe`
+/// blocks.
 pub(crate) fn lints() -> Result<()> {
     add_target()?;
     for board in BOARDS {
@@ -149,7 +151,7 @@ pub(crate) fn lints() -> Result<()> {
     Ok(())
 }
 
-/// Tests the part of the firmware that needs no hardware on this computer.
+/// Tests the library part of the firmware, which needs no hardware, on this computer.
 pub(crate) fn tests() -> Result<Outcome> {
     let host = shell::read(shell::command("rustc").args(["--print", "host-tuple"]))?;
     let mut cargo = shell::cargo(&["test", "--lib", "--target", host.trim()]);
@@ -162,7 +164,8 @@ pub(crate) fn tests() -> Result<Outcome> {
     Ok(Outcome::Counted(counts, String::new()))
 }
 
-/// Runs the command. `arguments` contains names of boards; if it is empty, all boards are built.
+/// Runs `cargo xtask firmware`. `arguments` contains names of boards. If `arguments` is empty, the command builds the
+/// firmware of all boards.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let boards: Vec<&str> = match arguments {
         [] => BOARDS.to_vec(),

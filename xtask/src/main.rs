@@ -12,7 +12,6 @@ mod firmware;
 mod links;
 mod parallel;
 mod prebuild;
-// Module that is used by the checks of the board's program.
 mod package;
 mod panics;
 mod paths;

@@ -1,5 +1,5 @@
-//! Tests the Python package: builds its wheel, installs the wheel in an empty environment, and tests it there. The source tree is not
-//! tested, because it does not contain the compiled part.
+//! Tests the Python package: builds its wheel, installs the wheel in an empty environment, and tests the wheel there. The source tree
+//! is not tested, because it does not contain the compiled part of the package.
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -10,10 +10,10 @@ use crate::shell::{self, Scratch, root, run};
 use crate::suite;
 use crate::tally::{self, Counts, Outcome, Tally};
 
-/// Requirements for the build and the tests of the Python package.
+/// File that lists the Python packages for the build and the tests of the Python package.
 const REQUIREMENTS: &str = "requirements-package.txt";
 
-/// Program for a new environment, with the lines of the README that need only the package.
+/// Program that runs in a new environment, with the lines of the README that need only the package.
 const FIRST_LINES: &str = "import openjtc\n\
     with openjtc.connect('sim:', speed=None) as robot:\n    \
         run = robot.move([0, 30, -60, 0, 30, 0], degrees=True)\n    \
@@ -32,7 +32,8 @@ fn is_own(path: &Path) -> bool {
     })
 }
 
-/// Builds the wheel for this computer from the files that the tests have compiled; `cargo xtask dist` makes the wheels of a release.
+/// Builds the wheel for this computer from the files that the tests have compiled. `cargo xtask dist` builds the wheels of a
+/// release.
 pub(crate) fn build() -> Result<PathBuf> {
     let python = python::environment(REQUIREMENTS)?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -53,8 +54,8 @@ pub(crate) fn build() -> Result<PathBuf> {
     made.next().context("Maturin left no wheel")
 }
 
-/// Runs the steps of `cargo xtask test`. No other check runs at the same time: many tests of the package run
-/// simulated arms in real time.
+/// Runs the package steps of `cargo xtask test`. No other check runs at the same time, because many tests of the
+/// package run simulated arms in real time.
 pub(crate) fn steps(tally: &mut Tally) {
     let mut wheel = None;
     tally.step("Python package: wheel", || {
@@ -71,7 +72,7 @@ pub(crate) fn steps(tally: &mut Tally) {
     });
 }
 
-/// Tests the wheel as on a computer without other tools than Python.
+/// Tests the wheel in an environment without tools other than Python.
 fn fresh(wheel: &Path) -> Result<()> {
     let scratch = Scratch::new("fresh-python")?;
     let environment = scratch.path().join("environment");
@@ -81,7 +82,7 @@ fn fresh(wheel: &Path) -> Result<()> {
     run(shell::command(&python).args(["-c", FIRST_LINES]).current_dir(scratch.path()))
 }
 
-/// Checks the types of the installed wheel and runs its tests.
+/// Checks the types of the installed wheel and runs the tests of the package.
 fn tested(wheel: &Path) -> Result<Outcome> {
     let python = python::environment(REQUIREMENTS)?;
     run(python::pip_install(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;

@@ -1,8 +1,8 @@
-//! Checks that the control tick cannot reach a panic, by following the calls of the linked program.
+//! Checks that the control tick cannot reach a panic. The check follows the calls of the linked program.
 //!
 //! The check reads the ELF and not the source, because only the compiled code runs on the board. From each root function, the check
 //! follows every branch that leaves the function. If the code computes the address of a function, the check assumes that the code calls
-//! this function. Calls through a register are listed, because the check does not know their targets.
+//! this function. The check lists calls through a register, because it does not know the targets of these calls.
 
 mod thumb;
 
@@ -15,7 +15,7 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
 use thumb::Flow;
 
-/// Name parts of functions that panic.
+/// Name parts that identify functions that panic.
 const PANICS: [&str; 8] = [
     "panicking",
     "panic_",
@@ -27,17 +27,17 @@ const PANICS: [&str; 8] = [
     "len_mismatch_fail",
 ];
 
-/// Result of the search from the root functions.
+/// Result of the search that starts at the root functions.
 #[derive(Debug)]
 pub(crate) struct Report {
-    /// Number of functions that were reached, including the roots.
+    /// Number of functions that the search has reached, including the root functions.
     pub functions: usize,
-    /// Number of instructions of the reached functions.
+    /// Number of instructions in the reached functions.
     pub instructions: usize,
-    /// Calls and jumps through a register, each with function and address.
+    /// Calls and jumps through a register, each with the name of the function and the address.
     pub indirect: Vec<String>,
-    /// Call path to each instruction that panics or traps. A path lists the names of functions, each with the address of the branch
-    /// that leaves the function, and finally the instruction.
+    /// Call path to each instruction that panics or traps. A call path lists the names of functions, each with the address of the
+    /// branch that leaves the function. The instruction is the last element of the call path.
     pub paths: Vec<String>,
 }
 
@@ -61,12 +61,13 @@ impl fmt::Display for Report {
     }
 }
 
-/// Returns the paths from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
+/// Returns the call paths from `roots` to a panic in a program for ARMv7-M. `roots` contains names of functions, as linked
+/// or as in the source.
 ///
-/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line of an address.
+/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the source line of an address.
 pub(crate) fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     let program = Program::read(elf)?;
-    // Functions that were reached, each with the calling function and the address of the branch.
+    // Functions that the search has reached, each with the calling function and the address of the branch.
     let mut from: BTreeMap<u32, Option<(u32, u32)>> = BTreeMap::new();
     let mut queue = VecDeque::new();
     for root in roots {
@@ -101,7 +102,7 @@ pub(crate) fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     Ok(report)
 }
 
-/// Returns the chain of calls to a function.
+/// Returns the chain of calls that leads to a function.
 fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32) -> String {
     let name = &program.functions[&at].name;
     match from.get(&at) {
@@ -128,11 +129,11 @@ struct Function {
 }
 
 struct Program<'a> {
-    /// Functions of the program by their first address.
+    /// Functions of the program by first address.
     functions: BTreeMap<u32, Function>,
-    /// Executable sections, each with first address and bytes.
+    /// Executable sections of the program, each with first address and bytes.
     sections: Vec<(u32, &'a [u8])>,
-    /// Addresses at which data in the code begins (true) and at which code continues (false).
+    /// Addresses at which data in the code begins (`true`) and at which code continues (`false`).
     data: BTreeMap<u32, bool>,
 }
 
@@ -154,7 +155,7 @@ impl<'a> Program<'a> {
             if let Some(kind) = name.strip_prefix('$') {
                 program.data.insert(address, kind.starts_with('d'));
             } else if symbol.kind() == SymbolKind::Text {
-                // The lowest bit marks Thumb code.
+                // The lowest bit of the address marks Thumb code.
                 let (start, end) = (address & !1, (address & !1) + symbol.size() as u32);
                 let name = format!("{:#}", rustc_demangle::demangle(name));
                 let panics = PANICS.iter().any(|part| name.contains(part));
@@ -172,7 +173,7 @@ impl<'a> Program<'a> {
             }
         }
         ensure!(!program.functions.is_empty(), "the program has no symbols of functions");
-        // Functions in assembly have no size, so they are assumed to extend to the next function.
+        // Functions in assembly have no size, so the check assumes that they extend to the next function.
         let starts: Vec<u32> = program.functions.keys().copied().collect();
         for (start, next) in starts.iter().zip(starts.iter().skip(1).map(Some).chain([None])) {
             let Some(function) = program.functions.get_mut(start) else { continue };
@@ -203,7 +204,7 @@ impl<'a> Program<'a> {
         bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]))
     }
 
-    /// Returns the pieces of a function; the flag of a piece is true if it contains data.
+    /// Returns the pieces of a function. The flag of a piece is `true` if the piece contains data.
     fn pieces(&self, function: &Range<u32>) -> Vec<(Range<u32>, bool)> {
         let mut is_data = self.data.range(..=function.start).next_back().is_some_and(|(_, data)| *data);
         let mut at = function.start;
@@ -227,7 +228,7 @@ impl<'a> Program<'a> {
                 let Some(first) = self.halfword(function.section, address) else { break };
                 let second = self.halfword(function.section, address + 2).unwrap_or(0);
                 if is_data {
-                    // In literals, the addresses of functions have the lowest bit set.
+                    // If data in the code contain the address of a function, the lowest bit of this address is set.
                     let word = u32::from(second) << 16 | u32::from(first);
                     if address.is_multiple_of(4) && word & 1 == 1 && self.functions.contains_key(&(word & !1))
                     {
@@ -245,7 +246,7 @@ impl<'a> Program<'a> {
                         call = true;
                         found(address, self.function_at(to).map_or(End::Nowhere(to), End::Function));
                     }
-                    // The linker uses a jump to a constant address for long distances.
+                    // For long distances, the linker uses a jump to a constant address.
                     Flow::Indirect(register) => match halves[usize::from(register)] {
                         Some((at, to)) if at + 4 == address => {
                             found(address, self.function_at(to & !1).map_or(End::Nowhere(to), End::Function));
@@ -264,7 +265,7 @@ impl<'a> Program<'a> {
                             }
                         }
                     }
-                    // A trap after a call that does not return is never executed.
+                    // The processor never executes a trap after a call that does not return.
                     Flow::Trap if !after_call => found(address, End::Trap),
                     Flow::Trap | Flow::Other => {}
                 }

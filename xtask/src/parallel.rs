@@ -1,4 +1,4 @@
-//! Runs programs in parallel; most of them wait and use little processor time.
+//! Runs programs in parallel. Most of these programs wait and use little processor time.
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
@@ -13,22 +13,22 @@ use anyhow::{Result, ensure};
 use crate::shell::Scratch;
 use crate::tally::{Outcome, Tally};
 
-/// Output and result of a program.
+/// Output and result of a program that has ended.
 pub(crate) struct Ended {
-    /// Text on standard output and standard error.
+    /// Text on standard output and standard error of the program.
     pub output: String,
     /// `true` if the exit code was 0.
     pub passed: bool,
-    /// Duration.
+    /// Duration of the program, s.
     pub seconds: f64,
 }
 
 /// Result of a program that ran in parallel with other programs.
 pub(crate) trait Ran {
-    /// Returns the output and the result of the program if the program ran.
+    /// Returns the output and the result of the program. Returns `None` if the program did not run.
     fn ended(&self) -> Option<&Ended>;
 
-    /// Returns the output if the program failed.
+    /// Returns the output of the program if the program failed.
     fn failure(&self) -> Option<&str> {
         self.ended().filter(|ended| !ended.passed).map(|ended| &*ended.output)
     }
@@ -51,28 +51,29 @@ impl Ran for Result<Option<Ended>> {
     }
 }
 
-/// Function that runs a program and writes its output to this file; `None` if the program cannot run.
+/// Function that runs a program and writes its output to this file. Returns `None` if the program cannot run.
 type Run<'a> = Box<dyn Fn(&Path) -> Result<Option<Ended>> + Send + Sync + 'a>;
 
-/// Check that runs in parallel with other checks and is reported as a separate step.
+/// Check that runs in parallel with other checks. The result is reported as a separate step.
 pub(crate) struct Check<'a> {
-    /// Title of the step.
+    /// Title of the step for this check.
     pub title: String,
-    /// Runs the check.
+    /// Function that runs the check.
     pub run: Run<'a>,
-    /// Returns the outcome of the step.
+    /// Function that returns the outcome of the step.
     pub outcome: fn(&Ended) -> Result<Outcome>,
     /// Reason why the check cannot run, if any.
     pub missing: String,
 }
 
-/// Returns the outcome of a check that counts as one test.
+/// Returns the outcome of a check that counts as a single test.
 pub(crate) fn whole(ended: &Ended) -> Result<Outcome> {
     ensure!(ended.passed, "it ended with an error");
     Ok(Outcome::Passed)
 }
 
-/// Runs the checks whose steps are selected, each as a separate step. The longest check should be first in the list.
+/// Runs the checks whose steps are selected, each as a separate step. The longest check should be the first in the
+/// list.
 pub(crate) fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
     checks.retain(|check| tally.wants(&check.title));
     let ran = run_all(
@@ -94,12 +95,12 @@ pub(crate) fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
     }
 }
 
-/// Calls `run` for each of `items`, in parallel, with one more call at a time than there are processors. `log` is a file for the output.
-/// Calls `ended` for each result.
+/// Calls `run` for each of `items`, in parallel. The number of parallel calls is the number of processors plus one. `log` is a file for
+/// the output of a program. Calls `ended` for each result.
 ///
-/// Tests with simulated arms and browsers depend on real time, so they can fail on a busy computer. Therefore, a program that
-/// failed runs again when all other programs have ended, and its second result is used. Returns the number of `items` that passed
-/// only in the second run.
+/// Tests with simulated arms and browsers depend on real time, so they can fail on a busy computer. Therefore, if a program
+/// failed, it runs again when all other programs have ended, and its second result counts. Returns the number of `items` that
+/// passed only in the second run.
 pub(crate) fn run_all<T: Send, R: Ran + Send>(
     items: Vec<T>,
     run: impl Fn(&T, &Path) -> R + Sync,

@@ -1,4 +1,4 @@
-//! Folders of this computer whose paths would become part of compiled programs, and the names that replace these
+//! Folders of this computer whose paths the compiler would put into compiled programs, and the names that replace these
 //! paths.
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ fn cargo_home() -> PathBuf {
         .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
 }
 
-/// Returns the folders, each with its replacement name. A later entry has priority over an earlier entry.
+/// Returns the folders, each with its replacement name. If two entries match a path, the later entry has priority.
 pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut folders = vec![
         (shell::root().to_owned(), "openjtc"),
@@ -39,7 +39,8 @@ pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok(folders)
 }
 
-/// Returns switches for cargo's `--config`, so that the compiler output for `triple` does not contain these paths.
+/// Returns options for cargo's `--config`. With these options, the compiler output for `triple` does not contain paths
+/// of this computer.
 pub(crate) fn remapped(triple: &str) -> Result<String> {
     let flags = folders()?.into_iter();
     let flags: Vec<String> =

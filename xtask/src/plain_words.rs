@@ -1,8 +1,8 @@
-//! `cargo xtask plain-words`: counts marks (patterns of sentences that are hard to read) in comments, messages, help
-//! and documents.
+//! `cargo xtask plain-words`: counts marks in comments, messages, help and documents. A mark is a pattern of sentences
+//! that are hard to read.
 //!
-//! The counts of each part of the project are stored and may only decrease. CONTRIBUTING.md explains how to write
-//! plain sentences.
+//! The command stores the counts of each part of the project, and the counts may only decrease. CONTRIBUTING.md
+//! explains how to write plain sentences.
 mod marks;
 mod texts;
 
@@ -18,22 +18,22 @@ use crate::shell::{self, files, root};
 
 /// File that contains the stored counts of marks.
 const KEPT: &str = "xtask/plain-words.txt";
-/// Files with prose.
+/// Extensions of the files that contain prose.
 const EXTENSIONS: [&str; 7] = ["rs", "py", "pyi", "md", "toml", "ts", "svelte"];
-/// Excluded files: the changelog, and files that another project or a command has written.
+/// Files that the command does not read: the changelog, and files that another project or a command has written.
 const EXCLUDED: [&str; 3] = ["CHANGELOG.md", "Cargo.toml", "api-types.ts"];
 
 /// Occurrence of a mark in a file.
 struct Place {
     part: String,
-    /// Path and line.
+    /// Path and line number of the mark.
     at: String,
     mark: &'static str,
     /// Sentence that contains the mark.
     sentence: String,
 }
 
-/// Runs the command. `arguments` is `--update`, or the name of a part whose marks are printed.
+/// Runs `cargo xtask plain-words`. `arguments` is `--update`, or the name of a part whose marks the command prints.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let update = shell::flag(&mut arguments, "--update");
@@ -60,7 +60,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns an error if a part has more marks than its stored count.
+/// Returns an error if a part of the project has more marks than its stored count.
 pub(crate) fn check() -> Result<()> {
     compare(&counts(&places()?), &kept()?)
 }
@@ -126,8 +126,8 @@ fn places() -> Result<Vec<Place>> {
     Ok(places)
 }
 
-/// Returns the name of the crate that contains a file. For files outside of crates, returns the name of the folder,
-/// or `pages` for files at the root.
+/// Returns the name of the crate that contains a file. For files outside of crates, returns the name of the folder. For
+/// files in the root folder, returns `pages`.
 fn part(path: &Path) -> String {
     let mut folders = path.iter().map(|folder| folder.to_string_lossy());
     let first = folders.next().unwrap_or_default();

@@ -1,8 +1,8 @@
-//! Builds that later steps need. The builds run at the lowest priority while earlier steps wait.
+//! Builds that later steps of the tests need. The builds run at the lowest priority while earlier steps wait.
 //!
 //! Most tests spend their time waiting, for example for a serial line with a realistic speed, or for the end of a lease. The free
-//! processor time is used to build the boards' programs, the emulator and the Python package. A failed build is reported in the step
-//! that needs it, because that step repeats the build.
+//! processor time is used to build the firmware, the emulator and the Python package. If a build fails, the step that needs the
+//! build reports the failure, because that step repeats the build.
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 
@@ -17,23 +17,23 @@ pub(crate) struct Prebuild {
 }
 
 impl Prebuild {
-    /// Begins the builds. The slowest builds are first in the list.
+    /// Starts the builds in the background. The slowest builds are first in the list.
     pub(crate) fn begin() -> Self {
         let (sender, receiver) = mpsc::channel();
         let make = move || {
             if let Err(error) = shell::in_background(|| make(&receiver)) {
-                // Without background builds, the steps build the programs themselves, but the tests take longer.
+                // Without background builds, the steps build the programs themselves, so the tests take longer.
                 println!("-- the builds in advance ended: {error:#}");
             }
         };
         Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
     }
 
-    /// Allows the build of the Python package. Cargo allows only one build at a time in a target folder. If the low-priority build
-    /// began earlier, it would delay the steps.
+    /// Permits the build of the Python package. Cargo allows only one build at a time in a target folder. If the low-priority
+    /// build began earlier, it would delay the steps.
     pub(crate) fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
-            // An error means that an earlier build has failed and the thread has ended.
+            // An error of this call means that an earlier build has failed and the thread has ended.
             let _ = sender.send(());
         }
     }
@@ -41,10 +41,10 @@ impl Prebuild {
 
 impl Drop for Prebuild {
     fn drop(&mut self) {
-        // If the workspace was not built, this call ends the wait of the thread.
+        // If the workspace was not built, this assignment ends the wait of the thread.
         self.workspace_is_built = None;
         if let Some(thread) = self.making.take() {
-            // A panic of the thread has no effect on the checks, so it is ignored.
+            // A panic of the background thread has no effect on the checks, so the code ignores it.
             let _ = thread.join();
         }
     }
@@ -52,7 +52,7 @@ impl Drop for Prebuild {
 
 fn make(workspace_is_built: &Receiver<()>) -> Result<()> {
     python::environment("requirements.txt")?;
-    // An error is ignored: without the browser, the step that needs it is skipped.
+    // The code ignores an error: without the browser, the step that needs the browser is skipped.
     let _ = web::install_browser();
     emulate::programs()?;
     firmware::lints()?;

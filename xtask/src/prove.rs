@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
-/// Runs the command. `arguments` is `mutants` or `fuzz`, followed by the arguments of the selected check.
+/// Runs `cargo xtask prove`. `arguments` is `mutants` or `fuzz`, followed by the arguments of the selected check.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     match arguments.split_first() {
         Some((what, rest)) if what == "mutants" => mutants::main(rest),

@@ -1,4 +1,4 @@
-//! Checks against independent references in Python. The checks run in a virtual environment, which is created
+//! Checks against independent references in Python. The checks run in a virtual environment, which this module creates
 //! automatically.
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use crate::shell::{self, apt_install, command, root, run, works};
 use crate::suite;
 use crate::tally::{Outcome, Tally};
 
-/// Returns the interpreter of a virtual environment with the packages of references/`requirements`; creates the
+/// Returns the interpreter of a virtual environment with the packages of references/`requirements`. Creates the
 /// environment if it does not exist.
 pub(crate) fn environment(requirements: &str) -> Result<PathBuf> {
-    // A second caller waits while the environment is being created.
+    // A second caller waits while the first caller creates the environment.
     static MAKING: Mutex<()> = Mutex::new(());
     let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
     let list = root().join("references").join(requirements);
@@ -53,18 +53,19 @@ pub(crate) fn pip_install(python: &Path) -> Command {
     install
 }
 
-/// Returns the folder of third-party robot descriptions, for all environments.
+/// Returns the folder of third-party robot descriptions, which all environments share.
 pub(crate) fn robots() -> PathBuf {
     shell::target().join("robots")
 }
 
 /// Arguments of a check.
 struct Check {
-    /// Below references/.
+    /// Path of the script below references/.
     script: &'static str,
-    /// Program below the release folder that the check runs; passed as the first argument.
+    /// Path of the program that the check runs, below the release folder. This path is the first argument of the
+    /// script.
     program: Option<&'static str>,
-    /// Files of the demo that the check reads; passed as the next arguments.
+    /// Files of the demo that the check reads. The names of these files are the next arguments of the script.
     demo_files: &'static [&'static str],
 }
 
@@ -99,8 +100,8 @@ static CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
-/// Runs the preparation steps, and returns a check for each reference. `demo` is the folder with the files of the
-/// demo.
+/// Runs the preparation steps, and returns a check for each independent reference. `demo` is the folder with the files
+/// of the demo.
 pub(crate) fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Check<'a>> {
     let mut python = None;
     tally.step("Python environment of the references", || {
@@ -141,7 +142,7 @@ pub(crate) fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<parallel::Che
 }
 
 impl Check {
-    /// Runs the check; `None` if the demo did not write its files to `demo`.
+    /// Runs the Python script of the check. Returns `None` if the demo did not write its files to `demo`.
     fn run(&self, (python, demo): (&Path, &Path), log: &Path) -> Result<Option<Ended>> {
         if !self.demo_files.iter().all(|name| demo.join(name).exists()) {
             return Ok(None);

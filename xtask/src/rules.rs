@@ -1,4 +1,4 @@
-//! Rule coverage: checks that each rule of the protocol pages is mentioned by a test in the Rust sources.
+//! Rule coverage: checks that a test in the Rust sources mentions each rule of the protocol pages.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
@@ -15,7 +15,7 @@ fn defined(page: &str, letter: char) -> BTreeSet<u32> {
     page.split(&start).skip(1).filter_map(|rest| rest.split_once("**")?.0.parse().ok()).collect()
 }
 
-/// Returns the numbers of the rules that a source mentions as `j13_…`, `J-13` or `j_13`, in upper or lower case.
+/// Returns the numbers of the rules that a source file mentions as `j13_…`, `J-13` or `j_13`, in upper or lower case.
 fn named(source: &str, letter: char) -> BTreeSet<u32> {
     let mut rules = BTreeSet::new();
     let bytes = source.as_bytes();
@@ -35,7 +35,7 @@ fn named(source: &str, letter: char) -> BTreeSet<u32> {
     rules
 }
 
-/// Returns the part of a source that contains tests: the whole file if it is in tests/, otherwise the part from
+/// Returns the part of a source file that contains tests: the complete file if it is in tests/, otherwise the part from
 /// `#[cfg(test)]` on.
 fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
     let is_test_file = path.components().any(|c| c.as_os_str() == "tests")
@@ -46,7 +46,7 @@ fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
     source.find("#[cfg(test)]").map_or("", |at| &source[at..])
 }
 
-/// Returns an error that lists the rules without a test.
+/// Returns an error that lists the rules that no test mentions.
 pub(crate) fn check() -> Result<()> {
     let mut tests = Vec::new();
     for directory in ["crates", "emulator", "firmware"] {

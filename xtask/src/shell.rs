@@ -1,4 +1,5 @@
-//! Runs other programs. Prints each command before running it, and includes the command in the error if it fails.
+//! Runs other programs. The module prints each command before running it. If a command fails, the error contains the
+//! command.
 use std::cell::Cell;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Write};
@@ -12,7 +13,7 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
 
-/// Returns cargo's target folder.
+/// Returns the target folder of cargo.
 pub(crate) fn target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => root().join(directory),
@@ -20,12 +21,12 @@ pub(crate) fn target() -> PathBuf {
     }
 }
 
-/// Returns a command that runs `program` in the root of the workspace.
+/// Returns a command that runs `program` in the root folder of the workspace.
 pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
-    // Cargo sets these variables for xtask's own package. Build scripts that read the variables (for example ring's) would run again each
-    // time that cargo is used without xtask in between.
+    // Cargo sets these environment variables for the package of xtask. Build scripts that read the variables (for example the build
+    // script of the crate ring) would run again each time that the user changes between xtask and cargo without xtask.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();
         if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {
@@ -54,12 +55,13 @@ pub(crate) fn lint(cargo: &mut Command) -> Result<&mut Command> {
     Ok(cargo.env("RUSTC_WORKSPACE_WRAPPER", clippy).env("CLIPPY_ARGS", ""))
 }
 
-/// Returns the processor time of all programs that have ended so far, with their child processes; `None` if the system has no `/proc`.
+/// Returns the processor time of all programs that have ended so far, with their child processes. Returns `None` if the system has no
+/// `/proc`.
 ///
-/// Programs of [`in_background`] are included when they have ended.
+/// The result includes programs of [`in_background`] that have ended.
 pub(crate) fn processor_seconds() -> Option<f64> {
-    // According to proc_pid_stat(5), the name in parentheses is followed by the third and later fields. cutime and
-    // cstime are fields 16 and 17, in 1/100 s.
+    // According to proc_pid_stat(5), the name of the program in parentheses is followed by the third and later fields.
+    // cutime and cstime are fields 16 and 17, in 1/100 s.
     let line = std::fs::read_to_string("/proc/self/stat").ok()?;
     let mut fields = line.rsplit(") ").next()?.split(' ').skip(13);
     let ticks = fields.next()?.parse::<f64>().ok()? + fields.next()?.parse::<f64>().ok()?;
@@ -86,7 +88,8 @@ thread_local! {
     static IN_BACKGROUND: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `body`. Programs that `body` starts with [`run`] or [`read`] run at the lowest priority and without output.
+/// Runs the closure `body`. Programs that `body` starts with [`run`] or [`read`] run at the lowest priority and without
+/// output.
 pub(crate) fn in_background<T>(body: impl FnOnce() -> T) -> T {
     IN_BACKGROUND.set(true);
     let done = body();
@@ -94,7 +97,7 @@ pub(crate) fn in_background<T>(body: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Returns the command with a lower priority; `by` = 19 is the lowest priority.
+/// Returns the command with a lower priority. The lowest priority is `by` = 19.
 pub(crate) fn nice(command: &Command, by: u8) -> Command {
     let mut nice = Command::new("nice");
     nice.args(["-n", &by.to_string()]).arg(command.get_program()).args(command.get_args());
@@ -110,7 +113,7 @@ pub(crate) fn nice(command: &Command, by: u8) -> Command {
     nice
 }
 
-/// Runs a command whose output is shown on the terminal. Returns an error if the exit code is not 0.
+/// Runs a command whose output appears on the terminal. Returns an error if the exit code is not 0.
 pub(crate) fn run(command: &mut Command) -> Result<()> {
     let background = IN_BACKGROUND.get();
     if !background {
@@ -127,7 +130,7 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a command. Prints each line of its standard output immediately, and also passes the line to `line`.
+/// Runs a command. Prints each line of its standard output immediately, and also passes each line to `line`.
 pub(crate) fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     read_lines(command, |text| {
         println!("{text}");
@@ -155,7 +158,7 @@ pub(crate) fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> R
     Ok(())
 }
 
-/// Runs a command and returns its standard output. Progress and errors are shown on the terminal.
+/// Runs a command and returns its standard output. Progress and errors of the command appear on the terminal.
 pub(crate) fn read(command: &mut Command) -> Result<String> {
     let background = IN_BACKGROUND.get();
     let output = command
@@ -173,7 +176,7 @@ pub(crate) fn read(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Returns `true` if a program can be started and its exit code is 0. The output of the program is discarded.
+/// Returns `true` if a program can be started and its exit code is 0. Discards the output of the program.
 pub(crate) fn works(command: &mut Command) -> bool {
     command
         .stdin(Stdio::null())
@@ -183,7 +186,7 @@ pub(crate) fn works(command: &mut Command) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Installs Debian packages. Needs root privileges.
+/// Installs Debian packages. The function needs root privileges.
 pub(crate) fn apt_install(packages: &[&str]) -> Result<()> {
     let hint = format!("install it by hand: sudo apt-get install {}", packages.join(" "));
     if !works(command("id").arg("-u")) || read(command("id").arg("-u"))?.trim() != "0" {
@@ -202,7 +205,7 @@ pub(crate) fn apt_install(packages: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Separate folder below the temporary folder, which is removed on drop.
+/// Separate folder in the temporary folder of the system. The folder is removed when this value is dropped.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
@@ -213,7 +216,7 @@ impl Scratch {
         Ok(Self(path))
     }
 
-    /// Returns the path.
+    /// Returns the path of the folder.
     pub(crate) fn path(&self) -> &Path {
         &self.0
     }
@@ -225,8 +228,8 @@ impl Drop for Scratch {
     }
 }
 
-/// Returns the sorted files below `directory` with one of these extensions. Omits build output, installed packages
-/// and hidden folders.
+/// Returns the sorted files below `directory` with one of these extensions. The result does not contain build output,
+/// installed packages and hidden folders.
 pub(crate) fn files(directory: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut waiting = vec![directory.to_owned()];
@@ -263,7 +266,7 @@ pub(crate) fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<S
     Ok(Some(arguments.remove(at)))
 }
 
-/// Removes `--name` from `arguments`; returns `true` if it was present.
+/// Removes `--name` from `arguments`. Returns `true` if `arguments` contained this flag.
 pub(crate) fn flag(arguments: &mut Vec<String>, name: &str) -> bool {
     let before = arguments.len();
     arguments.retain(|a| a != name);

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 
 use crate::shell::{self, cargo, run};
 
-/// Runs the command. `arguments` may contain `--hours H` and `--seed N`.
+/// Runs `cargo xtask soak`. `arguments` may contain `--hours H` and `--seed N`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let hours = shell::option(&mut arguments, "--hours")?.unwrap_or_else(|| "24".into());

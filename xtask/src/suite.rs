@@ -1,9 +1,9 @@
-//! The tests of the workspace. Cargo builds the test programs, and this module runs them in parallel.
+//! The tests of the workspace. Cargo builds the test programs, and this module runs the test programs in parallel.
 //!
 //! Cargo runs one test program after the other. Many tests of this project wait in real time, for example for the end of a lease or
-//! for the timeout of a silent board. These programs use little processor time, so several programs run in parallel. The tests of a
-//! crate are linked into one program, `suite`, which runs once for each test file. A process therefore runs only the tests of one
-//! file.
+//! for the timeout of a silent board. These programs use little processor time, so this module runs several programs in parallel.
+//! The tests of a crate are linked into one program, `suite`, which runs once for each test file. Therefore a process runs only the
+//! tests of one file.
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::num::NonZero;
@@ -20,14 +20,14 @@ use crate::tally::{self, Counts, Outcome};
 struct Program {
     package: PathBuf,
     executable: PathBuf,
-    /// Name of the program and, for `suite`, of the test file.
+    /// Name of the test program and, for `suite`, of the test file.
     name: String,
     /// Selected tests; empty if all tests are selected.
     tests: Vec<String>,
 }
 
-/// Runs all tests of the workspace and all documentation tests, and adds up the test counts. Calls `built` when cargo has built the
-/// workspace.
+/// Runs all tests of the workspace and all documentation tests, and adds up the test counts. Calls `built` when cargo has built
+/// the workspace.
 pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
     let tests = build()?;
     programs()?;
@@ -41,7 +41,7 @@ pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
         println!("failed: {failure}");
     }
     if counts.failed == 0 {
-        // A program that ended too early has not reported test counts.
+        // A test program that ended too early has not reported its test counts.
         ensure!(failures.is_empty(), "a test program broke off: {}", failures.join(", "));
         documented?;
         ensure!(counts.passed > 0, "no test was run at all");
@@ -49,10 +49,10 @@ pub(crate) fn run(built: impl FnOnce()) -> Result<Outcome> {
     Ok(Outcome::Counted(counts, printed))
 }
 
-/// Builds the commands and the examples with the dependencies that the tests have. Returns their folder.
+/// Builds the commands and the examples with the same dependencies as the tests. Returns the folder of these programs.
 ///
-/// Cargo selects features for all packages of a command together. With a single package, it would build half of the
-/// dependencies a second time.
+/// Cargo selects features for all packages of a command together. If the command named a single package, cargo would
+/// build half of the dependencies a second time.
 pub(crate) fn programs() -> Result<PathBuf> {
     compile(&["build", "--bins", "--examples"], |_| {})?;
     Ok(shell::target().join("release"))
@@ -84,7 +84,7 @@ fn compile(arguments: &[&str], mut each: impl FnMut(&Value)) -> Result<()> {
     })
 }
 
-/// Builds the test programs.
+/// Builds the test programs of the workspace.
 fn build() -> Result<Vec<Program>> {
     let mut messages = Vec::new();
     compile(&["test", "--tests", "--no-run"], |message| messages.push(message.clone()))?;
@@ -106,7 +106,7 @@ fn build() -> Result<Vec<Program>> {
 }
 
 impl Program {
-    /// Splits a suite into one part for each of its test files.
+    /// Splits the test program `suite` into one part for each of its test files.
     fn by_file(self) -> Result<Vec<Self>> {
         if self.name != "suite" {
             return Ok(vec![self]);
@@ -122,7 +122,7 @@ impl Program {
     }
 }
 
-/// Returns the names of the tests in a list that libtest has printed, grouped by the top-level module.
+/// Returns the names of the tests in a list that libtest has printed, grouped by top-level module.
 fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
     let mut files = BTreeMap::<&str, Vec<String>>::new();
     for test in list.lines().filter_map(|line| line.strip_suffix(": test")) {
@@ -132,14 +132,14 @@ fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
 }
 
 /// Number of tests of one UCoM program that run in parallel, per processor. Tests of UCoM boards spend nearly all of their time
-/// waiting. For other programs, the default of one test per processor is used, because a simulated controller needs much processor
-/// time to be on time.
+/// waiting. Other programs use the default of one test per processor, because a simulated controller needs much processor time to
+/// be on time.
 const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
 /// Argument of the GNU program `env` that sets these signals to their default handling.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 
-/// Runs all programs, and prints the output of each when it has ended. Returns the names of the failed programs, and adds their
-/// failure messages to `printed`.
+/// Runs all test programs, and prints the output of each program when it has ended. Returns the names of the failed programs,
+/// and adds their failure messages to `printed`.
 fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) -> Result<Vec<String>> {
     let mut failures = Vec::new();
     let ended = |program: Program, ended: Result<Ended>| {
@@ -156,15 +156,15 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
             }
             Err(error) => failures.push(format!("{name}, which cannot be run: {error:#}")),
         }
-        // The output is flushed so that a reader of a pipe sees the progress.
+        // The code flushes the output so that a reader of a pipe sees the progress.
         std::io::stdout().flush().ok();
     };
     // If xtask runs under `nohup` or in the background of a script, it ignores signals that tests send to their programs. The
-    // test programs inherit this setting.
+    // test programs inherit this signal setting.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
     let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
     let threads = (BOARD_TESTS_FOR_A_PROCESSOR * processors).to_string();
-    // Each program runs in the folder of its package, as with cargo.
+    // Each test program runs in the folder of its package, as with cargo.
     let run = |program: &Program, log: &Path| {
         let mut command = if heeds_signals {
             let mut env = shell::command("env");
@@ -187,7 +187,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
     Ok(failures)
 }
 
-/// Adds the numbers of a line to the counts if it is a result line.
+/// If a line is a result line, adds the numbers of the line to the counts.
 pub(crate) fn count_results(line: &str, counts: &mut Counts) {
     let Some(rest) = line.strip_prefix("test result: ") else { return };
     counts.passed += count(rest, "passed");

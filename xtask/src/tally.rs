@@ -1,4 +1,5 @@
-//! Runs the steps of a command. Prints a heading for each step, collects the failures, and prints a closing line.
+//! Runs the steps of a command. The module prints a heading for each step, collects the failures, and prints a closing
+//! line.
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -6,30 +7,30 @@ use anyhow::Result;
 
 use crate::shell;
 
-/// Outcome of a step.
+/// Outcome of a step of a command.
 pub(crate) enum Outcome {
     /// A single check that passed.
     Passed,
-    /// Counts of several tests, and the output of the failed ones.
+    /// Counts of several tests, and the output of the failed tests.
     Counted(Counts, String),
-    /// The step was not run. Contains the reason.
+    /// The step was not run. The text is the reason why the step was skipped.
     Skipped(String),
 }
 
-/// Counts of tests.
+/// Counts of test results.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Counts {
-    /// Passed tests.
+    /// Number of passed tests.
     pub passed: u64,
-    /// Failed tests.
+    /// Number of failed tests.
     pub failed: u64,
-    /// Skipped tests.
+    /// Number of skipped tests.
     pub skipped: u64,
-    /// Test programs that failed in the first run, and passed in a second run without other programs.
+    /// Number of test programs that failed in the first run, and passed in a second run without other programs.
     pub passed_alone: u64,
 }
 
-/// Finished steps.
+/// Steps of a command that have finished.
 #[derive(Default)]
 pub(crate) struct Tally {
     only: Option<String>,
@@ -49,8 +50,8 @@ impl Tally {
         self.only.as_ref().is_none_or(|only| title.contains(only))
     }
 
-    /// Prints the heading of a step and runs the step. An error is reported and counted. After an error, the next
-    /// step still runs.
+    /// Prints the heading of a step and runs the step. If the step fails, the function prints and counts the error, and
+    /// the next step still runs.
     pub(crate) fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
         if !self.wants(title) {
             return;
@@ -75,7 +76,8 @@ impl Tally {
                 self.counts.skipped += counts.skipped;
                 self.passed_alone(counts.passed_alone);
                 if counts.failed > 0 {
-                    // The failures are printed again at the end, so that the last part of a long log shows the reason.
+                    // The command prints the failures again at the end, so that the last part of a long log shows the
+                    // reason.
                     let failure = format!("{title}: {} failed\n{}", counts.failed, printed.trim());
                     self.failures.push(failure.trim_end().to_owned());
                 }
@@ -97,12 +99,13 @@ impl Tally {
         }
     }
 
-    /// Counts programs that failed in the first run, and passed in a second run without other programs.
+    /// Adds the number of test programs that failed in the first run, and passed in a second run without other
+    /// programs.
     pub(crate) fn passed_alone(&mut self, programs: u64) {
         self.counts.passed_alone += programs;
     }
 
-    /// Prints the failed and skipped steps again, and then the closing line.
+    /// Prints the failed steps and the skipped steps again, and then the closing line.
     pub(crate) fn finish(self) -> ExitCode {
         println!();
         for skip in &self.skips {
@@ -120,8 +123,8 @@ impl Tally {
     }
 }
 
-/// Returns the part of the output from the first line that begins with `heading`. After this line, test runners
-/// describe the failures.
+/// Returns the output from the first line that begins with `heading`. After this line, test runners describe the
+/// failures.
 pub(crate) fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();

@@ -1,5 +1,4 @@
-//! `cargo xtask test`: runs every check of the project. The checks that find an error with the least effort run
-//! first.
+//! `cargo xtask test`: runs every check of the project. The checks that find an error with the least effort run first.
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -19,7 +18,7 @@ const BOARD_CRATES: [&str; 5] = ["jtc-dynamics", "jtc-wire", "jtc-bus", "jtc-cor
 /// Largest permitted tracking error of each joint in the demo, mrad RMS.
 const RMS_LIMIT_MRAD: f64 = 2.0;
 
-/// Runs the command. `arguments` may contain `--quick` and `--only TEXT`.
+/// Runs `cargo xtask test`. `arguments` may contain `--quick` and `--only TEXT`.
 pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let quick = shell::flag(&mut arguments, "--quick");
@@ -49,7 +48,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
             let mut doc = cargo(&["doc", "--release", "--workspace", "--no-deps"]);
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
-        // The following steps run the programs that were built in the background.
+        // The next steps run the programs that were built in the background.
         drop(prebuild);
         tally.step("book: made, every link leads somewhere", || passed(book::made()));
         let scratch = Scratch::new("demo")?;
@@ -79,7 +78,7 @@ fn passed(result: Result<()>) -> Result<Outcome> {
     result.map(|()| Outcome::Passed)
 }
 
-/// Returns git's list of changes; `None` outside a checkout.
+/// Returns the list of changed files from git. Returns `None` if the folder is not a checkout of the repository.
 fn tree() -> Option<String> {
     shell::read(shell::command("git").args(["status", "--porcelain"])).ok()
 }
@@ -99,7 +98,7 @@ fn board_builds() -> Result<()> {
     Ok(())
 }
 
-/// Runs `jtc demo`, which writes to the folder `out`, and checks its output.
+/// Runs `jtc demo`, which writes to the folder `out`, and checks the files of the demo.
 fn demo(out: &Path) -> Result<()> {
     let mut demo = shell::command(suite::programs()?.join("jtc"));
     let text = shell::read(demo.args(["demo", "--speed", "max", "--json", "--out"]).arg(out))?;
@@ -144,8 +143,8 @@ fn check_demo_files(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the file contains a header with names, and at least one second of rows. Each row must contain as many
-/// finite numbers as there are names.
+/// Checks that the file contains a header with names, and at least one second of rows. The number of finite numbers in
+/// each row must equal the number of names.
 fn check_csv(csv: &str) -> Result<()> {
     let mut lines = csv.lines();
     let header = lines.next().context("recording.csv is empty")?;

@@ -1,5 +1,5 @@
 //! Checks that every file with tests belongs to a test program. The tests of a crate are one program, and cargo does not find
-//! other test files by itself.
+//! other test files automatically.
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, root};
 
-/// Returns the root files of a crate's test programs, if its manifest lists them.
+/// Returns the root files of the test programs of a crate, if the manifest of the crate lists these files.
 fn programs(package: &Path) -> Result<Option<Vec<PathBuf>>> {
     let manifest: toml::Table = read_to_string(package.join("Cargo.toml"))?.parse()?;
     if manifest["package"].get("autotests").and_then(toml::Value::as_bool) != Some(false) {
@@ -19,7 +19,7 @@ fn programs(package: &Path) -> Result<Option<Vec<PathBuf>>> {
     Ok(Some(roots.collect()))
 }
 
-/// Returns the files that may declare the module with the source `file`, and the name of this module.
+/// Returns the files that may declare the module in `file`, and the name of this module.
 fn parents(file: &Path, tests: &Path, programs: &[PathBuf]) -> Option<(Vec<PathBuf>, String)> {
     let is_folder = file.file_name()? == "mod.rs";
     let module = if is_folder { file.parent()? } else { file };

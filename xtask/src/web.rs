@@ -1,7 +1,7 @@
 //! Checks of the dashboard: checks its source, builds it again, compares the result with the files in the agents, and
-//! tests it in a browser.
+//! tests the dashboard in a browser.
 //!
-//! A build of the programs needs none of these steps, because the built files are in the repository.
+//! A build of the programs needs none of these steps, because the built dashboard files are in the repository.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -15,8 +15,8 @@ use crate::tally::{self, Counts, Outcome, Tally};
 /// Path of the browser that Debian installs.
 pub(crate) const BROWSER: &str = "/usr/bin/chromium";
 
-/// Returns a command for `program` of Node.js in `web/`, from the references' environment, so that Node.js need not
-/// be installed on the system.
+/// Returns a command for `program` of Node.js in `web/`. Node.js is part of the environment of the references, so that
+/// it does not need to be installed on the system.
 fn command(program: &str) -> Result<Command> {
     let python = python::environment("requirements.txt")?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -27,7 +27,7 @@ fn command(program: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// Installs the packages of the lock file, from the package registry.
+/// Installs the packages of the lock file from the package registry.
 fn install() -> Result<()> {
     let stamp = shell::root().join("web/node_modules/.package-lock.json");
     let lock = shell::root().join("web/package-lock.json");
@@ -55,7 +55,7 @@ pub(crate) fn steps(tally: &mut Tally) {
     });
 }
 
-/// Builds the dashboard in a temporary folder, and compares each file with the file in the agents.
+/// Builds the dashboard in a temporary folder, and compares each built file with the file in the agents.
 fn same_build() -> Result<()> {
     let (kept, scratch) = (shell::root().join("web/dist"), Scratch::new("web-dist")?);
     let built = scratch.path().join("dist");
@@ -77,7 +77,7 @@ fn same_build() -> Result<()> {
     Ok(())
 }
 
-/// Returns all files in a folder, with their paths relative to it.
+/// Returns all files in a folder, with their paths relative to the folder.
 fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let (mut found, mut waiting) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(directory) = waiting.pop() {
@@ -94,7 +94,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Installs Debian's browser if it is missing and the user is permitted to install it.
+/// Installs the browser of Debian if the browser is missing and the user is permitted to install it.
 pub(crate) fn install_browser() -> Result<()> {
     if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
 }
@@ -109,8 +109,8 @@ pub(crate) fn browser<'a>() -> parallel::Check<'a> {
     }
 }
 
-/// Tests the dashboard in a browser, with the built programs, and returns the output. Returns `None` if no browser is
-/// installed and none can be installed.
+/// Tests the dashboard in a browser, with the built programs, and returns the output of the tests. Returns `None` if no
+/// browser is installed and none can be installed.
 fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     if install_browser().is_err() {
         return Ok(None);
@@ -120,12 +120,12 @@ fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     let mut npm = command("npm")?;
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
-    // The browser draws 3D without hardware support and needs much processor time, so parallel programs that depend
-    // on real time get priority.
+    // The browser draws 3D without hardware support and needs much processor time. Therefore, parallel programs that
+    // depend on real time get priority.
     parallel::run(&mut shell::nice(&npm, 5), log).map(Some)
 }
 
-/// Returns the test counts that Node's test runner prints.
+/// Returns the test counts that the test runner of Node.js prints.
 fn counted(Ended { output, passed, .. }: &Ended) -> Result<Outcome> {
     let number = |word: &str| {
         let lines = output.lines().map(|line| line.trim_start_matches(['#', 'ℹ', ' ']));

@@ -11,8 +11,8 @@ fn bytes(line: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the CRC-16/XMODEM. This function calculates the CRC itself, so that the page is not checked with the
-/// code that the page describes.
+/// Returns the CRC-16/XMODEM of the bytes. This function calculates the CRC itself, so that the test does not check the
+/// page with the code that the page describes.
 fn crc(bytes: &[u8]) -> u16 {
     let mut crc = 0u16;
     for byte in bytes {
@@ -24,7 +24,7 @@ fn crc(bytes: &[u8]) -> u16 {
     crc
 }
 
-/// Returns an error with the first wrong line.
+/// Returns an error that contains the first wrong line of the page.
 pub(crate) fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/protocol-jtc.md")).context("docs/protocol-jtc.md")?;

@@ -1,4 +1,4 @@
-//! Execution time of sine and cosine in the system's mathematics library, as a reference for the dynamics.
+//! Execution time of sine and cosine in the mathematics library of the system, as a reference for the dynamics.
 use std::hint::black_box;
 
 use test_kit::clock::least_ns;

@@ -1,4 +1,4 @@
-//! Time to upload 12 000 points over serial lines with three baud rates, in virtual time.
+//! Time to upload 12 000 points over serial lines with three bit rates, in virtual time.
 use jtc_host::session::Flow;
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Trajectory};
 use jtc_sim::SimConfig;

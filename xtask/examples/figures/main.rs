@@ -1,9 +1,9 @@
-//! Measures figures that need several crates. Prints lines `name value`, which `cargo xtask bench` adds to the figures of the
-//! crates.
+//! Measures performance figures that need several crates. The program prints lines `name value`, which `cargo xtask bench`
+//! adds to the figures of the crates.
 //!
 //! Run `figures` for all groups, or `figures libm|tick|line|tracking|ucom|recording` for one group. Figures in virtual time do not
-//! change between runs. `figures recording-file FILE SECONDS` writes a recording of this duration, with contents like the recording of
-//! the group `recording`.
+//! change between runs. `figures recording-file FILE SECONDS` writes a recording of this duration. Its contents are like the contents
+//! of the recording in the group `recording`.
 
 mod libm;
 mod line;
@@ -45,7 +45,7 @@ fn main() -> world::Result<()> {
     Ok(())
 }
 
-/// Prints a figure.
+/// Prints the name and the value of a performance figure.
 fn print(name: &str, value: f64) {
     println!("{name} {value:.6}");
 }

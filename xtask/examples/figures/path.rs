@@ -1,12 +1,12 @@
-//! Trajectories for the measurements.
+//! Trajectories for the measurements of performance figures.
 use jtc_host::Point;
 use jtc_wire::RawPoint;
 
-/// Time between points, ms.
+/// Time between trajectory points, ms.
 pub(crate) const STEP_MS: u16 = 10;
 
 /// Returns `points` points of a smooth motion of all joints in whole periods of about 10 s. The motion begins and ends at
-/// rest at position zero.
+/// rest, at position zero.
 pub(crate) fn smooth(points: usize) -> Vec<Point> {
     const AMPLITUDE: [f64; 6] = [0.8, -0.5, 0.9, 0.7, -0.8, 1.0];
     let seconds = points.saturating_sub(1) as f64 * f64::from(STEP_MS) * 1e-3;
@@ -29,7 +29,7 @@ pub(crate) fn smooth(points: usize) -> Vec<Point> {
         .collect()
 }
 
-/// Returns the points in the format of the JTC protocol.
+/// Returns the points of a trajectory in the format of the JTC protocol.
 pub(crate) fn raw(points: &[Point]) -> Result<Vec<RawPoint>, Box<dyn std::error::Error>> {
     Ok(points.iter().enumerate().map(|(i, point)| point.raw(i)).collect::<Result<_, _>>()?)
 }

@@ -14,12 +14,12 @@ use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use crate::print;
 use crate::world::Result;
 
-/// Duration of the measured recording. The next constant is the ratio of an hour to this duration.
+/// Duration of the measured recording, s. The next constant is the ratio of an hour to this duration.
 const SECONDS: u32 = 300;
 const IN_AN_HOUR: f64 = 3600.0 / SECONDS as f64;
 
-/// Prints, for both formats, the time to make a report, the time to read the file, and the memory of a program that only makes the
-/// report.
+/// Prints three figures for both file formats: the time to make a report, the time to read the file, and the memory of a program
+/// that only makes the report.
 pub(crate) fn figures() -> Result<()> {
     let dir = tempfile::tempdir()?;
     for format in ["mcap", "csv"] {
@@ -43,7 +43,7 @@ pub(crate) fn figures() -> Result<()> {
     Ok(())
 }
 
-/// Prints the largest memory use of a report, MB, if the system reports this value.
+/// Prints the largest memory use of a report, MB, if the operating system reports this value.
 pub(crate) fn memory(path: &Path) -> Result<()> {
     report(path)?;
     let status = std::fs::read_to_string("/proc/self/status")?;
@@ -54,7 +54,7 @@ pub(crate) fn memory(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Makes a report in the way of `jtc report`.
+/// Makes a report in the same way as `jtc report`.
 fn report(path: &Path) -> Result<()> {
     let mut digest = Digest::new();
     let found = scan(path, |sample| digest.push(sample))?;
@@ -67,7 +67,7 @@ fn report(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Reads and decompresses each record of the file.
+/// Reads and decompresses each record of the recording.
 fn decompress(path: &Path) -> Result<()> {
     let file = BufReader::with_capacity(1 << 18, File::open(path)?);
     let mut records = 0_u64;
@@ -78,7 +78,7 @@ fn decompress(path: &Path) -> Result<()> {
     if records == 0 { Err("no record".into()) } else { Ok(()) }
 }
 
-/// Reads each byte of the file and counts its lines.
+/// Reads each byte of the recording and counts its lines.
 fn lines(path: &Path) -> Result<()> {
     let (mut file, mut piece, mut lines) = (File::open(path)?, vec![0; 1 << 18], 0);
     loop {
@@ -90,14 +90,14 @@ fn lines(path: &Path) -> Result<()> {
     }
 }
 
-/// Writes a recording of `seconds` at 1 kHz with a value in every field.
+/// Writes a recording of `seconds` seconds at 1 kHz with a value in every field.
 pub(crate) fn write(path: &Path, seconds: u32) -> Result<()> {
     let arm = Arm::avena();
     let info = RecordingInfo { trajectory: "long".into(), ..RecordingInfo::of(&arm) };
     let mut recorder = Recorder::create(path, &info)?;
     for i in 0..seconds * 1000 {
         recorder.write(&sample(i))?;
-        // The recorder of a running motion also writes at this interval.
+        // The recorder of a running motion also writes to the file at this interval.
         if i % 200 == 199 {
             recorder.flush()?;
         }
@@ -106,7 +106,7 @@ pub(crate) fn write(path: &Path, seconds: u32) -> Result<()> {
     Ok(())
 }
 
-/// Returns the sample for one millisecond, with noise in the measured values.
+/// Returns the sample of one millisecond, with noise in the measured values.
 fn sample(i: u32) -> Sample {
     let time_s = f64::from(i) * 1e-3;
     let noise = |n: u32| {

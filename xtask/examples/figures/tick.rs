@@ -1,5 +1,5 @@
-//! Longest time of a tick. The inputs of a motion in the simulator are recorded and replayed with new controllers. The motion uses a
-//! friction table, and a segment arrives while the arm moves.
+//! Longest time of a tick. The program records the inputs of a motion in the simulator, and replays these inputs with new
+//! controllers. The motion uses a friction table, and a segment arrives while the arm moves.
 use std::hint::black_box;
 
 use jtc_bus::Frame;
@@ -20,11 +20,12 @@ const ROUNDS: usize = 15;
 /// Inputs of the controller in one tick.
 struct Seen {
     bus: Vec<Frame>,
-    /// Index of the host's frame that was offered in this tick. A frame is offered until the controller has handled it.
+    /// Index of the frame that the host offers to the controller in this tick. The host offers a frame until the
+    /// controller has handled it.
     host: Option<usize>,
 }
 
-/// Returns a command as bytes.
+/// Returns a command as the bytes of its frame.
 fn bytes(command: &Command<'_>) -> Result<Vec<u8>> {
     let mut bytes = vec![0; FRAME_MAX];
     let length = command.emit(&mut bytes)?;
@@ -32,7 +33,8 @@ fn bytes(command: &Command<'_>) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Returns the frames of a host, with the state of the controller in which each frame is offered.
+/// Returns the frames of a host. Each entry also contains the state of the controller in which the host offers the
+/// frame.
 fn script() -> Result<Vec<(ControllerState, Vec<u8>)>> {
     use Command::{ArmModelUseDefault, FrictionTableUseDefault, PidParamUseDefault, TrajSetExecStatus};
     let mut frames = Vec::new();
@@ -62,8 +64,8 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
 }
 
 /// Records the inputs of a complete session: start-up, parameters, upload, motion. The simulated drives answer the
-/// simulator's own controller. A second controller receives the same inputs and shows when the next frame must be
-/// sent.
+/// simulator's own controller. A second controller receives the same inputs. Its state determines when the host must
+/// send the next frame.
 fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
     let mut shadow = controller();
@@ -93,7 +95,8 @@ fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
 pub(crate) fn figures() -> Result<()> {
     let frames = script()?;
     let seen = record(&frames);
-    // The minimum of all rounds is used, because it does not include the time of other programs on the computer.
+    // The program uses the minimum of all rounds, because the minimum does not include the time of other programs on
+    // the computer.
     let mut least = vec![f64::INFINITY; seen.len()];
     for _ in 0..ROUNDS {
         let mut controller = controller();

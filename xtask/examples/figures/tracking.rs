@@ -35,8 +35,8 @@ impl Errors {
     }
 }
 
-/// Returns the recorded motion of the existing arm and `true` if its data are available, otherwise a smooth motion
-/// and `false`.
+/// Returns the recorded motion of the existing arm and `true` if the data of the recording are available. Without these
+/// data, returns a smooth motion and `false`.
 fn motion() -> Result<(Vec<RawPoint>, bool)> {
     let data = std::env::var_os("OPENJTC_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/avena")),

@@ -1,5 +1,5 @@
-//! UCoM figures: time to number 31 boards and to update one board with 60 KiB, compared with the time of the frames on the bus. Also
-//! the speed of decoding, and the memory of a board.
+//! UCoM figures: the time to number 31 boards and the time to update one board with 60 KiB, compared with the time of the frames on
+//! the bus. The program also measures the speed of decoding, and the memory of a board.
 use std::hint::black_box;
 
 use can_link::{BusEvent, CanFrame, Id, MemberId, TimedBus};
@@ -25,10 +25,10 @@ struct Bench {
     tool: MemberId,
     boards: Vec<MemberId>,
     chain: ChainSim,
-    /// All frames in their order on the bus.
+    /// All frames of the bus, in the order in which they were sent.
     received: Vec<CanFrame>,
-    /// Time at which the last frame of program data ended on the bus. The next field is the total time until the boards answered
-    /// frames of program data, ns.
+    /// Time at which the last frame of program data ended on the bus. The next field is the total time that the boards needed to
+    /// answer frames of program data, ns.
     asked_at: Option<u64>,
     turn_round_ns: u64,
 }
@@ -64,7 +64,7 @@ impl Bench {
         self.bus.now_ns() / NS_PER_US
     }
 
-    /// Runs a procedure until it ends, and returns its cost.
+    /// Runs a procedure until it ends, and returns its duration and result.
     fn run(&mut self, request: Request) -> Result<Cost> {
         let before = self.bus.stats();
         self.turn_round_ns = 0;
@@ -88,7 +88,7 @@ impl Bench {
         }
     }
 
-    /// Sends the due frames of the PC and of all boards, and advances the time to the next event.
+    /// Sends the due frames of the PC and of all boards, and advances virtual time to the next event.
     fn step(&mut self) -> Result<()> {
         let now = self.now_us();
         self.chain.advance(now);
@@ -167,7 +167,8 @@ pub(crate) fn figures() -> Result<()> {
     Ok(())
 }
 
-/// Updates one board with 60 KiB. The measured time is from the start of the procedure to the last read-back.
+/// Updates one board with 60 KiB. The measured time begins at the start of the procedure and ends at the last
+/// read-back.
 fn update(name: &str, profile: Profile) -> Result<()> {
     let mut bench = Bench::new(1, profile);
     bench.run(Request::Init(InitOptions::default()))?;
@@ -182,14 +183,14 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     print(&format!("{name}_s"), cost.seconds);
     print(&format!("{name}_bus_s"), cost.busy_seconds);
     print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
-    // The result is the time that the PC adds to the bus time. The response times of the boards and the wait for the restart are
-    // subtracted.
+    // The result is the time that the PC adds to the bus time. The calculation subtracts the response times of the boards and
+    // the wait for the restart.
     let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
     print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
     Ok(())
 }
 
-/// Prints the number of frames that are decoded per second, measured with the frames that number a chain of boards.
+/// Prints the number of frames that the library decodes per second. The measured frames number a chain of boards.
 fn decode(received: &[CanFrame]) -> Result<()> {
     let profile = Profile::default();
     let frames: Vec<Frame> = received
@@ -210,7 +211,7 @@ fn decode(received: &[CanFrame]) -> Result<()> {
     }
     print("ucom_decode_frames_s", 1e9 / best);
     if let Some(path) = std::env::var_os("OPENJTC_UCOM_FRAMES") {
-        // The benchmark of python-can reads the following file, which contains one frame per line.
+        // The benchmark of python-can reads this file, which contains one frame per line.
         let text: String = received.iter().map(|frame| format!("(0.0) can0 {}\n", candump(frame))).collect();
         std::fs::write(&path, text)?;
         let board = |number| DbcBoard { number, ..DbcBoard::default() };

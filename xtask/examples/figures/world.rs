@@ -1,4 +1,4 @@
-//! Sessions with a simulated controller.
+//! Sessions with a simulated controller for the measurements.
 use std::time::Duration;
 
 use jtc_host::Session;
@@ -6,7 +6,7 @@ use jtc_host::port::sim::SimPort;
 use jtc_sim::{Operator, SimConfig, World, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
-/// Result type for errors of any type.
+/// Result type of functions whose errors can have any type.
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Returns a session with a controller in HoldPos that uses its default parameters.
@@ -17,8 +17,8 @@ pub(crate) fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     Ok(session)
 }
 
-/// Uploads and starts `points` with the simulated host of the simulator. The library's session cannot be used for all measurements,
-/// because it does not upload points without velocities, which fail its check.
+/// Uploads and starts `points` with the host of the simulator. Some measurements cannot use the session of the library, because
+/// the session does not upload points that fail its check, such as points without velocities.
 pub(crate) fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;

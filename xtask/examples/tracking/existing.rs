@@ -1,9 +1,11 @@
-//! The control law of the existing firmware in the version published in April 2022, for comparison.
+//! The control law of the existing firmware in the version published in April 2022, for a comparison with our control
+//! law.
 //!
-//! The law is τ = 1.3·(inverse dynamics + PID + friction). Each channel of the trajectory is interpolated linearly between points. The
-//! inverse dynamics use rigid links at the measured position, with the commanded velocity and acceleration. The error is the current set
-//! position minus the measured position, which is two milliseconds old. The derivative is computed from the mean of five errors. The
-//! sign function in the friction polynomial is a step at zero. If the answer of a joint is lost, its last measured position is used.
+//! The control law is τ = 1.3·(inverse dynamics + PID + friction). The controller interpolates each channel of the trajectory linearly
+//! between points. The inverse dynamics use rigid links at the measured position, with the commanded velocity and acceleration. The
+//! error is the current set position minus the measured position, which is two milliseconds old. The derivative is computed from the
+//! mean of five errors. The sign function in the friction polynomial is a step at zero. If the answer of a joint is lost, the controller
+//! uses the last measured position of the joint.
 use jtc_bus::{Answer, Frame, JOINTS, NodeState, Request, Scale, Target, config};
 use jtc_core::{Config, Friction, Parameters, PidGains, SetPoint};
 use jtc_dynamics::Dynamics;
@@ -13,12 +15,12 @@ use jtc_wire::RawPoint;
 const GAIN: f64 = 1.3;
 /// Duration of a tick, s.
 const DT: f64 = 0.001;
-/// Number of errors whose mean is used for the derivative.
+/// Number of errors whose mean the controller uses for the derivative.
 const WINDOW: usize = 5;
 /// Number of ticks in position hold before the motion.
 const SETTLE: u32 = 2_000;
 
-/// PID controller. After a reset, the stored errors of the last ticks are zero.
+/// PID controller of a joint. After a reset, the stored errors of the last ticks are zero.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pid {
     errors: [f64; WINDOW],
@@ -48,11 +50,11 @@ pub(crate) enum Phase {
     Hold(u32),
     /// The arm follows the path; the value is the current millisecond of the path.
     Operate(u32),
-    /// The end of the path was reached.
+    /// The arm has reached the end of the path.
     Finish,
 }
 
-/// The existing firmware's controller.
+/// The controller of the existing firmware.
 pub(crate) struct Existing {
     dynamics: Dynamics,
     gains: [PidGains; JOINTS],
@@ -65,17 +67,17 @@ pub(crate) struct Existing {
     temperature: [f64; JOINTS],
     ticks: u32,
     configured: bool,
-    /// Current phase.
+    /// Current phase of the controller.
     pub phase: Phase,
     /// Commanded trajectory point of this tick.
     pub set: SetPoint,
-    /// Measured positions, rad.
+    /// Measured joint positions, rad.
     pub measured: [f64; JOINTS],
 }
 
 impl Existing {
-    /// Creates the controller for a path, with the parameters of the built-in arm. These parameters are also used in
-    /// the existing firmware.
+    /// Creates the controller for a path, with the parameters of the built-in arm. The existing firmware uses the same
+    /// parameters.
     pub(crate) fn new(config: &Config, parameters: &Parameters, points: &[RawPoint], step_ms: u16) -> Self {
         let Friction::Polynomial(friction) = parameters.friction else { unreachable!("it has a polynomial") };
         Self {
@@ -96,7 +98,8 @@ impl Existing {
         }
     }
 
-    /// Takes the answers since the last call and returns the frame to send. Called once per millisecond.
+    /// Processes the answers since the last call and returns the frame to send. The simulation calls this function once
+    /// per millisecond.
     pub(crate) fn tick(&mut self, received: &[Frame]) -> Frame {
         for frame in received {
             if let Ok(Answer::Joint { node, report }) = Answer::parse(frame, self.scale) {
@@ -118,8 +121,8 @@ impl Existing {
         Request::Move { torque: self.torque(), pump: false }.emit()
     }
 
-    /// Returns the next frame until all joints are enabled. The frame is a request in every fourth tick, and a Move
-    /// in all other ticks.
+    /// Returns the next frame until all joints are enabled. In every fourth tick, the frame is a request; in all other
+    /// ticks, the frame is a Move.
     fn bring_up(&mut self) -> Frame {
         const TORQUE_MODE: u8 = 1;
         let states = self.states;
@@ -153,7 +156,8 @@ impl Existing {
         self.pid = [Pid::default(); JOINTS];
     }
 
-    /// Sets the commanded trajectory point of this millisecond. The points of the last two milliseconds are omitted.
+    /// Sets the commanded trajectory point of this millisecond. The controller omits the points of the last two
+    /// milliseconds.
     fn follow(&mut self, k: u32) {
         let end = (self.points.len() as u32 - 1) * self.step_ms;
         self.phase = Phase::Operate(k);

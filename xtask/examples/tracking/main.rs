@@ -1,5 +1,5 @@
 //! Runs the control law of the existing firmware and the control law of this project along the same paths on the same
-//! simulated plant. Writes the results to docs/tracking.md.
+//! simulated plant. The program writes the results to docs/tracking.md.
 mod existing;
 mod page;
 mod paths;
@@ -11,31 +11,31 @@ use jtc_sim::{FrictionModel, LuGre, ModelError, SimConfig};
 
 use run::{Figures, Outcome, Path, Result};
 
-/// Number of random arms. Each result is the median over these arms.
+/// Number of random simulated arms. Each result is the median over these arms.
 const SEEDS: u64 = 10;
 
-/// Condition under which both controllers are compared.
+/// Condition under which the program compares both controllers.
 #[derive(Clone, Copy, Debug)]
 pub struct Condition {
     /// Heading of the condition on the page.
     pub name: &'static str,
-    /// Description of the condition.
+    /// Description of the condition on the page.
     pub what: &'static str,
-    /// Share of the requested torque that the drives deliver.
+    /// Share of the commanded torque that the drives deliver.
     delivers: f64,
     /// Torque gain of our controller (J-61).
     gain: f64,
     friction: FrictionModel,
-    /// Speed around zero within which our friction compensation changes its sign, rad/s (a setting).
+    /// Speed around zero within which our friction compensation changes its sign, rad/s (a controller setting).
     sign_width: f64,
     /// Relative errors of the masses and of the friction in the model that both controllers use.
     error: ModelError,
     /// Mass at the flange that is missing in the models of both controllers, kg.
     mass: f64,
-    /// Probability that a frame is not received.
+    /// Probability that a frame on the joint bus is lost.
     lost: f64,
     jitter_ms: u8,
-    /// `true` if the result is compared with the goal.
+    /// `true` if the page compares the result with the goal.
     pub judged: bool,
 }
 
@@ -111,13 +111,13 @@ impl Condition {
         },
     ];
 
-    /// Returns the condition with these errors of the model's masses and friction.
+    /// Returns the condition with these errors of the masses and the friction in the model.
     fn believing(self, mass: f64, friction: f64) -> Self {
         Self { error: ModelError { mass, friction, ..self.error }, ..self }
     }
 
-    /// Returns the simulation of a seed. The arm hangs from the ceiling, as in the existing firmware. `gain` is the torque
-    /// gain of our controller.
+    /// Returns the simulation for a random seed. The arm hangs from the ceiling, as in the existing firmware. `gain` is
+    /// the torque gain of our controller.
     fn world(&self, seed: u64, start: [f64; JOINTS], gain: f64) -> SimConfig {
         let mut controller = Config { gravity: [0.0, 0.0, 9.81], ..Config::avena() };
         controller.friction_sign_width = self.sign_width;
@@ -139,8 +139,8 @@ impl Condition {
         world
     }
 
-    /// Returns the results of the existing control law and of our control law. Each result is the median over the seeds with
-    /// which the arm reached the end of the path.
+    /// Returns the results of the existing control law and of our control law. Each result is the median over the random
+    /// seeds for which the arm reached the end of the path.
     pub fn compare(&self, path: &Path) -> Result<[Runs; 2]> {
         let start = path.points.first().map(jtc_wire::RawPoint::position_rad).ok_or("an empty path")?;
         let (mut existing, mut ours) = (Vec::new(), Vec::new());
@@ -152,12 +152,12 @@ impl Condition {
     }
 }
 
-/// Results of a controller's runs.
+/// Results of the runs of one controller.
 #[derive(Clone, Debug)]
 pub struct Runs {
     /// Number of runs that reached the end of the path.
     pub finished: usize,
-    /// Medians over the runs that reached the end of the path.
+    /// Medians over the runs that reached the end of the path; `None` without such a run.
     pub figures: Option<Figures>,
     /// Reasons why runs ended before the end of the path.
     pub errors: Vec<String>,
@@ -192,8 +192,8 @@ fn median(all: &[Figures]) -> Figures {
     }
 }
 
-/// Returns the errors of our controller with a partly correct and a completely correct model. Each entry contains a
-/// heading, and the error of each joint in mrad.
+/// Returns the errors of our controller with a partly correct model and with a completely correct model. Each entry
+/// contains a heading, and the error of each joint in mrad.
 fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
     let sharp = match condition.friction {
         FrictionModel::Smooth { width } => width,

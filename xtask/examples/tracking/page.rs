@@ -12,17 +12,18 @@ pub(crate) struct Comparison {
     pub condition: Condition,
     pub existing: Runs,
     pub ours: Runs,
-    /// Errors of our control law with a better model, mrad; used if the goal was missed.
+    /// Errors of our control law with a better model, mrad. The page shows these errors if our control law missed the
+    /// goal.
     pub bounds: Vec<(&'static str, [f64; JOINTS])>,
 }
 
-/// Goal for the error, mrad: a fifth of the error of the existing firmware, but not less than the resolution of a
-/// 16-bit encoder.
+/// Goal for the error of our control law, mrad: a fifth of the error of the existing firmware, but not less than the
+/// resolution of a 16-bit encoder.
 const SHARE: f64 = 0.2;
 const LEAST: f64 = 0.04;
 
-/// Results of the original code of the existing firmware, compiled for a PC, on this plant. With ideal drives, the first three
-/// results are commanded − measured position (mrad), commanded − true position (mrad), and the change of torque (N·m/ms). The fourth
+/// Results of the original code of the existing firmware, compiled for a PC, on this plant. The first three results are for ideal
+/// drives: commanded − measured position (mrad), commanded − true position (mrad), and the change of torque (N·m/ms). The fourth
 /// result is commanded − measured position (mrad) with drives that deliver 1/1.3 of the torque.
 const REFERENCE: [(&str, [f64; JOINTS]); 4] = [
     ("ideal drives, commanded − measured", [0.258, 0.416, 0.368, 0.121, 0.127, 0.136]),
@@ -132,12 +133,12 @@ impl Comparison {
     }
 }
 
-/// Rounds a value to the digits that the page shows.
+/// Rounds a value to the number of digits that the page shows.
 fn rounded(value: f64) -> f64 {
     (1e3 * value).round() / 1e3
 }
 
-/// Returns the goal of each joint, mrad.
+/// Returns the goal for the error of each joint, mrad.
 fn goals(existing: &Figures) -> [f64; JOINTS] {
     existing.true_error.map(|error| rounded((SHARE * rounded(error)).max(LEAST)))
 }
@@ -147,7 +148,8 @@ fn row(page: &mut String, name: &str, values: &[f64; JOINTS], digits: usize) {
     let _ = writeln!(page, "| {name} | {cells} |");
 }
 
-/// Writes the table that compares our implementation of the existing law with the existing firmware's own code.
+/// Writes the table that compares our implementation of the existing control law with the original code of the existing
+/// firmware.
 fn reference(page: &mut String, all: &[Comparison]) {
     let figures = |name: &str| {
         let found = all.iter().find(|c| c.path == "demo path" && c.condition.name == name);
@@ -175,7 +177,7 @@ fn reference(page: &mut String, all: &[Comparison]) {
     let _ = writeln!(page, "\nThe largest difference is {:.1} %.", 100.0 * most);
 }
 
-/// Returns the complete text of the page.
+/// Returns the complete text of the page docs/tracking.md.
 pub(crate) fn text(all: &[Comparison]) -> String {
     let mut page = INTRODUCTION.to_owned();
     reference(&mut page, all);

@@ -1,17 +1,18 @@
-//! Paths along which both controllers are compared.
+//! Paths along which the program compares both controllers.
 use jtc_host::example;
 use jtc_wire::RawPoint;
 
 use crate::run::{Path, Result};
 
-/// Indices (from 0) of the recorded points after which one point is missing in the recording.
+/// Indices (from 0) of the recorded points after which the recording lacks one point.
 const MISSING_AFTER: [usize; 5] = [184, 358, 544, 726, 906];
 /// Name of the recorded path on the page.
 pub(crate) const RECORDED: &str = "recorded path";
 /// Time between the points of the recorded path, ms.
 const STEP_MS: u16 = 10;
 
-/// Returns the path of `jtc demo`, and the path that was recorded with the existing arm if its data are available.
+/// Returns the path of `jtc demo`. The function also returns the path that was recorded with the existing arm, if the
+/// data of the recording are available.
 pub(crate) fn all() -> Result<Vec<Path>> {
     let demo = example::demo_motion();
     let mut paths = vec![Path { name: "demo path", points: demo.raw()?, step_ms: demo.step_ms }];
@@ -21,7 +22,7 @@ pub(crate) fn all() -> Result<Vec<Path>> {
     Ok(paths)
 }
 
-/// Returns the points of `TrajectoryInt.csv`. Points that are missing in the recording are interpolated.
+/// Returns the points of `TrajectoryInt.csv`. The function interpolates points that are missing in the recording.
 fn recorded() -> Option<Vec<RawPoint>> {
     let raw =
         |[position, velocity, acceleration]: [[i16; 6]; 3]| RawPoint { position, velocity, acceleration };
@@ -37,8 +38,8 @@ fn recorded() -> Option<Vec<RawPoint>> {
     Some(points)
 }
 
-/// Returns the point halfway between two points that are 20 ms apart. The position is interpolated with a cubic
-/// polynomial.
+/// Returns the point halfway between two points that are 20 ms apart. The function interpolates the position with a
+/// cubic polynomial.
 fn between(a: &RawPoint, b: &RawPoint) -> RawPoint {
     let mean = |a: &[i16; 6], b: &[i16; 6]| {
         core::array::from_fn(|j| ((i32::from(a[j]) + i32::from(b[j])) / 2) as i16)

@@ -1,4 +1,4 @@
-//! Simulation of a controller that follows a path on the simulated plant, and the resulting errors.
+//! Simulation of a controller that follows a path on the simulated plant, and the resulting position errors.
 use jtc_bus::{JOINTS, Scale};
 use jtc_core::{ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_sim::{Bus, Fault, FaultKind, Operator, Plant, SimConfig, Trigger, host};
@@ -8,17 +8,17 @@ use crate::existing::{Existing, Phase};
 
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// Results of a simulation, or the reason why it ended early.
+/// Results of a simulation, or the reason why the simulation ended early.
 pub(crate) type Outcome = std::result::Result<Figures, String>;
 
-/// Path, as points and the time between two points.
+/// Path of the comparison, as points and the time between two points.
 pub struct Path {
     pub name: &'static str,
     pub points: Vec<RawPoint>,
     pub step_ms: u16,
 }
 
-/// RMS values over the path, for each joint.
+/// RMS values of the errors over the path, for each joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Figures {
     /// Commanded minus true position at the time when the command takes effect, mrad.

@@ -1,26 +1,26 @@
-//! The table of `cargo xtask bench`: figures, their anchors and their targets.
+//! The table of `cargo xtask bench`: performance figures, their anchors and their targets.
 use super::{Failed, Figures};
 use crate::size;
 
 /// Target value of a performance figure.
 #[derive(Clone, Copy)]
 enum Target {
-    /// Our value must be at most factor × anchor.
+    /// The value of our software must be at most factor × anchor.
     Share(f64),
-    /// Our value must be at most this value.
+    /// The value of our software must be at most this value.
     AtMost(f64),
-    /// Our value must be at least this value.
+    /// The value of our software must be at least this value.
     AtLeast(f64),
     /// The figure has no target and is for information only.
     None,
 }
 
-/// Row of the table, which compares one figure.
+/// Row of the table, which compares one performance figure.
 struct Row {
     title: &'static str,
     ours: &'static str,
-    /// Anchors (reference values) of the figure. The figure is compared with the smallest anchor. The table also
-    /// lists anchors that could not be measured.
+    /// Anchors (reference values) of the figure. The table compares the figure with the smallest anchor, and also lists
+    /// anchors that could not be measured.
     anchors: &'static [&'static str],
     target: Target,
     unit: &'static str,
@@ -258,13 +258,13 @@ const ROWS: &[Row] = &[
     ),
 ];
 
-/// Returns the number of targets.
+/// Returns the number of figures that have a target.
 pub(super) fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
-/// Prints every row, and the cause if a measurement failed. Returns the number of missed targets. If the computer was not
-/// `quiet`, the measurements are not judged.
+/// Prints every row of the table, and the cause if a measurement failed. Returns the number of missed targets. If the
+/// computer was not `quiet`, the function does not judge the measurements.
 pub(super) fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
@@ -332,7 +332,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// All figures of the table exist, except the figures of one failed measurement.
+    /// The table contains all figures, except the figures of one failed measurement.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));

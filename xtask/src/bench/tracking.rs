@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::shell::{cargo, nothing_left, root, run};
 
-/// Runs the comparison, which is in virtual time, and writes the page.
+/// Runs the comparison of the control laws, which is in virtual time, and writes the page.
 pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     nothing_left(arguments)?;
     let mut example = cargo(&["run", "--quiet", "--package", "xtask", "--example", "tracking", "--"]);
@@ -18,14 +18,15 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
 mod tests {
     use super::*;
 
-    /// Rows of a section, each with a name and six numbers.
+    /// Rows of a section of the page, each with a name and six numbers.
     type Rows = Vec<(String, [f64; 6])>;
 
     fn page() -> String {
         std::fs::read_to_string(root().join("docs/tracking.md")).expect("docs/tracking.md is there")
     }
 
-    /// Returns heading, rows and text of each section. Panics if a row is not a name and six numbers.
+    /// Returns heading, rows and text of each section of the page. Panics if a row does not consist of a name and six
+    /// numbers.
     fn sections(page: &str) -> Vec<(String, Rows, String)> {
         let mut sections = Vec::new();
         for section in page.split("\n##").skip(1) {
@@ -48,8 +49,8 @@ mod tests {
         rows.iter().find(|(row, _)| row == name).map(|(_, figures)| *figures)
     }
 
-    /// The page says that a goal is met only if its figures meet the goal. Otherwise the page lists the joints that miss the
-    /// goal, with the quantity that limits each joint.
+    /// The page says that a goal is met only if the figures on the page meet the goal. If joints miss the goal, the page
+    /// lists these joints, with the quantity that limits each joint.
     #[test]
     fn j62_the_page_of_tracking_judges_its_own_figures() {
         let (page, sections) = (page(), sections(&page()));
@@ -89,7 +90,8 @@ mod tests {
         }
     }
 
-    /// Each known result of the existing firmware agrees with our implementation of its control law within 10 %.
+    /// Our implementation of the existing control law agrees with each known result of the existing firmware within 10
+    /// %.
     #[test]
     fn j62_the_existing_law_of_the_page_is_that_of_the_existing_firmware() {
         let sections = sections(&page());

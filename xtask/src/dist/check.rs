@@ -1,5 +1,5 @@
-//! Test of the packages. The packages are installed in a separate Debian system, used, removed and purged. After the
-//! purge, no file of the packages may remain.
+//! Test of the packages. The test installs the packages in a separate Debian system, uses them, removes them and purges
+//! them. After the purge, the system must not contain any file of the packages.
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ fn cheaply() -> Result<()> {
     trial(&Root::copied("root")?, &debs(&paths))
 }
 
-/// Installs the packages of a release in a fresh Debian.
+/// Installs the packages of a release in a newly created Debian system.
 pub(super) fn install(out: &Path) -> Result<()> {
     let paths: Vec<PathBuf> = fs::read_dir(out)?.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
     let own = format!("_{}.deb", programs::own()?.debian);
@@ -59,7 +59,7 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     run(root.dpkg().args(["--verify", "jtc", "ucom"]))?;
     used(root)?;
     units(root)?;
-    // Creates files such as an agent creates during use.
+    // Creates files like the files that an agent creates during use.
     let state = root.path().join("var/lib/jtc/cell1");
     fs::create_dir_all(&state)?;
     fs::write(state.join("tokens.toml"), "")?;
@@ -129,7 +129,7 @@ fn used(root: &Root) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the unit is valid, its user exists, and no unit is enabled.
+/// Checks that the systemd unit is valid, that its user exists, and that no unit is enabled.
 fn units(root: &Root) -> Result<()> {
     for folder in ["etc/systemd/system", "etc/rc2.d"] {
         for file in shell::files(&root.path().join(folder), &["service"]) {
@@ -143,7 +143,7 @@ fn units(root: &Root) -> Result<()> {
     }
     let users = fs::read_to_string(root.path().join("etc/passwd"))?;
     ensure!(users.lines().any(|line| line.starts_with("jtc:")), "the user jtc was not made");
-    // The first check uses an invalid unit, to verify that the method detects an error.
+    // The test first checks an invalid unit, to verify that the check detects an error.
     let broken = root.path().join("etc/systemd/system/jtc-broken.service");
     fs::write(&broken, "[Service]\nExecStart=/usr/bin/no-such-program\nNoSuchKey=1\n")?;
     let found = complaints(root, "jtc-broken.service")?;
@@ -158,8 +158,8 @@ fn units(root: &Root) -> Result<()> {
     Ok(())
 }
 
-/// Returns the problems that systemd reports for a unit of this project. Other units are not checked, because the copied Debian may
-/// lack their dependencies.
+/// Returns the problems that systemd reports for a unit of this project. The function does not check other units, because the
+/// copied Debian system may lack their dependencies.
 fn complaints(root: &Root, unit: &str) -> Result<Vec<String>> {
     let verified = root.command("systemd-analyze").args(["verify", "--man=no", unit]).output()?;
     let text = String::from_utf8_lossy(&verified.stderr).into_owned();

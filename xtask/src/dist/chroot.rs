@@ -1,4 +1,4 @@
-//! Small Debian system in a folder, in which packages are installed for a test.
+//! Small Debian system in a folder, in which a test installs packages.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::tree::sha256;
 use crate::shell::{self, Scratch, apt_install, run, works};
 
-/// Folders that are not compared, because they contain dpkg's own records or temporary files.
+/// Folders that the test does not compare, because they contain dpkg's own records or temporary files.
 const UNCOMPARED: [&str; 6] = ["var/lib/dpkg", "var/log", "var/cache", "proc", "tmp", "run"];
 /// Backup files that are written by the programs that change user accounts.
 const BACKUPS: [&str; 7] = [
@@ -22,16 +22,16 @@ const BACKUPS: [&str; 7] = [
     "etc/subgid-",
     "etc/.pwd.lock",
 ];
-/// Packages that the test uses in addition to the essential packages, if they are installed on this computer.
+/// Packages that the test uses in addition to the essential packages, if these packages are installed on this computer.
 const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
-/// Files that the test does not need.
+/// Files of packages that the test does not need.
 const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
-/// Folder of the Debian system, which is removed on drop.
+/// Folder of the Debian system. The folder is removed when this value is dropped.
 pub(super) struct Root(Scratch);
 
-/// Package of this computer, according to dpkg.
+/// Package of this computer, with data from dpkg.
 struct Installed {
     essential: bool,
     /// Dependencies of the package. Each entry is a list of alternative package names.
@@ -39,7 +39,8 @@ struct Installed {
 }
 
 impl Root {
-    /// Copies the essential packages of this computer's Debian. The copy needs no network and takes seconds.
+    /// Copies the essential packages of the Debian system on this computer. The copy needs no network and takes
+    /// seconds.
     pub(super) fn copied(name: &str) -> Result<Self> {
         let root = Self(Scratch::new(name)?);
         for folder in ["bin", "sbin", "lib", "lib32", "lib64", "libx32"] {
@@ -60,7 +61,7 @@ impl Root {
         Ok(root)
     }
 
-    /// Creates a new Debian 12 from its archive, with the programs that the test uses.
+    /// Creates a new Debian 12 system from the Debian archive, with the programs that the test uses.
     pub(super) fn bootstrapped(name: &str) -> Result<Self> {
         if !works(shell::command("debootstrap").arg("--version")) {
             apt_install(&["debootstrap"])?;
@@ -72,12 +73,12 @@ impl Root {
         Ok(root)
     }
 
-    /// Returns the path of the folder.
+    /// Returns the path of the folder with the Debian system.
     pub(super) fn path(&self) -> &Path {
         self.0.path()
     }
 
-    /// Writes dpkg's records of the new system. The new records are copies of this computer's records for the
+    /// Writes the dpkg records of the new system. The new records are copies of the records on this computer for the
     /// copied packages.
     fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
         let to = self.path().join("var/lib/dpkg");
@@ -118,7 +119,7 @@ impl Root {
         Ok(())
     }
 
-    /// Returns the path of a file of the system, if it exists.
+    /// Returns the path of a file of the system. Returns `None` if the file does not exist.
     pub(super) fn has(&self, path: &str) -> Option<PathBuf> {
         Some(self.path().join(path)).filter(|path| path.symlink_metadata().is_ok())
     }
@@ -144,8 +145,8 @@ impl Root {
         chroot
     }
 
-    /// Returns a command that runs dpkg on the system. The command also installs manual pages, which dpkg does not install in
-    /// some containers.
+    /// Returns a command that runs dpkg on the system. This dpkg also installs manual pages; in some containers, the
+    /// configuration of dpkg excludes manual pages.
     pub(super) fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
@@ -205,14 +206,15 @@ fn installed() -> Result<BTreeMap<String, Installed>> {
         packages.insert(name.to_owned(), Installed { essential: essential == "yes", depends });
         provided.extend(provides.split(',').flat_map(names).map(|other| (other, name.to_owned())));
     }
-    // A name that a package provides is treated as a package that depends on the providing package.
+    // If a package provides another name, the function treats this name as a package that depends on the providing
+    // package.
     for (other, by) in provided {
         packages.entry(other).or_insert(Installed { essential: false, depends: vec![vec![by]] });
     }
     Ok(packages)
 }
 
-/// Returns the essential packages and the packages that the test uses, with all dependencies.
+/// Returns the essential packages and the packages that the test uses, with all of their dependencies.
 fn closure(installed: &BTreeMap<String, Installed>) -> Result<BTreeSet<String>> {
     let begins = |name: &str, package: &Installed| package.essential || WANTED.contains(&name);
     let mut waiting: Vec<&str> =
@@ -238,7 +240,7 @@ fn closure(installed: &BTreeMap<String, Installed>) -> Result<BTreeSet<String>> 
     Ok(real)
 }
 
-/// Returns Debian's name of this computer's architecture.
+/// Returns the name that Debian uses for the architecture of this computer.
 fn shell_architecture() -> Result<&'static str> {
     Ok(super::programs::own()?.debian)
 }

@@ -1,10 +1,10 @@
-//! JavaScript libraries that are part of the dashboard pages in the programs.
+//! JavaScript libraries that are part of the dashboard pages in the programs `jtc` and `ucom`.
 use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::shell::root;
 
-/// Libraries whose scripts are part of the built files. Other entries of web/package.json are used only by the build and the tests.
+/// Libraries whose scripts are part of the built dashboard. Only the build and the tests use the other entries of web/package.json.
 const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
 /// JavaScript library of the dashboard.
@@ -15,11 +15,12 @@ pub(super) struct Library {
     pub version: String,
     /// Licence of the library, as an SPDX identifier.
     pub licence: String,
-    /// Text of the library's licence.
+    /// Text of the licence of the library.
     pub text: String,
 }
 
-/// Returns all libraries. The texts are stored next to this program, so that a release can be built without Node.js.
+/// Returns all libraries. The licence texts are stored with the source of this program, so that a release can be built
+/// without Node.js.
 pub(super) fn libraries() -> Result<Vec<Library>> {
     let lock = root().join("web/package-lock.json");
     let lock: Value =

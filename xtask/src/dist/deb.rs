@@ -1,18 +1,18 @@
-//! Format of Debian packages (deb(5)), reproducible byte for byte. The packages do not contain checksums of their
-//! files, because dpkg computes the checksums.
+//! Format of Debian packages (deb(5)). The packages are reproducible byte for byte. The packages do not contain checksums of
+//! their files, because dpkg computes the checksums.
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result, ensure};
 
 use super::tree::Tree;
 
-/// Debian package.
+/// Debian package of a command.
 pub(super) struct Deb<'a> {
-    /// Name.
+    /// Name of the package.
     pub name: &'a str,
     /// Version of the package, including Debian's revision.
     pub version: &'a str,
-    /// Architecture: `amd64`, `arm64`.
+    /// Architecture of the package: `amd64` or `arm64`.
     pub architecture: &'a str,
     /// Additional lines of the control file, such as `Section: science`.
     pub fields: &'a str,
@@ -23,7 +23,7 @@ pub(super) struct Deb<'a> {
 }
 
 impl Deb<'_> {
-    /// Returns the file name, such as `jtc_0.2.0-1_amd64.deb`.
+    /// Returns the file name of the package, such as `jtc_0.2.0-1_amd64.deb`.
     pub(super) fn file_name(&self) -> String {
         format!("{}_{}_{}.deb", self.name, self.version, self.architecture)
     }

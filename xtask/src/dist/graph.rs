@@ -1,4 +1,4 @@
-//! Third-party crates that a release contains, as cargo resolves them.
+//! Third-party crates that a release contains. Cargo selects these crates with the lock files.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -8,31 +8,31 @@ use serde_json::Value;
 use super::programs::PLATFORMS;
 use crate::{firmware, shell};
 
-/// Crate.
+/// A crate in the dependency graph.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Crate {
-    /// Name.
+    /// Name of the crate.
     pub name: String,
-    /// Version.
+    /// Version of the crate.
     pub version: String,
-    /// Licence as an SPDX expression; `None` if the manifest contains no licence.
+    /// Licence as an SPDX expression; `None` if the manifest of the crate contains no licence.
     pub licence: Option<String>,
-    /// Source of the crate; `None` for the project's own crates.
+    /// Source of the crate; `None` for the crates of this project.
     pub source: Option<String>,
     /// Authors of the crate, as listed in its manifest.
     pub authors: Vec<String>,
-    /// Address of the crate's repository.
+    /// Address of the repository of the crate.
     pub repository: Option<String>,
-    /// Folder of the crate's source.
+    /// Folder with the source code of the crate.
     pub folder: PathBuf,
-    /// SHA-256 of the crate's archive in the registry.
+    /// SHA-256 of the crate archive in the registry.
     pub checksum: Option<String>,
 }
 
-/// Crates by `name version`, with the dependencies of each.
+/// Crates by `name version`, with the dependencies of each crate.
 #[derive(Default)]
 pub(crate) struct Graph {
-    /// The crates.
+    /// All crates of the graph.
     pub crates: BTreeMap<String, Crate>,
     /// Dependencies of each crate, by `name version`.
     pub uses: BTreeMap<String, BTreeSet<String>>,
@@ -41,14 +41,14 @@ pub(crate) struct Graph {
 /// Kinds of dependencies to include.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Kind {
-    /// Dependencies that become a part of a program, or generate a part of it during compilation.
+    /// Dependencies that become a part of a program, or generate a part of a program during compilation.
     Shipped,
     /// All dependencies, including the dependencies of build scripts and tests.
     All,
 }
 
-/// Returns the crates in the programs, the Python package and the boards' programs. The features of the whole workspace are used, so the
-/// graph may contain more crates than a program, but never fewer.
+/// Returns the crates in the programs, the Python package and the firmware of the boards. The function uses the features of the whole
+/// workspace, so the graph may contain more crates than a program, but never fewer.
 pub(crate) fn shipped() -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in PLATFORMS {
@@ -74,7 +74,7 @@ pub(crate) fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
     Ok(graph)
 }
 
-/// Returns cargo's resolution for a platform, without network access if possible.
+/// Returns the dependencies that cargo resolves for a platform, without network access if possible.
 fn metadata(manifest: &Path, platform: &str) -> Result<Value> {
     let ask = || {
         let mut cargo = shell::cargo(&[
@@ -142,7 +142,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Adds the checksums from the lock files.
+    /// Adds the checksums of the crates from the lock files.
     fn checksums(&mut self) -> Result<()> {
         for lock in ["Cargo.lock", "firmware/Cargo.lock"] {
             let text = std::fs::read_to_string(shell::root().join(lock)).context(lock)?;
@@ -160,7 +160,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Returns the third-party crates.
+    /// Returns the third-party crates of the graph.
     pub(crate) fn foreign(&self) -> impl Iterator<Item = &Crate> {
         self.crates.values().filter(|found| found.source.is_some())
     }

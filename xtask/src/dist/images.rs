@@ -1,4 +1,4 @@
-//! Flash images of the programs for the boards, and the list of images that `jtc firmware flash` reads.
+//! Flash images of the firmware for the boards, and the list of images that `jtc firmware flash` reads.
 use anyhow::{Context, Result, ensure};
 use object::{Object as _, ObjectSegment as _};
 use serde_json::json;
@@ -6,24 +6,24 @@ use serde_json::json;
 use super::tree::{Tree, sha256};
 use crate::firmware;
 
-/// First address of the flash.
+/// First address of the flash of a board.
 const FLASH: u64 = 0x0800_0000;
 /// Number of bytes from the start of flash to the stored arm, which an image must not overwrite. The stored arm is in the last two
-/// sectors of bank 2. The words for the second core of an H745 are at the start of bank 2. The images for H745 boards therefore
+/// sectors of bank 2. The program of the second core of an H745 is at the start of bank 2. Therefore, the images for H745 boards
 /// contain a gap of erased flash.
 const ROOM: u64 = (2048 - 2 * 128) * 1024;
 /// Value of erased flash bytes.
 const ERASED: u8 = 0xff;
 
-/// Flash image of a board's program.
+/// Flash image of the firmware of a board.
 pub(super) struct Image {
-    /// Name of the board.
+    /// Name of the board for which the image is built.
     pub board: &'static str,
-    /// Contents of flash from 0x0800_0000 on.
+    /// Contents of flash from address 0x0800_0000 on.
     pub bin: Vec<u8>,
 }
 
-/// Builds the programs of all boards. The contents of flash do not depend on the build folder. The file names in the ELF files
+/// Builds the firmware of all boards. The contents of flash do not depend on the build folder. The file names in the ELF files
 /// depend on the build folder, so a release does not contain the ELF files.
 pub(super) fn build() -> Result<Vec<Image>> {
     let image = |board| {
@@ -44,7 +44,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         if bytes.is_empty() {
             continue;
         }
-        // The code uses the load address, which differs from the run address.
+        // The code uses the load address of the segment, which differs from its run address.
         let address = u64::from(segment.elf_program_header().p_paddr.get(file.endian()));
         let end = address + bytes.len() as u64;
         ensure!(
@@ -56,8 +56,8 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         bin.resize(bin.len().max(to), ERASED);
         bin[from..to].copy_from_slice(bytes);
     }
-    // The vector table begins with the initial stack pointer in RAM and the address of the first instruction, which is odd
-    // for Thumb code.
+    // The vector table begins with two addresses: the initial stack pointer in RAM and the first instruction. The address
+    // of the first instruction is odd for Thumb code.
     let word = |at: usize| bin.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
     let (stack, start) = (word(0).context("the image is empty")?, word(4).context("the image is empty")?);
     ensure!(
@@ -85,7 +85,7 @@ pub(super) fn name(image: &Image) -> String {
     format!("{}.bin", image.board)
 }
 
-/// Returns the list of images, with file, board, SHA-256, address and size of each image.
+/// Returns the list of images in JSON, with file, board, SHA-256, address and size of each image.
 pub(super) fn list(images: &[Image], version: &str) -> Result<String> {
     let images: Vec<_> = images
         .iter()

@@ -1,4 +1,4 @@
-//! Licences, with their texts, of all parts of a release.
+//! Licences of all parts of a release, with their texts.
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use super::dashboard;
 use super::graph::{Crate, Graph};
 use crate::shell;
 
-/// Prefixes of the names of licence files in crates.
+/// Beginnings of the names of licence files in crates.
 const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"];
 
 /// Folders of a crate whose files do not become part of a program.
@@ -19,8 +19,8 @@ pub(crate) fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
 
-/// Returns THIRD-PARTY.txt: a list of all crates and libraries with their licences, followed by each licence text
-/// once. Returns an error for a crate without a licence.
+/// Returns THIRD-PARTY.txt: a list of all crates and libraries with their licences, followed by the licence texts, each
+/// text once. Returns an error for a crate without a licence.
 pub(crate) fn third_party(graph: &Graph) -> Result<String> {
     let mut list =
         String::from("openjtc contains what others wrote. Their licences, and below them the texts.\n\n");
@@ -29,7 +29,7 @@ pub(crate) fn third_party(graph: &Graph) -> Result<String> {
         let label = format!("{} {}", found.name, found.version);
         let licence = found.licence.as_deref();
         let licence = licence.with_context(|| format!("{label} names no licence; it cannot be shipped"))?;
-        // Some licences require the address of the source.
+        // Some licences require that the list contains the address of the source.
         let source = format!("https://crates.io/crates/{}/{}", found.name, found.version);
         writeln!(list, "{label}: {}, {source}", expression(licence))?;
         texts.of(found, &label)?;
@@ -46,20 +46,20 @@ pub(crate) fn third_party(graph: &Graph) -> Result<String> {
     Ok(list)
 }
 
-/// Components that the compiler and the linker add to programs in addition to crates.
+/// Components, in addition to crates, that the compiler and the linker add to programs.
 pub(crate) const RUNTIME: [(&str, &str); 3] = [
     ("musl", "MIT"),
     ("llvm-libunwind", "Apache-2.0 WITH LLVM-exception"),
     ("llvm-compiler-rt", "Apache-2.0 WITH LLVM-exception"),
 ];
 
-/// Lists Rust's standard library, and the entries of [`RUNTIME`].
+/// Lists the standard library of Rust, and the entries of [`RUNTIME`].
 fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     let version = shell::read(shell::command("rustc").arg("--version"))?;
     let version = version.split(' ').nth(1).unwrap_or_default().to_owned();
     let label = format!("Rust's standard library {version}");
     writeln!(list, "{label}: MIT OR Apache-2.0")?;
-    // The project's licences have equal texts.
+    // The Apache licence of this project has the same text as the Apache licence of Rust.
     let apache = std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?;
     texts.add(&label, &apache);
     for (name, licence) in RUNTIME {
@@ -74,7 +74,7 @@ fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     Ok(())
 }
 
-/// Licence texts in the order of their first use, each with the labels of the parts under this licence.
+/// Licence texts in the order of their first use. Each entry also contains the labels of the parts under this licence.
 #[derive(Default)]
 struct Texts(Vec<(String, Vec<String>)>);
 
@@ -90,8 +90,8 @@ impl Texts {
         }
     }
 
-    /// Adds the licence texts in the source of a crate. Adds the standard text if the source contains no licence
-    /// text.
+    /// Adds the licence texts in the source of a crate. If the source contains no licence text, adds the standard text
+    /// of the licence.
     fn of(&mut self, found: &Crate, label: &str) -> Result<()> {
         let files = files(&found.folder)?;
         for file in &files {
@@ -121,8 +121,8 @@ impl Texts {
     }
 }
 
-/// Returns the licence files in the source of a crate, including the files for C code and other parts. Tests and
-/// examples are excluded, because they do not become part of a program.
+/// Returns the licence files in the source of a crate, including the files for C code and other parts. The result
+/// excludes tests and examples, because they do not become part of a program.
 fn files(source: &Path) -> Result<Vec<PathBuf>> {
     let (mut found, mut waiting) = (Vec::new(), vec![source.to_owned()]);
     while let Some(folder) = waiting.pop() {
@@ -142,8 +142,8 @@ fn files(source: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Returns true for source code, because source files about licences can have names that begin like the names of
-/// licence files.
+/// Returns `true` for source code, because the names of source files about licences can begin like the names of licence
+/// files.
 fn is_code(path: &Path) -> bool {
     path.extension()
         .is_some_and(|ending| ["rs", "py", "c", "h", "sh", "toml"].iter().any(|code| ending == *code))

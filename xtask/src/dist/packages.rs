@@ -1,4 +1,4 @@
-//! Contents of the packages and archives of the commands.
+//! Contents of the packages and archives of the commands `jtc` and `ucom`.
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -10,13 +10,13 @@ use super::programs::{PROGRAMS, Platform};
 use super::tree::{Tree, gzip};
 use crate::shell::root;
 
-/// Revision number of the Debian packages of a version.
+/// Revision number of the Debian packages of a release version.
 const REVISION: u32 = 1;
 
-/// udev rules. Both packages install these files, under different names.
+/// udev rules for serial ports. Both packages install these rules, under different file names.
 const RULES: &str = include_str!("../../packaging/serial.rules");
 
-/// Intended findings of lintian, with the reasons.
+/// Findings of lintian that the packages intentionally contain, with the reasons.
 const OVERRIDES: &str = "\
 # One program for every distribution.
 NAME: statically-linked-binary
@@ -26,29 +26,29 @@ NAME: initial-upload-closes-no-bugs
 NAME: maintainer-script-calls-systemctl
 ";
 
-/// Data shared by all packages of a release.
+/// Data that all packages of a release share.
 pub(super) struct Release {
-    /// Version, such as `0.2.0`.
+    /// Version of the release, such as `0.2.0`.
     pub version: String,
     /// Unix time of the release, s.
     pub time: u64,
-    /// Text of THIRD-PARTY.txt.
+    /// Text of the file THIRD-PARTY.txt.
     pub third_party: String,
-    /// Flash images of the boards.
+    /// Flash images of the firmware for the boards.
     pub images: Vec<Image>,
 }
 
 /// File that belongs to a release.
 pub(super) struct Made {
-    /// Name.
+    /// Name of the file.
     pub name: String,
-    /// Contents.
+    /// Contents of the file.
     pub bytes: Vec<u8>,
 }
 
 impl Release {
-    /// Returns the Debian package and the archive of each command. `programs` is the folder of the programs, `runnable` the folder of
-    /// programs that run on this computer.
+    /// Returns the Debian package and the archive of each command. `programs` is the folder of the programs. `runnable` is the folder
+    /// of programs that run on this computer.
     pub(super) fn packages(&self, platform: Platform, programs: &Path, runnable: &Path) -> Result<Vec<Made>> {
         let mut made = Vec::new();
         for (name, _) in PROGRAMS {
@@ -116,7 +116,8 @@ impl Release {
         tree.put("THIRD-PARTY.txt", &*self.third_party);
         tree.put("udev/70-openjtc.rules", RULES);
         if name == "jtc" {
-            // The program searches for the images at the following path, next to its own folder.
+            // The program is in the folder `bin`. It searches for the images at this path, relative to the parent of
+            // `bin`.
             images::install(&self.images, &self.version, "share/openjtc/firmware", &mut tree)?;
         }
         let folder = format!("{name}-{}-{}-linux", self.version, platform.machine);
@@ -125,7 +126,7 @@ impl Release {
     }
 }
 
-/// Maintainer field. The project has no mail address, because problems are reported in its repository.
+/// Maintainer field of the packages. The project has no mail address, because users report problems in its repository.
 const MAINTAINER: &str = "The openjtc contributors <openjtc@noreply.invalid>";
 
 const JTC: &str = "\
@@ -151,7 +152,7 @@ fn fields(description: &str) -> String {
     )
 }
 
-/// Returns the project's licences in Debian's format.
+/// Returns the licences of this project in the format of Debian.
 fn copyright() -> Result<String> {
     let mit = std::fs::read_to_string(root().join("LICENSE-MIT")).context("LICENSE-MIT")?;
     let (line, terms) =

@@ -1,4 +1,4 @@
-//! Manual pages and completions, which the programs print.
+//! Manual pages and shell completions, which the programs print.
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use super::tree::Tree;
 use crate::shell::{self, Scratch};
 
-/// Pages printed by `program`, which must run on this computer.
+/// Pages that `program` prints. The program must run on this computer.
 pub(super) struct Pages {
     /// Manual pages by their file names, such as `jtc-serve.1`.
     pub manual: Vec<(String, Vec<u8>)>,
@@ -19,8 +19,8 @@ impl Pages {
     /// Returns the pages of the program with this name in `folder`.
     pub(super) fn of(folder: &Path, name: &str) -> Result<Self> {
         let program = folder.join(name);
-        // The environment variables of `jtc` and `ucom` are removed, because options that the user has set must not
-        // become part of the packages.
+        // The code removes the environment variables of `jtc` and `ucom`, because options that the user has set must
+        // not become part of the packages.
         let ask = || {
             let mut ask = shell::command(&program);
             ask.env_clear();
@@ -44,7 +44,7 @@ impl Pages {
         Ok(Self { manual, bash: completions("bash")?, zsh: completions("zsh")?, fish: completions("fish")? })
     }
 
-    /// Installs the pages at Debian's paths.
+    /// Installs the manual pages and completions at the paths that Debian uses.
     pub(super) fn install(&self, name: &str, tree: &mut Tree) -> Result<()> {
         for (page, text) in &self.manual {
             tree.put(format!("usr/share/man/man1/{page}.gz"), super::tree::gzip(text)?);
@@ -55,7 +55,7 @@ impl Pages {
         Ok(())
     }
 
-    /// Adds the pages at the paths that are used in the archives.
+    /// Adds the manual pages and completions at the paths that the archives use.
     pub(super) fn unpacked(&self, name: &str, tree: &mut Tree) {
         for (page, text) in &self.manual {
             tree.put(format!("man/man1/{page}"), &**text);

@@ -1,5 +1,5 @@
 //! Programs of a release, which are statically linked and stripped. The bytes of the programs do not depend on the
-//! location of the checkout or of cargo's folders.
+//! folder of the checkout or on the folders of cargo.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -11,7 +11,7 @@ use crate::{paths, python};
 /// Names of the programs, with the packages that contain them.
 pub(super) const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
 
-/// Platform of a program.
+/// Platform for which a program is built.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Platform {
     /// Platform name that the Linux kernel and Rust use.
@@ -47,8 +47,8 @@ pub(super) fn own() -> Result<Platform> {
     own.with_context(|| format!("there are no packages for computers like this ({machine}), which would have to run their programs"))
 }
 
-/// Installs the compiler target if rustup manages the toolchain. Returns an error if the target is not available
-/// here.
+/// Installs the compiler target if rustup manages the toolchain. Returns an error if the target is not available on
+/// this computer.
 pub(super) fn add_target(triple: &str) -> Result<()> {
     let installed = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))?;
     if installed.lines().any(|target| target == triple) {
@@ -57,7 +57,7 @@ pub(super) fn add_target(triple: &str) -> Result<()> {
     run(shell::command("rustup").args(["target", "add", triple]))
 }
 
-/// Returns the Unix time that all archives contain, s. The time is the time of the last commit, or
+/// Returns the Unix time that all archives contain, s. This time is the time of the last commit, or
 /// `SOURCE_DATE_EPOCH`.
 pub(super) fn time() -> Result<u64> {
     let time = match std::env::var("SOURCE_DATE_EPOCH") {
@@ -78,7 +78,7 @@ pub(super) fn tools() -> Result<PathBuf> {
 /// Adds switches for `triple` to a cargo command, so that the output does not contain paths of this computer.
 pub(super) fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
-    // The following options are necessary for C code and its assembler code.
+    // The next options are necessary for C code and for its assembler code.
     let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();
@@ -86,7 +86,7 @@ pub(super) fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     Ok(())
 }
 
-/// Sets the environment in which the compilers and the linker of `tools` are used.
+/// Sets the environment so that cargo uses the compilers and the linker in `tools`.
 pub(super) fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> {
     let others = std::env::var_os("PATH").unwrap_or_default();
     let all = [tools.to_owned()].into_iter().chain(std::env::split_paths(&others));
@@ -94,7 +94,7 @@ pub(super) fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Resu
     Ok(())
 }
 
-/// Builds the programs and returns the folder that contains them.
+/// Builds the programs of a release and returns the folder that contains them.
 pub(super) fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     add_target(platform.triple)?;
     let tools = tools()?;
@@ -105,7 +105,7 @@ pub(super) fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     }
     without_paths(&mut build, platform.triple)?;
     with_tools(&mut build, &tools, time)?;
-    // All debug information is removed.
+    // The build removes all debug information.
     build.env("CARGO_PROFILE_DIST_STRIP", "symbols").env("CARGO_PROFILE_DIST_DEBUG", "false");
     build.env("CARGO_TARGET_DIR", shell::target());
     run(&mut build)?;
@@ -118,7 +118,8 @@ pub(super) fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Returns an error if the program requests a dynamic loader, because such a program needs libraries of the system.
+/// Returns an error if the program requests a dynamic loader, because such a program needs libraries of the operating
+/// system.
 fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
     use object::read::elf::{FileHeader as _, ProgramHeader as _};
     let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;

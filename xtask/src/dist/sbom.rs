@@ -7,7 +7,7 @@ use super::graph::{Crate, Graph};
 use super::{licences, programs};
 use crate::shell::{self, Scratch, run};
 
-/// Returns the bill of materials of `graph` and of the libraries in the dashboard's pages. Equal lock files result in
+/// Returns the bill of materials of `graph` and of the libraries in the dashboard pages. Equal lock files result in
 /// equal bytes.
 pub(super) fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
     let scripts = dashboard::libraries()?;
@@ -73,7 +73,7 @@ fn component(found: &Crate) -> Value {
     component
 }
 
-/// Returns the package URL of a crate. The project's own crates have no registry address.
+/// Returns the package URL of a crate. The crates of this project have no registry address.
 fn purl(found: &Crate) -> String {
     reference(if found.source.is_some() { "cargo" } else { "generic" }, &found.name, &found.version)
 }
@@ -90,7 +90,7 @@ fn stamp(time: u64) -> Result<String> {
     Ok(text.trim().to_owned())
 }
 
-/// Validates a bill against the schema of CycloneDX, with CycloneDX's own library.
+/// Validates a bill of materials against the schema of CycloneDX, with the library of CycloneDX.
 pub(super) fn validate(bill: &str) -> Result<()> {
     let scratch = Scratch::new("sbom")?;
     let file = scratch.path().join("bill.json");

@@ -1,4 +1,4 @@
-//! Files of a package in memory, and reproducible archives of them.
+//! Files of a package in memory, and reproducible archives of these files.
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 use std::path::Path;
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use flate2::{Compression, GzBuilder};
 use sha2::{Digest as _, Sha256};
 
-/// Files of the package by their path below the root, such as `usr/bin/jtc`.
+/// Files of a package by their path relative to the root folder, such as `usr/bin/jtc`.
 #[derive(Clone, Default, Debug, PartialEq)]
 pub(super) struct Tree(BTreeMap<String, File>);
 
@@ -26,12 +26,12 @@ impl Tree {
         self.0.insert(path.into(), File { bytes: bytes.into(), runs: false });
     }
 
-    /// Adds a program.
+    /// Adds an executable program.
     pub(super) fn put_program(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
         self.0.insert(path.into(), File { bytes: bytes.into(), runs: true });
     }
 
-    /// Adds a copy of a file of this computer.
+    /// Adds a copy of a file on this computer.
     pub(super) fn copy(&mut self, path: impl Into<String>, from: &Path) -> Result<()> {
         let bytes = std::fs::read(from).with_context(|| from.display().to_string())?;
         self.put(path, bytes);
@@ -43,8 +43,8 @@ impl Tree {
         self.0.iter().map(|(path, file)| (path.as_str(), file))
     }
 
-    /// Returns a tar archive with sorted paths. All files belong to root and have the time `time` (Unix time, s). `prefix` (`./` or
-    /// `name/`) is added at the beginning of each path. The archive also contains entries for the folders.
+    /// Returns a tar archive with sorted paths. All files belong to root and have the time `time` (Unix time, s). Each path begins
+    /// with `prefix` (`./` or `name/`). The archive also contains entries for the folders.
     pub(super) fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         let mut tar = tar::Builder::new(Vec::new());
         let mut folders = BTreeSet::new();
@@ -66,7 +66,7 @@ impl Tree {
         Ok(tar.into_inner()?)
     }
 
-    /// Returns the compressed archive.
+    /// Returns the files as a compressed tar archive.
     pub(super) fn tar_gz(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         compress(&self.tar(prefix, time)?, Compression::default())
     }
@@ -80,26 +80,26 @@ fn header(kind: tar::EntryType, mode: u32, size: u64, time: u64) -> tar::Header 
     header.set_mtime(time);
     header.set_uid(0);
     header.set_gid(0);
-    // The names of user 0 and group 0 fit into their fields.
+    // The names of user 0 and group 0 fit into their header fields.
     let _ = header.set_username("root");
     let _ = header.set_groupname("root");
     header
 }
 
-/// Compresses a page or a text as much as gzip can, as Debian requires.
+/// Compresses a manual page or a text with the highest level of gzip, as Debian requires.
 pub(super) fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
     compress(bytes, Compression::best())
 }
 
-/// Compresses data without a time and a name in the header. For a program, the best level would take three times as
-/// long as the default level and save 1 %.
+/// Compresses data with gzip, without a time and a name in the header. For a program, the highest level would take
+/// three times as long as the default level and save 1 %.
 fn compress(bytes: &[u8], by: Compression) -> Result<Vec<u8>> {
     let mut gzip = GzBuilder::new().mtime(0).operating_system(3).write(Vec::new(), by);
     gzip.write_all(bytes)?;
     Ok(gzip.finish()?)
 }
 
-/// Returns the SHA-256 in the format of `sha256sum`.
+/// Returns the SHA-256 of the bytes in the format of `sha256sum`.
 pub(super) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -7,11 +7,11 @@ use anyhow::{Context, Result, bail};
 
 use crate::shell::{self, run};
 
-/// Builds the release of `first` again in another folder. If files differ, returns an error that lists them and keeps
-/// both releases.
+/// Builds the release in `first` again in another folder. If files differ, returns an error that lists these files, and
+/// keeps both releases.
 pub(super) fn compare(first: &Path, quick: bool) -> Result<()> {
-    // The folder for temporary files is not used, because on some systems it is in memory, and the build needs
-    // gigabytes.
+    // The command does not use the folder for temporary files, because on some systems this folder is in memory, and
+    // the build needs gigabytes.
     let folder = shell::target().join("made-again-in-a-folder-with-a-longer-name");
     if folder.exists() {
         fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -24,7 +24,7 @@ pub(super) fn compare(first: &Path, quick: bool) -> Result<()> {
     if quick {
         again.arg("--quick");
     }
-    // Variables of cargo are removed, so that only the checkout selects the toolchain.
+    // The command removes the environment variables of cargo, so that only the checkout selects the toolchain.
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARGO") && name != "CARGO_HOME") {
         again.env_remove(name);
     }
@@ -64,8 +64,7 @@ pub(super) fn compare(first: &Path, quick: bool) -> Result<()> {
     Ok(())
 }
 
-/// Copies the current checkout with uncommitted changes and history, but without build output and without the
-/// release.
+/// Copies the current checkout with uncommitted changes and history, but without build output and without the release.
 fn copy(to: &Path, release: &Path) -> Result<()> {
     run(shell::command("git").args(["clone", "--quiet", "--no-local", "."]).arg(to))?;
     let listed = shell::read(shell::command("git").args([

@@ -1,4 +1,4 @@
-//! The Python package, which is built with Maturin.
+//! The wheel of the Python package, which Maturin builds.
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -8,12 +8,14 @@ use super::packages::Made;
 use super::programs::{self, Platform};
 use crate::shell::{self, Scratch, run};
 
-/// Returns the folder of the Python package's source; `None` if the checkout does not contain the folder.
+/// Returns the folder with the source of the Python package. Returns `None` if the checkout does not contain the
+/// folder.
 pub(super) fn folder() -> Option<PathBuf> {
     Some(shell::root().join("crates/openjtc-py")).filter(|folder| folder.join("pyproject.toml").exists())
 }
 
-/// File that lists third-party parts. `license-files` in pyproject.toml contains the path of this file.
+/// File that lists the third-party parts of the package. `license-files` in pyproject.toml contains the path of this
+/// file.
 const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
 
 /// Builds the wheel, which works with every glibc from 2.17 on.
@@ -50,7 +52,7 @@ pub(super) fn build(platform: Platform, time: u64, third_party: &str) -> Result<
     Ok(Made { name: wheel.file_name().to_string_lossy().into_owned(), bytes: std::fs::read(wheel.path())? })
 }
 
-/// Checks that no file of a wheel contains a path of this computer, and that the licences are among the files.
+/// Checks that no file of a wheel contains a path of this computer, and that the wheel contains the licences.
 fn look_into(tools: &Path, wheel: &Path, unpacked: &Path) -> Result<()> {
     let mut unpack = shell::command(tools.join("python"));
     run(unpack.args(["-m", "zipfile", "-e"]).arg(wheel).arg(unpacked))?;

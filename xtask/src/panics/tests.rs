@@ -1,4 +1,4 @@
-//! Tests with small programs in machine code, which are put into ELF files.
+//! Tests of the panic check with small programs in machine code. The tests put these programs into ELF files.
 use object::write::{Object, SectionId, Symbol, SymbolSection};
 use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
 
@@ -21,7 +21,7 @@ fn add(file: &mut Object<'_>, section: SectionId, name: &str, kind: SymbolKind, 
     });
 }
 
-/// Returns a program of consecutive functions, each at the next multiple of 4.
+/// Returns a program of consecutive functions, each at the next address that is a multiple of 4.
 fn program(parts: &[(&str, &[u16])]) -> Vec<u8> {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
@@ -38,7 +38,7 @@ fn check(parts: &[(&str, &[u16])]) -> Report {
     reachable_panics(&program(parts), &["tick"]).unwrap()
 }
 
-/// Returns the code of a BL from `at` to `to`, for short distances forward.
+/// Returns the code of a BL instruction from `at` to `to`, for short distances forward.
 fn call(at: u32, to: u32) -> [u16; 2] {
     [0xF000, 0xF800 | ((to - at - 4) >> 1) as u16]
 }
@@ -54,7 +54,7 @@ fn a_panic_behind_two_calls_is_found_with_its_way() {
 
 #[test]
 fn a_short_branch_that_leaves_its_function_counts() {
-    // The instruction is CBZ r0 from 0 to 4.
+    // The first instruction of `tick` is CBZ r0 from address 0 to address 4.
     let report = check(&[("tick", &[0xB100, RETURN]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x0) > core::panicking::panic_fmt"]);
 }
@@ -73,8 +73,8 @@ fn what_is_not_called_does_not_count() {
     assert_eq!((report.functions, report.instructions), (2, 5));
 }
 
-/// Returns the report for a program whose `tick`, at 0 to 8, contains a return and then two halfwords of data or code.
-/// The panicking function is at address 8.
+/// Returns the report for a program whose function `tick` is at addresses 0 to 8. `tick` contains a return and then two
+/// halfwords of data or code. The panicking function is at address 8.
 fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
@@ -94,23 +94,23 @@ fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
 fn data_between_code_is_no_code() {
     assert_eq!(behind_return("$t", call(4, 8)).paths.len(), 1);
     assert!(behind_return("$d", call(4, 8)).paths.is_empty());
-    // The address of a function in the data is treated as a call.
+    // The check treats the address of a function in the data as a call of this function.
     assert_eq!(behind_return("$d", [9, 0]).paths, ["tick (0x4) > core::panicking::panic_fmt"]);
 }
 
 #[test]
 fn a_function_whose_address_is_formed_counts_as_called() {
-    // The instructions MOVW r0, #9 and MOVT r0, #0 load the Thumb address of the panic at 8.
+    // The instructions MOVW r0, #9 and MOVT r0, #0 load the Thumb address of the panicking function at 8.
     let report = check(&[("tick", &[0xF240, 0x0009, 0xF2C0, 0x0000]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x4) > core::panicking::panic_fmt"]);
 }
 
 #[test]
 fn calls_through_a_register_are_listed_and_bridges_are_crossed() {
-    // BLX r3.
+    // The first instruction is BLX r3, whose target is unknown.
     let report = check(&[("tick", &[0x4798, RETURN]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.indirect, ["tick at 0x0"]);
-    // The instructions MOVW r12, #13, MOVT r12, #0 and BX r12 jump to the panic at 12.
+    // The instructions MOVW r12, #13, MOVT r12, #0 and BX r12 jump to the panicking function at 12.
     let report = check(&[("tick", &[0xF240, 0x0C0D, 0xF2C0, 0x0C00, 0x4760, NOP]), (PANIC, &[0xE7FE])]);
     assert!(report.indirect.is_empty() && !report.paths.is_empty(), "{report}");
 }

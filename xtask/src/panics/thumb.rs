@@ -5,16 +5,16 @@
 pub(super) enum Flow {
     /// Branch to an address with B, `B<cc>`, CBZ, CBNZ or BL.
     Direct(u32),
-    /// Branch to a computed address with BX, BLX, or with MOV or LDR to the program counter. The target address
-    /// is known only at run time.
+    /// Branch to a computed address with BX, BLX, or with MOV or LDR to the program counter. The target address is
+    /// known only at run time.
     Indirect(u8),
     /// MOVW, which sets the lower half of a register and clears the upper half.
     Low(u8, u16),
     /// MOVT, which sets the upper half of a register.
     High(u8, u16),
-    /// UDF: an abort.
+    /// UDF instruction, which aborts the program.
     Trap,
-    /// Any other instruction, including returns.
+    /// Any other instruction, including a return.
     Other,
 }
 
@@ -37,12 +37,12 @@ fn narrow(address: u32, code: u32) -> Flow {
     let to = |offset: u32| Flow::Direct(address.wrapping_add(4).wrapping_add(offset));
     let register = (code >> 3 & 0xF) as u8;
     match code {
-        // BX (which is a return if it uses the link register) and BLX.
+        // BX and BLX instructions. A BX instruction is a return if it uses the link register.
         0x4700..=0x47FF if register == 14 && code & 0x80 == 0 => Flow::Other,
         0x4700..=0x47FF => Flow::Indirect(register),
-        // MOV to the program counter, which is a return if it uses the link register.
+        // MOV instruction to the program counter. This MOV instruction is a return if it uses the link register.
         0x4687..=0x46FF if code & 0x87 == 0x87 && register != 14 => Flow::Indirect(register),
-        // ADD to the program counter.
+        // ADD instruction to the program counter.
         0x4487..=0x44FF if code & 0x87 == 0x87 => Flow::Indirect(15),
         0xB100..=0xBBFF if code & 0x0500 == 0x0100 => to((code >> 9 & 1) << 6 | (code >> 3 & 0x1F) << 1),
         0xDE00..=0xDEFF => Flow::Trap,
@@ -58,7 +58,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
     let immediate = (first & 0xF) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF;
     let register = (second >> 8 & 0xF) as u8;
     match (first & 0xF800, second & 0xD000) {
-        // BL, and B without condition.
+        // BL, and B without a condition.
         (0xF000, 0xD000 | 0x9000) => {
             let (i1, i2) = (1 ^ j1 ^ sign, 1 ^ j2 ^ sign);
             let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
@@ -75,7 +75,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             0xF2C0 => Flow::High(register, immediate as u16),
             _ => Flow::Other,
         },
-        // LDR to the program counter from any memory except the stack. A load from the stack is a return.
+        // LDR to the program counter from any memory except the stack. An LDR from the stack is a return.
         _ if first & 0xFF70 == 0xF850 && second >> 12 == 15 && first & 0xF != 13 => Flow::Indirect(15),
         _ => Flow::Other,
     }
@@ -87,8 +87,8 @@ mod tests {
 
     const AT: u32 = 0x0800_1000;
 
-    /// Instruction codes (the first halfword of a long instruction first), and their meaning according to LLVM's assembler and
-    /// disassembler. Offsets are relative to the instruction's address + 4.
+    /// Instruction codes, and their meaning according to the assembler and disassembler of LLVM. The first halfword of a long
+    /// instruction comes first. Offsets are relative to the address of the instruction + 4.
     const BRANCHES: [(u32, i32); 11] = [
         (0xF001_F918, 4_656),      // bl
         (0xF7FE_FEE4, -4_664),     // bl

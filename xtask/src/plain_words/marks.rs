@@ -1,10 +1,10 @@
-//! Marks, which are words and constructions that hide the subject of a sentence, or that have another meaning in most
-//! texts.
+//! Marks, which are words and constructions that hide the subject of a sentence. A word is also a mark if it has
+//! another meaning in most other texts.
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-/// Names of the marks, with the pattern of each.
+/// Names of the marks, with the search pattern of each mark.
 pub(super) const MARKS: [(&str, &str); 10] = [
     ("begins with What, Who, Whose, Whether", r"(?:^|[.!;:] )(?:What|Who|Whose|Whether)\b"),
     (

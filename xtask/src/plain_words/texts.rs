@@ -1,18 +1,18 @@
 //! Extracts the prose of a file: comments and strings of a program, or paragraphs of a page.
 use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
 
-/// Comment, string or paragraph, joined into one line.
+/// Comment, string or paragraph of a file, joined into one line.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Text {
     pub words: String,
-    /// Positions in `words` at which the lines of the file begin, with the line numbers.
+    /// Positions in `words` at which the lines of the file begin, with the line numbers of these lines.
     lines: Vec<(usize, usize)>,
 }
 
 impl Text {
     /// Returns the number of the line that contains this byte of `words`.
     pub(super) fn line_at(&self, offset: usize) -> usize {
-        // A mark may begin at the end of the previous sentence.
+        // The pattern of a mark may begin at the end of the previous sentence.
         let before = |(start, _): &&(usize, usize)| *start <= offset + 2;
         self.lines.iter().rev().find(before).map_or(1, |(_, number)| *number)
     }
@@ -37,7 +37,7 @@ pub(super) fn of(source: &str, extension: &str) -> Vec<Text> {
     paragraphs((1..).zip(source.lines().map(prose)))
 }
 
-/// Joins consecutive lines outside fenced code into one text. A list item begins a new text.
+/// Joins consecutive lines outside fenced code into one text. Each list item begins a new text.
 fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<Text> {
     let (mut texts, mut open, mut fenced) = (Vec::new(), Text::default(), false);
     for (number, line) in lines {
@@ -57,7 +57,8 @@ fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<
     texts
 }
 
-/// Returns the comment after `mark`, or a line that may belong to a longer comment or a docstring.
+/// Returns the comment text after `mark`. Also returns a line without `mark` that may belong to a longer comment or a
+/// docstring.
 fn comment_or_prose<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
     let line = line.trim();
     match line.split_once(mark) {
@@ -66,7 +67,7 @@ fn comment_or_prose<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
     }
 }
 
-/// Returns true if at least three quarters of the line are words.
+/// Returns `true` if at least three quarters of the line are words.
 fn is_prose(line: &str) -> bool {
     let words =
         line.split_whitespace().filter(|word| word.chars().all(|c| c.is_alphabetic() || ",.'’".contains(c)));

@@ -1,5 +1,5 @@
-//! Source changes since the last mutation test. Only the mutants in changed parts are tested again, and the results
-//! of the other mutants are kept.
+//! Source changes since the last mutation test. The command tests only the mutants in changed parts again, and keeps
+//! the results of the other mutants.
 use std::collections::BTreeMap;
 use std::fs::{read_to_string, write};
 use std::path::Path;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::shell::{command, root};
 
-/// Changes of a file since its last mutation test, from `git diff -U0`.
+/// Changes of a source file since its last mutation test, from `git diff -U0`.
 pub(super) struct Changes {
     pub(super) diff: String,
     /// Changed pieces, each with the first old line, the number of old lines and the number of new lines.
@@ -17,20 +17,20 @@ pub(super) struct Changes {
 }
 
 impl Changes {
-    /// Compares `old` with the current file.
+    /// Compares the file `old` with the current file.
     fn of(old: &Path, file: &str) -> Result<Self> {
         let mut git = command("git");
         git.args(["diff", "--no-index", "-U0"]).arg(old).arg(file);
-        // The exit code of `git diff` is 1 if there is a difference.
+        // The exit code of `git diff` is 1 if the files differ.
         let diff = String::from_utf8(git.output().context("cannot start git")?.stdout)?;
         Ok(Self { pieces: diff.lines().filter_map(piece).collect(), diff })
     }
 
-    /// Returns the current number of an old line; `None` if the line was changed or removed.
+    /// Returns the current line number of an old line. Returns `None` if the line was changed or removed.
     fn now(&self, line: u64) -> Option<u64> {
         let mut shifted = line;
         for &(first, old, new) in &self.pieces {
-            // A piece without old lines is inserted after the given line.
+            // If a piece has no old lines, its new lines are inserted after the line `first`.
             let first = if old == 0 { first + 1 } else { first };
             if line < first {
                 break;
@@ -44,8 +44,8 @@ impl Changes {
     }
 }
 
-/// Parses a header such as `@@ -12,2 +13 @@`. Returns the first old line, the number of old lines and the number of
-/// new lines.
+/// Parses a header of a diff such as `@@ -12,2 +13 @@`. Returns the first old line, the number of old lines and the
+/// number of new lines.
 fn piece(line: &str) -> Option<(u64, u64, u64)> {
     let (old, new) = line.strip_prefix("@@ -")?.split_once(" +")?;
     let new = new.split(' ').next()?;
@@ -53,8 +53,8 @@ fn piece(line: &str) -> Option<(u64, u64, u64)> {
     Some((old.split(',').next()?.parse().ok()?, count(old)?, count(new)?))
 }
 
-/// Returns the changes of the files in a report. The report contains the sources of the files. Deleted files are
-/// omitted.
+/// Returns the changes of the source files in a report. The report contains the old sources of the files. The result
+/// does not contain deleted files.
 pub(super) fn changes(results: &Path, report: &Value) -> Result<BTreeMap<String, Changes>> {
     let old = results.join("old.rs");
     let mut all = BTreeMap::new();

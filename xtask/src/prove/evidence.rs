@@ -1,5 +1,5 @@
-//! Reads and updates docs/evidence.md, which contains generated tables between marks, and explanations of
-//! mutants that tests cannot detect.
+//! Reads and updates docs/evidence.md. The page contains generated tables between marks, and explanations of mutants
+//! that tests cannot detect.
 use std::collections::BTreeSet;
 use std::fs::{read_to_string, write};
 
@@ -9,12 +9,12 @@ use crate::shell::root;
 
 const PAGE: &str = "docs/evidence.md";
 
-/// Returns the page.
+/// Returns the text of docs/evidence.md.
 pub(super) fn read() -> Result<String> {
     read_to_string(root().join(PAGE)).with_context(|| format!("cannot read {PAGE}"))
 }
 
-/// Replaces the text between the marks `<!-- name -->` and `<!-- end of name -->`.
+/// Replaces the text of the page between the marks `<!-- name -->` and `<!-- end of name -->`.
 pub(super) fn replace(name: &str, table: &str) -> Result<()> {
     let page = read()?;
     let (before, rest) = parts(&page, name)?;
@@ -38,14 +38,15 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
     Ok((&page[..start], (&page[start..end], &page[end..])))
 }
 
-/// Mutant, identified by the file, the source line without indentation, and the change, but not by a line number.
+/// Identification of a mutant by its file, its source line and its change. The identification does not depend on line
+/// numbers.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Named {
     /// Path of the source file, relative to the root of the workspace.
     pub file: String,
-    /// Source line in which the mutant begins.
+    /// Source line in which the mutant begins, without indentation.
     pub line: String,
-    /// Change of the source, as described by cargo-gamma.
+    /// Change of the source in the words of cargo-gamma.
     pub change: String,
 }
 
@@ -60,7 +61,7 @@ pub(super) fn explained(page: &str) -> BTreeSet<Named> {
         }
         let item = text.strip_prefix("- `").and_then(|rest| rest.split_once("` → `"));
         let Some((line, rest)) = item else { continue };
-        // A mutant without a sentence is treated as not explained.
+        // A mutant without an explaining sentence counts as not explained.
         let Some((change, sentence)) = rest.split_once("`: ") else { continue };
         if !sentence.trim().is_empty() {
             explained.insert(Named { file: file.into(), line: line.into(), change: change.into() });

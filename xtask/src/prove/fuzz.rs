@@ -1,5 +1,5 @@
-//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain. Installs cargo-fuzz and
-//! the toolchain if they are missing.
+//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain. If cargo-fuzz or the
+//! toolchain is missing, the command installs it.
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::create_dir_all;
@@ -13,24 +13,24 @@ use crate::shell::{self, command, root, run, works};
 
 const RUNS: &str = "20000000";
 const PORTION: u64 = 500_000;
-/// Number of executions of a target that are also guided by comparisons, in order to find keywords and constants. All
-/// other executions are guided only by code coverage, which is two to three times as fast.
+/// Number of executions of a fuzz target that are also guided by comparisons, in order to find keywords and constants.
+/// All other executions are guided only by code coverage, and run two to three times as fast.
 const COMPARING: u64 = 1_000_000;
 /// Name of the table in docs/evidence.md.
 const TABLE: &str = "fuzz";
 
-/// Option that limits the length of inputs. Longer inputs are slow and only repeat the contents of shorter inputs. Kept
-/// inputs must be readable and small enough for git.
+/// Option that limits the length of fuzz inputs. Longer inputs are slow and only repeat the contents of shorter inputs.
+/// Kept inputs must be readable and small enough for git.
 const LENGTH: &str = "-max_len=4096";
 
-/// Returns a command of the nightly toolchain, without the variables of the pinned toolchain.
+/// Returns a command of the nightly toolchain, without the environment variables of the pinned toolchain.
 fn nightly(arguments: &[&str]) -> Command {
     let mut rustup = command("rustup");
     rustup.args(["run", "nightly"]).args(arguments).env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
     rustup
 }
 
-/// Runs the command. `arguments` may contain a target, `--runs N` and `--keep`.
+/// Runs `cargo xtask prove fuzz`. `arguments` may contain a fuzz target, `--runs N` and `--keep`.
 pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let wanted = shell::option(&mut arguments, "--runs")?;
@@ -53,7 +53,8 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
         let directories: Vec<&str> = directories.iter().map(String::as_str).collect();
         let mut done = done;
         while done < wanted {
-            // The executions run in portions, so that finished portions are counted even if the run is interrupted.
+            // The executions run in portions, so that the command counts finished portions even if the user interrupts
+            // it.
             let portion = (wanted - done).min(PORTION);
             let build = if done < COMPARING { &COMPARISONS[..] } else { &COVERAGE[..] };
             run(&mut fuzz(&target, build, &directories, &[&format!("-runs={portion}"), LENGTH]))?;
@@ -61,7 +62,7 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
             done += portion;
         }
         if keep {
-            // The merge ignores how often code is executed, so that only few inputs are kept.
+            // The merge ignores how often inputs execute the code, so that only few inputs are kept.
             let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }
@@ -80,9 +81,10 @@ fn install() -> Result<()> {
     Ok(())
 }
 
-/// Returns the folders of found inputs and kept inputs, and the folder of regressions if it exists.
+/// Returns the folders of found inputs and kept inputs. If the folder of regressions exists, the function also returns
+/// this folder.
 fn directories(target: &str) -> Result<Vec<String>> {
-    // Found inputs accumulate in the build folder, outside git. Kept inputs are stored in git.
+    // Found inputs accumulate in the build folder, which is not in git. Kept inputs are stored in git.
     let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
     for directory in &directories {
         let path = root().join(directory);
@@ -107,7 +109,7 @@ fn count(target: &str, portion: u64) -> Result<()> {
     evidence::replace(TABLE, &with(&table, target, &commit()?, portion))
 }
 
-/// Returns the rows of the table: target and commit, with the number of executions.
+/// Returns the rows of the table: fuzz target and commit, with the number of executions.
 fn rows(table: &str) -> BTreeMap<(String, String), u64> {
     let row = |line: &str| {
         let mut cells = line.split('|').map(|cell| cell.trim().trim_matches('`').to_owned()).skip(1);
@@ -117,12 +119,12 @@ fn rows(table: &str) -> BTreeMap<(String, String), u64> {
     table.lines().filter_map(row).collect()
 }
 
-/// Returns the number of executions of `target` on all commits.
+/// Returns the number of executions of the fuzz target `target` on all commits.
 fn executions(table: &str, target: &str) -> u64 {
     rows(table).iter().filter(|((name, _), _)| name == target).map(|(_, executions)| executions).sum()
 }
 
-/// Returns the table after adding `portion` executions of `target` on `commit`.
+/// Returns the table with `portion` additional executions of `target` on `commit`.
 fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
     let mut rows = rows(table);
     *rows.entry((target.into(), commit.into())).or_default() += portion;
@@ -133,13 +135,14 @@ fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
     table
 }
 
-/// Arguments of the build that is guided by coverage and by comparisons.
+/// Build arguments for fuzzing that is guided by coverage and by comparisons.
 const COMPARISONS: [&str; 0] = [];
-/// Arguments of the build that is guided only by coverage, in a separate folder so that neither build is repeated.
+/// Build arguments for fuzzing that is guided only by coverage. This build has a separate folder, so that neither of
+/// the two builds is repeated.
 const COVERAGE: [&str; 2] = ["--no-trace-compares", "--target-dir=fuzz/target/coverage"];
 
-/// Returns the command that runs the fuzzer on `directories`. New inputs are written to the first folder. The address sanitizer is
-/// off, because the code has no `unsafe` and the fuzzer is several times as fast without it.
+/// Returns the command that runs the fuzzer on `directories`. The fuzzer writes new inputs to the first folder. The address
+/// sanitizer is off, because the code has no `unsafe` and the fuzzer is several times as fast without the sanitizer.
 fn fuzz(target: &str, build: &[&str], directories: &[&str], options: &[&str]) -> Command {
     let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none"]);
     fuzz.args(build).arg(target).args(directories).arg("--").args(options);
@@ -171,8 +174,8 @@ mod tests {
         assert_eq!((executions(&table, "stream_parser"), executions(&table, "bus_frame")), (521, 0));
     }
 
-    /// Checks that every test run executes each target with its kept inputs, and that all kept inputs belong to a
-    /// target.
+    /// Checks that every test run executes each fuzz target with its kept inputs, and that all kept inputs belong to a
+    /// fuzz target.
     #[test]
     fn every_target_is_built_and_tested() {
         let manifest = read_to_string(root().join("fuzz/Cargo.toml")).unwrap();

@@ -13,24 +13,23 @@ use super::changes::{changes, complete};
 use super::evidence::{self, Named};
 use crate::shell::{self, cargo, command, run, target, works};
 
-/// Version of cargo-gamma. The report format of other versions may differ.
+/// Version of cargo-gamma that the command installs. The report format of other versions may differ.
 const VERSION: &str = "0.4.0";
 const REPORT: &str = "gamma-report.json";
-/// File with the commit that was tested for the report.
+/// Name of the file with the commit that was tested for the report.
 const COMMIT: &str = "commit";
 /// Crates that run on a board. The crates with the fastest tests are first in the list.
 const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
-/// Crates whose tests are run on the mutants of `ucom`. The board side of `ucom` is also tested by tests of the PC
-/// side.
+/// Crates whose tests run on the mutants of `ucom`. Tests of the PC side also test the board side of `ucom`.
 const JUDGES_OF_UCOM: [&str; 3] = ["ucom", "ucom-sim", "ucom-host"];
-/// Largest share of a crate's mutants that may survive, including explained ones.
+/// Largest share of the mutants of a crate that may survive, including explained mutants.
 const SURVIVING_MAX: f64 = 0.03;
 
 /// Results of the mutation test of a crate.
 #[derive(Default)]
 struct Tally {
     killed: usize,
-    /// Number of mutants with which a test did not end. A test that does not end is treated as a failed test.
+    /// Number of mutants for which a test did not end. Such a test counts as a failed test.
     endless: usize,
     equivalent: usize,
     unexplained: Vec<String>,
@@ -50,20 +49,21 @@ impl Tally {
     }
 }
 
-/// Selection of the mutants of a crate to be tested.
+/// Selection of the mutants of a crate that the command tests.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Which {
-    /// All mutants.
+    /// All mutants of the crate.
     All,
     /// Mutants that survived the last mutation test.
     Survivors,
     /// Mutants on lines that have changed since the last mutation test.
     Changed,
-    /// Mutants that an interrupted mutation test has not reached.
+    /// Mutants that an interrupted mutation test has not tested.
     Left,
 }
 
-/// Runs the command. `arguments` may contain `--package NAME`, `--survivors`, `--changed`, `--resume` and `--report`.
+/// Runs `cargo xtask prove mutants`. `arguments` may contain `--package NAME`, `--survivors`, `--changed`, `--resume`
+/// and `--report`.
 pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let package = shell::option(&mut arguments, "--package")?;
@@ -135,19 +135,20 @@ fn results(package: &str) -> PathBuf {
     target().join("mutants").join(package)
 }
 
-/// Runs cargo-gamma for one crate. The exit code depends on the mutants, so the result is determined from the report.
+/// Runs cargo-gamma for one crate. The exit code of cargo-gamma depends on the mutants, so the function reads the
+/// result from the report.
 fn campaign(package: &str, which: Which) -> Result<()> {
     let results = results(package);
     create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
-    // The report covers only the mutants of this run, so the complete report is kept and updated.
+    // The report covers only the mutants of this run, so the command keeps and updates the complete report.
     let whole = results.join(REPORT);
     let in_part = matches!(which, Which::Survivors | Which::Changed);
     let before = if in_part { Some(read_report(&whole)?) } else { None };
     let commit = commit()?;
     let mut gamma: Command = command(program());
     gamma.args(["gamma", "run", "--color", "never", "--progress", "never"]);
-    // The profile contains all assertions and optimises the crates that compute, because simulated arms need most of
-    // the time.
+    // The profile contains all assertions and optimises the crates that do calculations, because simulated arms need
+    // most of the time.
     gamma.args(["--profile", "release"]);
     gamma.arg("--artifact-dir").arg(&results);
     if which == Which::Left {
@@ -171,7 +172,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
-    // Exit code 2 means that too many mutants survived. Exit code 2 is not treated as an error here.
+    // Exit code 2 means that too many mutants survived. This code does not treat exit code 2 as an error.
     ensure!(
         matches!(status.code(), Some(0 | 2)),
         "cargo-gamma ended with {status}; go on with `cargo xtask prove mutants --package {package} --resume`"
@@ -213,7 +214,8 @@ fn mutants(file: &Value) -> impl Iterator<Item = &Value> {
     file["mutants"].as_array().into_iter().flatten()
 }
 
-/// Returns the outcome of a mutant. The report lists an endless mutant as a survivor, together with the reason.
+/// Returns the outcome of a mutant. The report lists a mutant whose test did not end as a survivor, together with the
+/// reason.
 fn outcome(mutant: &Value) -> &str {
     let text = |key: &str| mutant[key].as_str().unwrap_or_default();
     match text("status") {
@@ -227,7 +229,7 @@ fn read_report(path: &Path) -> Result<Value> {
     Ok(serde_json::from_str(&text)?)
 }
 
-/// Counts the outcomes of the mutants of a report.
+/// Counts the outcomes of the mutants in a report.
 fn tally(report: &Value, page: &str) -> Result<Tally> {
     let explained = evidence::explained(page);
     let mut tally = Tally::default();
@@ -251,7 +253,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
                         tally.unexplained.push(format!("{file}:{at}\n- `{line}` → `{change}`:"));
                     }
                 }
-                // The mutant does not compile, or was not tested in this run.
+                // The mutant does not compile, or this run has not tested the mutant.
                 _ => {}
             }
         }
@@ -259,7 +261,8 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Returns the table with a row for each crate. The row of a crate without results on this computer does not change.
+/// Returns the table with a row for each crate. If this computer has no results of a crate, the row of the crate does
+/// not change.
 fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     let mut table = String::from(
         "| crate | mutants | killed | never ended | equivalent | unexplained | alive | commit |\n\
@@ -285,7 +288,7 @@ fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     table
 }
 
-/// Returns the name of the tested commit.
+/// Returns the abbreviated hash of the commit that is checked out.
 pub(super) fn commit() -> Result<String> {
     Ok(shell::read(command("git").args(["rev-parse", "--short=9", "HEAD"]))?.trim().to_owned())
 }

@@ -1,5 +1,5 @@
-//! Answers every frame with a frame that has the same payload and the next identifier: `cargo run --example echo --
-//! URL`.
+//! Echo program for a CAN bus: `cargo run --example echo -- URL`. The program answers every received frame with a
+//! frame that has the same payload and the next identifier.
 
 use std::time::Duration;
 

@@ -4,27 +4,26 @@ use std::time::Duration;
 
 use crate::{CanError, CanFrame, ControllerState};
 
-/// A member on a CAN bus.
+/// A member of a CAN bus.
 ///
-/// Implementations deliver the frames of all other members in the order of the bus, and never deliver the member's own
-/// frames.
+/// `receive` returns the frames of all other members in the order of the bus, and never the member's own frames.
 pub trait CanBus {
-    /// Sends a frame. Waits while the transmit queue is full. Returns an error only if the queue stays full for
-    /// seconds, for example because no other member acknowledges.
+    /// Sends a frame. Waits while the transmit queue is full. Returns an error if the queue stays full for seconds,
+    /// for example because no other member acknowledges frames.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
     /// Returns the next frame of another member, or `None` if none arrived within `timeout`. With a timeout of zero,
     /// the call does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
 
-    /// Returns the state of this member's CAN controller, as far as the frames received so far show this state.
+    /// Returns the state of this member's CAN controller, derived from the frames received so far.
     fn state(&mut self) -> ControllerState {
         ControllerState::default()
     }
 
-    /// Returns how many times this member's CAN controller has been bus-off, as far as the frames received so far show
-    /// it. The controller may be active again, but frames that were sent while it was bus-off are lost. Does not query
-    /// the adapter; returns 0 if the adapter does not report it.
+    /// Returns how many times this member's CAN controller has been bus-off, derived from the frames received so far.
+    /// The controller may be active again, but frames that were sent during bus-off are lost. `times_bus_off` does
+    /// not query the adapter. The number is 0 if the adapter does not report bus-off.
     fn times_bus_off(&self) -> u64 {
         0
     }

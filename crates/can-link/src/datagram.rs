@@ -10,7 +10,7 @@ use crate::{CanFrame, Id};
 /// Longest datagram that python-can accepts, bytes.
 pub(crate) const MAX_DATAGRAM: usize = 4096;
 
-/// Map that is sent in a datagram. python-can refuses maps with other keys.
+/// MessagePack map that is sent in a datagram. python-can refuses maps with other keys.
 #[derive(Serialize)]
 struct Sent<'a> {
     timestamp: f64,
@@ -26,7 +26,7 @@ struct Sent<'a> {
     error_state_indicator: bool,
 }
 
-/// Relevant keys of a received map; other keys are ignored.
+/// Keys that are read from a received map; other keys are ignored.
 #[derive(Deserialize)]
 struct Received {
     arbitration_id: u32,
@@ -85,7 +85,8 @@ pub(crate) fn decode(datagram: &[u8]) -> Option<CanFrame> {
         return None;
     }
     if map.is_fd {
-        // python-can sends any length up to 64. On a real bus the length would be rounded up to a length of CAN FD.
+        // python-can sends payloads of any length up to 64 bytes. A real bus supports only the lengths of CAN FD,
+        // so the length is rounded up.
         return Some(CanFrame::fd_padded(id, data).ok()?.with_brs(map.bitrate_switch));
     }
     CanFrame::classic(id, data).ok().filter(|_| !map.bitrate_switch)
@@ -110,7 +111,8 @@ mod tests {
         let frame = decode(BY_PYTHON_CAN).unwrap();
         let bytes: Vec<u8> = (0..12).collect();
         assert_eq!(frame, CanFrame::fd(Id::standard(0x205).unwrap(), &bytes).unwrap());
-        // The bytes are the same except for the time of day (8 bytes from byte 12).
+        // The datagrams of openjtc and python-can have the same bytes, except the time of day (8 bytes from byte
+        // 12).
         let again = encode(&frame);
         assert_eq!(again[..12], BY_PYTHON_CAN[..12]);
         assert_eq!(again[20..], BY_PYTHON_CAN[20..]);

@@ -12,24 +12,24 @@ pub enum OpenError {
     /// The URL is invalid.
     #[error(transparent)]
     Url(#[from] UrlError),
-    /// This system cannot open buses of this kind.
+    /// The operating system cannot open buses of this kind.
     #[error("`{url}`: {kind} buses need a Linux kernel; this system supports {}", crate::url::OPENABLE)]
     Unsupported {
-        /// The URL.
+        /// URL that cannot be opened.
         url: String,
         /// Scheme of the URL.
         kind: &'static str,
     },
-    /// The adapter's protocol does not support the rate.
+    /// The adapter's protocol does not support the requested bit rate.
     #[error("{url}: {what} {rate} bit/s is not supported, expected one of {possible}")]
     Rate {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// Kind of rate.
+        /// Kind of bit rate.
         what: &'static str,
-        /// Requested rate, bit/s.
+        /// Requested bit rate, bit/s.
         rate: u32,
-        /// All possible rates, bit/s.
+        /// All bit rates that the protocol supports, bit/s.
         possible: String,
     },
     /// The bus cannot be reached.
@@ -49,21 +49,21 @@ pub enum AttachError {
          network interface with multicast (`ip -br link`) and that the port can be shared"
     )]
     Join {
-        /// The group.
+        /// Address of the multicast group.
         group: IpAddr,
-        /// The UDP port.
+        /// UDP port of the multicast group.
         port: u16,
-        /// Failed step.
+        /// Operation that failed.
         step: &'static str,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The connection to a server failed.
     #[error("{url}: cannot connect: {source}; check that the server runs there and uses this port")]
     Connect {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A serial port could not be opened.
@@ -72,9 +72,9 @@ pub enum AttachError {
          of this user, and that no other program uses the port"
     )]
     Port {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A network interface cannot be used.
@@ -86,11 +86,11 @@ pub enum AttachError {
 #[derive(Debug, thiserror::Error)]
 #[error("{url}: {source}: {hint}")]
 pub struct InterfaceError {
-    /// The bus.
+    /// URL of the bus.
     pub url: String,
-    /// The likely cause and the next command.
+    /// Likely cause, and the command that the user should try next.
     pub hint: String,
-    /// The system's error.
+    /// Error of the operating system.
     pub source: io::Error,
 }
 
@@ -100,32 +100,32 @@ pub enum CanError {
     /// Sending or receiving failed.
     #[error("{url}: {step} failed: {source}")]
     Io {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// Failed step.
+        /// Operation that failed.
         step: &'static str,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The connection has ended; the bus must be opened again.
+    /// The connection has ended; the program must open the bus again.
     #[error(
         "{url}: the other side has closed the connection; open the bus again when the other side is available"
     )]
     Closed {
-        /// The bus.
+        /// URL of the bus.
         url: String,
     },
     /// The network interface has disappeared.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
-    /// This kind of bus cannot transmit the frame.
+    /// A bus of this kind cannot transmit the frame.
     #[error("{url}: cannot carry {frame}: {why}")]
     NotCarried {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// The frame.
+        /// Frame that cannot be transmitted.
         frame: CanFrame,
-        /// Missing capability.
+        /// Capability that the bus lacks.
         why: &'static str,
     },
     /// The server or adapter did not carry out the request.
@@ -139,23 +139,23 @@ pub enum AnswerError {
     /// The server or adapter refused the request.
     #[error("{url}: {step} was refused: {answer}")]
     Refused {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// Refused step.
+        /// Operation that was refused.
         step: &'static str,
-        /// Answer.
+        /// Answer of the server or adapter.
         answer: String,
     },
     /// The server or adapter uses another protocol, or does not answer.
     #[error("{url}: no answer to {step} within {seconds} s; {hint}")]
     NoAnswer {
-        /// The bus.
+        /// URL of the bus.
         url: String,
-        /// Unanswered step.
+        /// Operation that was not answered.
         step: &'static str,
         /// Time waited, s.
         seconds: u64,
-        /// Likely causes.
+        /// Likely causes of the missing answer.
         hint: &'static str,
     },
 }
@@ -168,6 +168,6 @@ pub enum AnswerError {
 pub struct ListenError {
     /// Requested address.
     pub address: String,
-    /// The system's error.
+    /// Error of the operating system.
     pub source: io::Error,
 }

@@ -41,7 +41,7 @@ pub struct FaultSchedule {
 /// Counters of the faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultStats {
-    /// Number of frames that arrived.
+    /// Number of frames that entered the simulated line.
     pub frames: u64,
     /// Number of lost frames.
     pub lost: u64,
@@ -57,15 +57,15 @@ pub struct FaultStats {
 pub(crate) struct Line {
     faults: FaultConfig,
     random: fastrand::Rng,
-    /// Queue of frames, sorted by the time at which each frame is due. Frames with equal times are in the order of
-    /// their arrival.
+    /// Frames in transit, sorted by the time at which each frame is delivered. Frames with equal delivery times are in the order in
+    /// which they were added.
     under_way: Vec<(Duration, CanFrame)>,
-    /// Time at which the last frame is due. Frames that are not reordered do not overtake each other.
+    /// Time at which the last frame that is not reordered is delivered. Frames that are not reordered do not overtake each other.
     last_due: Duration,
     stats: FaultStats,
 }
 
-/// Converts a setting in seconds; an invalid value means no delay.
+/// Converts a setting in seconds to a duration; an invalid setting means no delay.
 fn seconds(value: f64) -> Duration {
     Duration::try_from_secs_f64(value).unwrap_or_default()
 }
@@ -76,8 +76,8 @@ impl Line {
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, stats: FaultStats::default() }
     }
 
-    /// Adds a frame. Always draws the same number of random values in the same order, so that changing one setting does
-    /// not change the faults from the other settings.
+    /// Adds a frame. Every frame draws the same number of random values in the same order. Changing one setting therefore does not
+    /// change the faults from the other settings.
     pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let FaultConfig { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
@@ -199,12 +199,12 @@ impl<B: CanBus> CanBus for Faulty<B> {
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let start = (self.clock)();
-        // The wait is counted in addition to being measured, because a virtual clock may not advance during the wait.
+        // The code also adds up its own waits, because a virtual clock may not advance during a wait.
         let mut waited = Duration::ZERO;
         loop {
             let now = (self.clock)();
             self.send_due(now)?;
-            // All frames that have arrived are sorted before the first is returned.
+            // All frames that have already arrived are sorted before the first frame is returned.
             while let Some(frame) = self.bus.receive(Duration::ZERO)? {
                 self.received.put(now, frame);
             }

@@ -1,4 +1,4 @@
-//! CAN frame of any kind, which is always valid.
+//! CAN frames of all kinds. A frame always has a length that is valid for its kind.
 
 use std::fmt;
 
@@ -50,7 +50,8 @@ enum Kind {
     Fd { brs: bool },
 }
 
-/// A classic, remote or CAN FD frame. The length of a frame is always valid for its kind, so every frame can be sent.
+/// A classic, remote or CAN FD frame. The length of a frame is always valid for its kind, so every frame can be sent
+/// on a bus.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     id: Id,
@@ -102,7 +103,7 @@ impl CanFrame {
         self
     }
 
-    /// Returns the shortest CAN FD length of at least `len` bytes, or `None` above 64.
+    /// Returns the shortest CAN FD payload length of at least `len` bytes, or `None` if `len` is above 64.
     pub const fn fd_len(len: usize) -> Option<usize> {
         match len {
             0..=8 => Some(len),
@@ -140,7 +141,7 @@ impl CanFrame {
         matches!(self.kind, Kind::Fd { brs: true })
     }
 
-    /// Returns `true` for a remote frame, which has no payload.
+    /// Returns `true` for a remote frame. A remote frame has no payload.
     pub const fn is_remote(&self) -> bool {
         matches!(self.kind, Kind::Remote)
     }
@@ -150,7 +151,7 @@ impl CanFrame {
         self.len as usize
     }
 
-    /// Returns `true` if the length is 0.
+    /// Returns `true` if the length of the frame is 0.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -186,30 +187,30 @@ impl fmt::Debug for CanFrame {
 /// Reasons why a frame is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidFrame {
-    /// The value is too large for an 11-bit identifier.
+    /// The identifier is too large for 11 bits.
     #[error("identifier 0x{value:X} has more than 11 bits (0x7FF); it may be an extended identifier")]
     StandardId {
-        /// The number.
+        /// Rejected identifier.
         value: u32,
     },
-    /// The value is too large for a 29-bit identifier.
+    /// The identifier is too large for 29 bits.
     #[error("identifier 0x{value:X} has more than 29 bits (0x1FFFFFFF)")]
     ExtendedId {
-        /// The number.
+        /// Rejected identifier.
         value: u32,
     },
     /// A classic frame with more than 8 bytes.
     #[error("frame {id}: {len} bytes, but a classic frame has at most 8; use CAN FD")]
     ClassicLength {
-        /// Identifier.
+        /// Identifier of the frame.
         id: Id,
         /// Number of bytes.
         len: usize,
     },
-    /// A length that CAN FD does not have.
+    /// The payload length is not a valid CAN FD length.
     #[error("frame {id}: {len} bytes, but a CAN FD frame has 0..8, 12, 16, 20, 24, 32, 48 or 64")]
     FdLength {
-        /// Identifier.
+        /// Identifier of the frame.
         id: Id,
         /// Number of bytes.
         len: usize,

@@ -40,7 +40,7 @@ fn inner(text: &str) -> &str {
     text.strip_prefix('<').and_then(|text| text.strip_suffix('>')).expect("a message in its brackets")
 }
 
-/// Finds the messages in a slow and simple way: each message begins at the last `<` before a `>`.
+/// Finds messages with a slow and simple algorithm: each message begins at the last `<` before a `>`.
 fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     let mut found = Vec::new();
     let mut rest = stream;
@@ -57,8 +57,8 @@ fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     found
 }
 
-/// Parses a stream of SLCAN lines in pieces of any length. For the line reader and for the adapter, the result must be
-/// the same as for the whole stream. A parsed frame that is written again must parse to the same frame.
+/// Parses a stream of SLCAN lines in pieces of any length. The line reader and the adapter must produce the same
+/// results as for the whole stream. A parsed frame that is written again must parse to the same frame.
 pub fn slcan_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
     let lines = |pieces: &mut dyn Iterator<Item = &[u8]>| {
@@ -98,7 +98,7 @@ pub fn slcan_stream(data: &[u8]) {
     assert_eq!(adapter(&mut pieces(cuts, stream)), adapter(&mut std::iter::once(stream)));
 }
 
-/// Splits off the first bytes, which define how the other bytes are cut into pieces.
+/// Splits off the first bytes. The first bytes define how the remaining bytes are cut into pieces.
 fn parts(data: &[u8]) -> (&[u8], &[u8]) {
     data.split_at(data.len().min(4))
 }

@@ -9,15 +9,15 @@ use socket2::{Domain, Protocol, Socket, Type};
 use crate::datagram::{MAX_DATAGRAM, decode, encode};
 use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 
-/// Bytes that the system may buffer for this member, about 4,000 frames.
+/// Bytes that the operating system may buffer for this member, about 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
 
-/// Longest time for which a send waits for space in the system's queue.
+/// Longest time for which a send waits for space in the transmit queue of the operating system.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
 ///
-/// UDP loses frames if a member is too slow. This transport is suitable for simulators and tools on one computer.
+/// UDP loses frames if a member reads too slowly. UDP multicast is suitable for simulators and tools on one computer.
 pub struct MulticastBus {
     url: String,
     /// Socket that listens at the group's port, which all members share.
@@ -34,7 +34,7 @@ impl MulticastBus {
     /// Joins a group. With `ttl` 0, frames stay on this computer; with `ttl` 1, frames can reach the local network.
     pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, AttachError> {
         let failed = |(step, source)| AttachError::Join { group, port, step, source };
-        // A computer without a network has no default interface, but can still communicate with itself by IPv4.
+        // A computer without a network has no default interface, but can still reach itself by IPv4.
         let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
             .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))
             .map_err(failed)?;
@@ -72,8 +72,8 @@ impl MulticastBus {
     fn next(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
             match self.listener.recv_from(buffer) {
-                // The system does not always report the scope of an IPv6 address, so only address and port are
-                // compared.
+                // The operating system does not always report the scope of an IPv6 address, so only address and port
+                // are compared.
                 Ok((_, from)) if (from.ip(), from.port()) == (self.own.ip(), self.own.port()) => {}
                 Ok((len, _)) => return Ok(Some(len)),
                 Err(error) if is_no_data(&error) => return Ok(None),
@@ -94,14 +94,15 @@ fn step<T>(what: &'static str, result: io::Result<T>) -> Step<T> {
     result.map_err(|error| (what, error))
 }
 
-/// Opens the listener and the sender. IPv4 groups use the interface in the argument, IPv6 groups the default interface.
+/// Opens the listener and the sender. IPv4 groups use the network interface in the argument, and IPv6 groups use the
+/// default network interface.
 fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<(UdpSocket, UdpSocket)> {
     let listener = step("opening a socket", udp(group))?;
     step("sharing the port", share_port(&listener))?;
-    // A larger buffer is useful but not required.
+    // A larger receive buffer is useful but not required.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
-    // If bound to the group, the listener receives no datagrams of other groups. On Windows, a socket can only be bound
-    // to the computer's own addresses.
+    // A listener that is bound to the group address receives no datagrams of other groups. On Windows, a socket can
+    // only be bound to the computer's own addresses.
     let address = if cfg!(windows) { unspecified(group) } else { group };
     step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
 
@@ -215,7 +216,7 @@ mod tests {
     use super::*;
     use crate::Id;
 
-    /// Receives a frame. The timeout is reached only if the transport does not work.
+    /// Receives a frame. The timeout expires only if the transport does not work.
     fn received(bus: &mut MulticastBus) -> Option<CanFrame> {
         bus.receive(Duration::from_secs(60)).unwrap()
     }

@@ -1,4 +1,4 @@
-//! Opens a bus of any kind from its URL. Only this module knows all transports.
+//! Opens a bus of any kind from its URL. Only the module `open` knows all transports of the crate.
 
 #[cfg(target_os = "linux")]
 use crate::AttachError;

@@ -39,10 +39,11 @@ impl SocketCanBus {
             hint: hint(&source, interface),
             source,
         };
-        // First opens any interface, because the error of a kernel without CAN differs from the error for a wrong name.
+        // The code first opens a socket for all interfaces (index 0), because a kernel without CAN returns another
+        // error than a wrong name does.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
-        // The kernel reports a disabled interface (down) here.
+        // At this point the kernel reports a disabled interface (down).
         if let Some(error) = socket.as_raw_socket().take_error().map_err(failed)? {
             return Err(failed(error));
         }

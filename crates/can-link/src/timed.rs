@@ -17,7 +17,7 @@ pub use event::{BusError, BusEvent, BusStats, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
 use wire::{ERROR_FRAME, INTERMISSION, RECESSIVE_RUN, RECOVERIES, TO_ACKNOWLEDGE};
 
-/// Largest number of waiting frames per member.
+/// Largest number of queued frames per member.
 const QUEUE: usize = 65_536;
 
 /// A classic CAN bus in virtual time.
@@ -47,9 +47,9 @@ pub struct TimedBus {
     members: Vec<Member>,
     random: fastrand::Rng,
     disturbance: f64,
-    /// Frame transfer that is on the bus.
+    /// Frame that is on the bus now.
     transfer: Option<Transfer>,
-    /// End of the intermission.
+    /// Time at which the intermission ends and the bus is free, ns.
     free_from: u64,
     events: VecDeque<BusEvent>,
     stats: BusStats,
@@ -57,7 +57,7 @@ pub struct TimedBus {
 }
 
 struct Member {
-    /// Queue of waiting frames (first in, first out).
+    /// Queue of frames that the member must send (first in, first out).
     queue: VecDeque<CanFrame>,
     /// Simulated faults of frames between the member and its queue, and of frames from the bus.
     lines: Option<Box<(Line, Line)>>,
@@ -83,7 +83,7 @@ impl Member {
 struct Transfer {
     end: u64,
     arbitration: Arbitration,
-    /// Error of the frame, unless it is a collision.
+    /// Error that ends the frame. The field does not store a collision.
     error: Option<BusError>,
 }
 
@@ -91,7 +91,7 @@ fn time(ns: u64) -> Duration {
     Duration::from_nanos(ns)
 }
 
-/// Converts a time to ns; returns `None` for a time that is too large to be represented.
+/// Converts a duration to ns; returns `None` if the duration is too long for a `u64`.
 fn ns(time: Duration) -> Option<u64> {
     u64::try_from(time.as_nanos()).ok()
 }
@@ -117,9 +117,9 @@ impl TimedBus {
         }
     }
 
-    /// Sets whether controllers begin to recover as soon as they are bus-off, like `restart-ms` in Linux and the
-    /// automatic recovery of many controllers. Frames that are queued during the recovery wait. Without this setting,
-    /// [`recover`](Self::recover) begins the recovery.
+    /// Sets whether a controller begins its recovery as soon as it is bus-off. Linux (`restart-ms`) and many
+    /// controllers can recover automatically in this way. Frames that are queued during the recovery wait. Without this
+    /// setting, [`recover`](Self::recover) begins the recovery.
     pub fn set_recovers_by_itself(&mut self, recovers: bool) {
         self.recovers_by_itself = recovers;
     }
@@ -182,8 +182,8 @@ impl TimedBus {
         self.members[member.0].acknowledges = acknowledges;
     }
 
-    /// Sets simulated faults between a member and the bus, such as those of a gateway. These faults do not affect the
-    /// bus itself.
+    /// Sets simulated faults between a member and the bus, for example those of a gateway. The simulated faults of a
+    /// member do not affect the bus itself.
     pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let send = Line::new(schedule.send, seeds.u64(..));
@@ -191,7 +191,8 @@ impl TimedBus {
         self.members[member.0].lines = Some(Box::new((send, receive)));
     }
 
-    /// Returns the counters of the simulated faults, for frames that the member sent and for frames that it received.
+    /// Returns the counters of the simulated faults, for frames sent by the member and for frames received by the
+    /// member.
     pub fn fault_stats(&self, member: MemberId) -> (FaultStats, FaultStats) {
         let lines = self.members[member.0].lines.as_deref();
         lines.map_or_else(Default::default, |(send, receive)| (send.stats(), receive.stats()))
@@ -226,7 +227,7 @@ impl TimedBus {
         Ok(())
     }
 
-    /// Returns the number of the member's waiting frames, including a frame that is on the bus.
+    /// Returns the number of frames in the member's queue, including a frame that is on the bus.
     pub fn pending(&self, member: MemberId) -> usize {
         self.members[member.0].queue.len()
     }
@@ -256,7 +257,8 @@ impl TimedBus {
         BusStats { now_ns: self.now, ..self.stats }
     }
 
-    /// Returns the time of the bus's next action if no further call is made, ns. The action may cause no event.
+    /// Returns the time of the bus's next action if the caller does nothing until then, ns. The action may cause no
+    /// event.
     pub fn next_ns(&self) -> Option<u64> {
         if !self.events.is_empty() {
             return Some(self.now);
@@ -273,9 +275,9 @@ impl TimedBus {
         due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
     }
 
-    /// Advances to the next event, or to `at_ns` if no event comes before. The caller must repeat the call until it
-    /// returns `None`. After the call returns an event, the current time is the time of this event. Frames that are
-    /// queued at that point take part in arbitration from this time on.
+    /// Advances to the next event, or to `at_ns` if no event occurs before. The caller must repeat the call until it
+    /// returns `None`. After the call returns an event, the current time is the time of this event. Frames that the
+    /// caller queues then take part in arbitration from this time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -299,14 +301,14 @@ impl TimedBus {
         (u64::from(bits) * 1_000_000_000).div_ceil(u64::from(self.bitrate))
     }
 
-    /// Returns the time at which the bus is free and a member with a frame may start.
+    /// Returns the earliest time at which the bus is free and a member with a queued frame may start.
     fn next_start(&self) -> Option<u64> {
         let ready = |member: &Member| member.on_bus() && !member.queue.is_empty();
         let start = |member: &Member| member.may_start.max(self.free_from);
         self.members.iter().filter(|member| ready(member)).map(start).min()
     }
 
-    /// Handles the events that are due now.
+    /// Handles all actions of the bus that are due now.
     fn step(&mut self) {
         let now = time(self.now);
         if self.transfer.as_ref().is_some_and(|transfer| transfer.end <= self.now)
@@ -334,15 +336,15 @@ impl TimedBus {
                 self.events.push_back(BusEvent::Received { member: MemberId(number), frame });
             }
         }
-        // Events of this time are returned first, so that members that react to these events take part in the next
+        // The bus first returns the events of this time. Members that react to these events then take part in the next
         // arbitration.
         if self.events.is_empty() && self.transfer.is_none() {
             self.start();
         }
     }
 
-    /// Updates the recovery when a frame has ended. The first of the 11 recessive bits was the delimiter before the end
-    /// of frame.
+    /// Updates the recoveries when a frame has ended. The delimiter before the end of frame was the first of the 11
+    /// recessive bits.
     fn wire_is_recessive(&mut self) {
         let from = self.free_from.saturating_sub(self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -350,8 +352,8 @@ impl TimedBus {
         }
     }
 
-    /// Updates the recovery when a frame begins. A sequence of fewer than 11 recessive bits before the frame is not
-    /// counted.
+    /// Updates the recoveries when a frame begins. A sequence of fewer than 11 recessive bits before the frame does not
+    /// count.
     fn wire_is_taken(&mut self) {
         let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {

@@ -1,4 +1,4 @@
-//! CAN URLs, which identify a bus in one word of a command line.
+//! CAN URLs. A CAN URL identifies a bus in one word of a command line.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -26,9 +26,9 @@ pub enum CanUrl {
     Slcan {
         /// Serial port, or `tcp:HOST:PORT`.
         device: String,
-        /// Bit rate of the bus after the `@`, bit/s; with `None` the adapter's own setting stays.
+        /// Bit rate of the bus after the `@`, bit/s; with `None` the adapter keeps its own setting.
         rate: Option<u32>,
-        /// Bit rate of the data phase, bit/s; with `None` the adapter's own setting stays.
+        /// Bit rate of the data phase, bit/s; with `None` the adapter keeps its own setting.
         data_rate: Option<u32>,
         /// Rate of the serial line, bit/s.
         baud: u32,
@@ -74,23 +74,23 @@ impl CanUrl {
 /// Reasons why a text is not a valid CAN URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UrlError {
-    /// The text has no scheme, or an unknown scheme.
+    /// The URL has no scheme, or an unknown scheme.
     #[error(
         "`{url}` is not a valid CAN URL, expected socketcan:can0, slcan:/dev/ttyACM0@1000000, \
          socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME"
     )]
     Scheme {
-        /// The text.
+        /// Text that is not a valid CAN URL.
         url: String,
     },
-    /// A part is missing or invalid.
+    /// A part of the URL is missing or invalid.
     #[error("`{url}`: {what}; the form is {form}")]
     Part {
-        /// The text.
+        /// Text that is not a valid CAN URL.
         url: String,
         /// Description of the error.
         what: &'static str,
-        /// Required form.
+        /// Required form of the URL.
         form: &'static str,
     },
 }
@@ -150,7 +150,7 @@ fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
     Ok(CanUrl::Slcan { device: device.to_owned(), rate, data_rate, baud })
 }
 
-/// Splits a host or bracketed IPv6 address from its port, if it has one.
+/// Splits a host name or a bracketed IPv6 address from its port, if the text contains a port.
 fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> {
     let port = |text: &str| match text.parse() {
         Ok(0) | Err(_) => Err("the port is out of range (1..65535)"),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::{CanBus, CanError, CanFrame, ControllerState, ErrorState};
 
-/// Maximum number of frames waiting for a member.
+/// Maximum number of frames in the receive queue of a member.
 const QUEUE: usize = 4096;
 
 /// Default time for which a sender waits for a member whose queue is full.
@@ -31,7 +31,7 @@ pub struct VirtualHub {
 struct Shared {
     timeout: Duration,
     state: Mutex<State>,
-    /// Condition that is notified when an entry was added to or taken from a queue.
+    /// Condition variable that is notified when an entry was added to or removed from a queue.
     changed: Condvar,
 }
 
@@ -47,7 +47,7 @@ struct State {
     members: BTreeMap<u64, Member>,
 }
 
-/// An entry that waits for a member. Entries are in the order of arrival.
+/// An entry in the receive queue of a member. Entries are in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Received {
     /// A frame of another member.
@@ -58,14 +58,14 @@ pub(crate) enum Received {
 
 struct Member {
     waiting: VecDeque<Received>,
-    /// Maximum number of waiting frames.
+    /// Maximum number of frames in the queue.
     limit: usize,
-    /// `true` if no sender waits for the member: the member is a guest, or it has taken no entry since a sender waited
-    /// without success.
+    /// `true` if no sender waits for the member. Senders do not wait for a guest. Senders also do not wait for a
+    /// member that has taken no entry since a sender waited for it without success.
     stalled: bool,
     /// `true` if no sender ever waits for the member.
     guest: bool,
-    /// `true` if the member receives nothing at present.
+    /// `true` while the member receives no frames.
     deaf: bool,
     missed: u64,
 }
@@ -117,7 +117,7 @@ impl VirtualHub {
 
     /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames
     /// is full. A member that takes no frame for that time misses frames until it takes a frame again. A slow member
-    /// therefore does not stop the bus for the other members.
+    /// therefore does not block the bus for the other members.
     pub fn with_timeout(timeout: Duration) -> Self {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
@@ -127,8 +127,8 @@ impl VirtualHub {
         self.add(Member::ORDINARY)
     }
 
-    /// Adds a member for which no sender ever waits. The member misses frames if more than `limit` are waiting, and
-    /// receives nothing until `set_deaf(false)` is called.
+    /// Adds a member for which senders never wait. The member misses frames if more than `limit` frames are in its
+    /// queue. The member receives no frames until `set_deaf(false)` is called.
     pub(crate) fn join_as_guest(&self, limit: usize) -> VirtualBus {
         self.add(Member { limit, stalled: true, guest: true, deaf: true, ..Member::ORDINARY })
     }
@@ -150,7 +150,7 @@ impl VirtualHub {
         self.shared.changed.notify_all();
     }
 
-    /// Reports to one member the state of its own controller, in order with the frames.
+    /// Adds the state of a member's own controller to the member's queue, in order with the frames.
     pub(crate) fn report_state(&self, state: ErrorState, number: u64) {
         if let Some(member) = self.shared.state().members.get_mut(&number) {
             member.becomes(state);
@@ -158,7 +158,7 @@ impl VirtualHub {
         self.shared.changed.notify_all();
     }
 
-    /// Puts a frame on the bus for all members except one, without waiting for any of them.
+    /// Delivers a frame to all members except one, without waiting for any member.
     pub(crate) fn deliver(&self, frame: &CanFrame, except: Option<u64>) {
         let mut state = self.shared.state();
         for (number, member) in &mut state.members {
@@ -214,7 +214,7 @@ impl VirtualBus {
         Self { membership: Arc::clone(&self.membership) }
     }
 
-    /// Stops or starts receiving. When the member stops receiving, waiting frames are dropped.
+    /// Stops or starts receiving. When the member stops receiving, the frames in its queue are dropped.
     pub(crate) fn set_deaf(&self, deaf: bool) {
         if let Some(member) = self.shared().state().members.get_mut(&self.number()) {
             member.deaf = deaf;
@@ -224,13 +224,13 @@ impl VirtualBus {
         }
     }
 
-    /// Leaves the bus, for all handles of the member.
+    /// Removes the member from the bus, for all handles of the member.
     pub(crate) fn leave(&self) {
         self.shared().state().members.remove(&self.number());
         self.shared().changed.notify_all();
     }
 
-    /// Waits for frames and states, and moves at most `most` of them to `received`. Returns `false` if the member has
+    /// Waits for frames and states, and moves at most `most` entries to `received`. Returns `false` if the member has
     /// left the bus.
     pub(crate) fn take_some(&self, most: usize, timeout: Duration, received: &mut Vec<Received>) -> bool {
         let mut state = self.shared().state();
@@ -258,8 +258,8 @@ impl CanBus for VirtualBus {
         let shared = self.shared();
         let give_up = Instant::now().checked_add(shared.timeout);
         let mut state = shared.state();
-        // Waits for the slowest member before any member gets the frame, so that all members receive frames in the same
-        // order.
+        // The sender waits for the slowest member before any member gets the frame. All members therefore receive
+        // frames in the same order.
         loop {
             let blocks = |(number, member): (&u64, &Member)| {
                 *number != self.number() && member.full() && !member.stalled && !member.deaf
@@ -281,7 +281,7 @@ impl CanBus for VirtualBus {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        // A timeout that the clock cannot represent is treated as an unlimited wait.
+        // If the clock cannot represent the end of the timeout, the wait has no limit.
         let deadline = Instant::now().checked_add(timeout);
         let shared = self.shared();
         let mut state = shared.state();

@@ -6,13 +6,14 @@ use super::line::{BELL, Lines, Piece, flags, parse_frame, push_frame};
 use super::options::{BIT_RATES, DATA_RATES};
 use crate::{CanBus, CanError, CanFrame, ControllerState};
 
-/// Largest number of bytes that wait for a host that does not read. Further frames are lost, as in a real adapter with
-/// little memory.
+/// Largest number of output bytes that the adapter stores for a host that does not read. Further frames are lost, as
+/// in a real adapter with little memory.
 const OUTPUT: usize = 256 * 1024;
-/// Largest number of frames that one exchange takes from the bus.
+/// Largest number of frames that one call of `turn` takes from the bus.
 const MOST: usize = 64;
 
-/// A simulated SLCAN adapter without a port and without a thread: it accepts bytes and returns bytes.
+/// A simulated SLCAN adapter without a port and without a thread. The adapter accepts bytes from the host and returns
+/// bytes for the host.
 ///
 /// ```
 /// use can_link::SlcanAdapter;
@@ -42,12 +43,13 @@ impl SlcanAdapter {
         Self::default()
     }
 
-    /// Processes bytes from the host. `send` is called with the host's frames and returns `true` if the bus has
-    /// accepted a frame. Otherwise the adapter refuses the frame with a bell, as an adapter with a full queue does.
+    /// Processes bytes from the host. Calls `send` with each frame of the host. `send` must return `true` if the bus
+    /// has accepted the frame. Otherwise the adapter refuses the frame with a bell character, like an adapter with a
+    /// full queue.
     pub fn input(&mut self, mut bytes: &[u8], mut send: impl FnMut(&CanFrame) -> bool) {
         let mut lines = self.lines.take().unwrap_or_else(Lines::new);
         while let Some(piece) = lines.next(&mut bytes) {
-            // Only the adapter sends a bell, so a bell from the host is ignored.
+            // Only an adapter sends bell characters, so a bell from the host is ignored.
             if let Piece::Line(line) = piece {
                 self.execute(line, &mut send);
             }
@@ -97,8 +99,8 @@ impl SlcanAdapter {
         self.lost
     }
 
-    /// Runs one exchange between a host and a bus: executes the host's commands and reports the frames of the bus. The
-    /// port's reads and writes must not wait for long.
+    /// Exchanges data once between a host and a bus: executes the host's commands and forwards the frames of the bus.
+    /// Reads and writes of the port must not wait for long.
     pub fn turn(
         &mut self,
         port: &mut (impl Read + Write),
@@ -196,7 +198,7 @@ pub enum AdapterError {
     Bus(CanError),
 }
 
-/// Converts a read or write that found no data or no space to 0, because it is not an error.
+/// Converts the result of a read without data or a write without space to 0. Such a read or write is not an error.
 fn waited(result: io::Result<usize>) -> io::Result<usize> {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     result.or_else(|error| match error.kind() {

@@ -14,17 +14,17 @@ use crate::{AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, Contro
 const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
 /// Number of version requests before the host assumes that no adapter answers.
 const VERSION_QUESTIONS: u32 = 3;
-/// Longest wait for other answers of an adapter.
+/// Longest wait for the answers of an adapter to other commands.
 const ANSWER: Duration = Duration::from_millis(500);
-/// Time after which all data that was sent for an earlier user has arrived.
+/// Time after which all bytes that the adapter sent for an earlier user have arrived.
 const QUIET: Duration = Duration::from_millis(30);
 /// Longest time for which an adapter may refuse a frame because its queue is full, or delay its answer.
 const SEND_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause before a refused frame is sent again.
 const RETRY: Duration = Duration::from_millis(1);
-/// Duration of the intervals in which a wait handles both directions.
+/// Duration of one step of a wait. Each step handles both directions.
 const SLICE: Duration = Duration::from_millis(20);
-/// Largest number of received frames that are stored while waiting for an answer.
+/// Largest number of received frames that are stored while the host waits for an answer.
 const RECEIVE_QUEUE: usize = 100_000;
 
 /// An adapter's answer to a command.
@@ -64,7 +64,7 @@ pub struct SlcanBus {
     /// `true` if the adapter supports the command `F`; `None` before the host has sent this command.
     has_flags: Option<bool>,
     got_flags: bool,
-    /// `true` if a line was received that is of no other known kind, for example the version.
+    /// `true` if the adapter has sent a line of an unknown kind, for example its version.
     got_text: bool,
     closed: bool,
 }
@@ -129,7 +129,7 @@ impl SlcanBus {
 
     /// Closes a channel that an earlier user has not closed, and checks that an adapter answers.
     fn check_presence(&mut self) -> Result<(), CanError> {
-        // The first carriage return ends any earlier input.
+        // The first carriage return ends a line that an earlier user has left incomplete.
         self.write(b"\rC\r")?;
         let end = Instant::now() + ANSWER;
         while self.take_in(QUIET)? && Instant::now() < end {}
@@ -140,12 +140,12 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // The version is a text, so the adapter cannot have sent it as an answer to an earlier line.
+                // The version is a text, so it cannot be an answer to an earlier line.
                 if self.got_text {
                     return Ok(());
                 }
             }
-            // The adapter is connected, but does not know the request.
+            // The adapter is connected, but does not support the version request.
             if somebody {
                 return Ok(());
             }
@@ -212,7 +212,7 @@ impl SlcanBus {
                         self.state = state;
                     } else if let Some(state) = parse_flags(line) {
                         self.got_flags = true;
-                        // The counters that the adapter reported stay valid as long as they agree with the state.
+                        // The reported error counters stay valid as long as they agree with the error state.
                         if self.state.errors != state.errors {
                             self.state = state;
                         }
@@ -247,7 +247,7 @@ impl SlcanBus {
                 Ok(0) if Instant::now() >= give_up => {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
-                // The adapter may be waiting until this host reads.
+                // The adapter may wait until this host reads received frames.
                 Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }
@@ -262,7 +262,8 @@ impl SlcanBus {
         Ok(())
     }
 
-    /// Handles the unconfirmed frame, and writes it again if it was refused. Returns `true` if no frame is unconfirmed.
+    /// Handles the unconfirmed frame, and writes this frame again if the adapter has refused it. Returns `true` if no
+    /// frame is unconfirmed.
     fn settle(&mut self, now: Instant) -> Result<bool, CanError> {
         let Some(frame) = &mut self.outstanding else { return Ok(true) };
         let late = now.saturating_duration_since(frame.since) >= SEND_TIMEOUT;
@@ -295,7 +296,7 @@ impl SlcanBus {
         Ok(self.outstanding.is_none())
     }
 
-    /// Waits until the last frame is confirmed.
+    /// Waits until the adapter has confirmed the last frame.
     fn wait_for_confirmation(&mut self) -> Result<(), CanError> {
         while !self.settle(Instant::now())? {
             if self.receive_queue.len() < RECEIVE_QUEUE {
@@ -353,7 +354,7 @@ impl CanBus for SlcanBus {
         if self.write(b"F\r").is_ok() {
             let end = Instant::now() + ANSWER;
             self.last_answer = None;
-            // A bell means that the adapter refuses the command.
+            // A bell character means that the adapter refuses the command.
             while !self.got_flags && self.last_answer.is_none() && Instant::now() < end {
                 if self.take_in(SLICE).is_err() {
                     break;

@@ -8,12 +8,12 @@ use crate::{CanFrame, ControllerState, ErrorState, Id};
 const LONGEST: usize = 256;
 /// Character that ends a line.
 pub(crate) const CR: u8 = b'\r';
-/// Character that means "refused"; not part of a line.
+/// Bell character, which an adapter sends to refuse a command. The bell character is not part of a line.
 pub(crate) const BELL: u8 = 7;
 /// Number of digits of the time stamp that some adapters append.
 const TIME_STAMP: usize = 4;
 
-/// Received line or bell.
+/// Line or bell character of the stream.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Piece<'a> {
     Line(&'a str),
@@ -25,7 +25,7 @@ pub(crate) struct Lines {
     line: Vec<u8>,
     /// `true` if the line in `line` was already returned.
     complete: bool,
-    /// `true` while the remainder of a line is skipped.
+    /// `true` while the reader skips the remaining characters of a line that is too long.
     too_long: bool,
 }
 
@@ -51,7 +51,8 @@ impl Lines {
                 CR if self.too_long || !self.line.is_ascii() => {
                     self.line.clear();
                     self.too_long = false;
-                    // This line must not be treated as an empty line, which means "accepted".
+                    // A line that is too long must not be treated as an empty line, because an empty line means
+                    // "accepted".
                     return Some(Piece::Line("?"));
                 }
                 CR => {
@@ -68,7 +69,7 @@ impl Lines {
     }
 }
 
-/// CAN FD lengths, in the order of their codes.
+/// CAN FD payload lengths, in the order of their length codes.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
 /// Returns the frame in a line (without line end); `None` if the line is not a frame.
@@ -99,7 +100,7 @@ pub(crate) fn parse_frame(line: &str) -> Option<CanFrame> {
     }
 }
 
-/// Appends the line of a frame, including the line end.
+/// Appends the SLCAN line of a frame, including the line end.
 pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
     let kind = match (frame.is_remote(), frame.is_fd(), frame.is_brs()) {
         (true, ..) => 'r',
@@ -108,7 +109,7 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
         (_, true, true) => 'b',
     };
     let kind = if frame.is_extended() { kind.to_ascii_uppercase() } else { kind };
-    // The length of every frame is in this list.
+    // The length of every frame is in the list `LENGTHS`.
     let code = LENGTHS.iter().position(|len| *len == frame.len()).unwrap_or(0);
     let written = write!(text, "{kind}{}{code:X}", frame.id())
         .and_then(|()| frame.data().iter().try_for_each(|byte| write!(text, "{byte:02X}")))
@@ -141,8 +142,8 @@ pub(crate) fn flags(state: ControllerState) -> u8 {
     }
 }
 
-/// Parses a state change that newer adapters report without a request, in the form that Linux accepts. The form is `s`,
-/// a letter, then the receive and the transmit error counter with three decimal digits each.
+/// Parses the line of a state change in the form that Linux accepts. Newer adapters send this line without a request.
+/// The form is `s`, a letter, then the receive and the transmit error counter with three decimal digits each.
 pub(crate) fn parse_state(line: &str) -> Option<ControllerState> {
     let rest = line.strip_prefix('s').filter(|rest| rest.len() == 7 && rest.is_ascii())?;
     let errors = match rest.chars().next()? {

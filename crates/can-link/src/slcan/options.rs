@@ -1,4 +1,4 @@
-//! Options of an adapter, and the rates that have codes in the protocol.
+//! Options of an SLCAN adapter, and the bit rates that have codes in the protocol.
 
 /// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 has the rate that LAWICEL defines; some CANable firmware
 /// interprets it as 750,000 bit/s.
@@ -9,14 +9,14 @@ pub(crate) const BIT_RATES: [u32; 9] =
 pub(crate) const DATA_RATES: [(u32, u8); 4] =
     [(1_000_000, 1), (2_000_000, 2), (4_000_000, 4), (5_000_000, 5)];
 
-/// Options of an adapter.
+/// Options of an SLCAN adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlcanOptions {
     /// Device: `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
     pub device: String,
-    /// Bit rate of the bus, bit/s; with `None` the adapter's own setting stays.
+    /// Bit rate of the bus, bit/s; with `None` the adapter keeps its own setting.
     pub rate: Option<u32>,
-    /// Bit rate of the CAN FD data phase, bit/s; with `None` the adapter's own setting stays.
+    /// Bit rate of the CAN FD data phase, bit/s; with `None` the adapter keeps its own setting.
     pub data_rate: Option<u32>,
     /// Rate of the serial line, bit/s; USB adapters ignore it.
     pub baud: u32,

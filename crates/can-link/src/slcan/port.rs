@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Longest time for establishing a TCP connection.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Shortest timeout; with a shorter timeout, a read would not wait.
+/// Shortest timeout of a read; with a shorter timeout, a read would not wait.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 pub(super) enum Port {
@@ -34,8 +34,8 @@ impl Port {
         Err(last)
     }
 
-    /// Reads bytes that arrive within `timeout`; returns `None` if no byte arrived. The end of the stream is returned
-    /// as an error.
+    /// Reads bytes that arrive within `timeout`; returns `None` if no byte arrived. At the end of the stream, the
+    /// function returns an error.
     pub(super) fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
         let timeout = timeout.max(SHORTEST);
         let read = match self {

@@ -1,4 +1,5 @@
-//! Converts frames to and from the kernel's frames, and the kernel's error frames to a state.
+//! Converts CAN frames to and from the structures of the Linux kernel, and error frames of the kernel to a
+//! controller state.
 
 use socketcan::errors::ControllerProblems;
 use socketcan::id::FdFlags;
@@ -55,8 +56,8 @@ fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
     }
 }
 
-/// Returns the state after an error frame. The frame may contain a new state and new counters; each of these can be
-/// missing.
+/// Returns the controller state after an error frame. An error frame may lack the new state, the new counters, or
+/// both.
 fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
     const WARNING: ControllerProblems = ControllerProblems::RX_WARNING.union(ControllerProblems::TX_WARNING);
@@ -85,7 +86,8 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));
             let of_counters = ErrorState::of_counters(tec, rec);
-            // Eight-bit counters cannot express bus-off. A controller stays bus-off until it reports another state.
+            // Eight-bit counters cannot represent bus-off. A controller stays bus-off until it reports another
+            // state.
             let kept = if before.errors == ErrorState::BusOff { before.errors } else { of_counters };
             ControllerState { errors: errors.unwrap_or(kept), tec: Some(tec), rec: Some(rec) }
         }
@@ -132,7 +134,8 @@ mod tests {
         }
         let passive = after(unknown, CONTROLLER | COUNTERS, 0x20, 136, 7);
         assert_eq!(passive, ControllerState::of_counters(136, 7));
-        // Counters alone also determine the state. Frames without state and counters do not change the state.
+        // Counters without a state also determine the state. An error frame without state and counters changes
+        // nothing.
         assert_eq!(after(passive, COUNTERS, 0, 100, 0), ControllerState::of_counters(100, 0));
         assert_eq!(after(passive, BUS_ERROR, 0, 0, 0), passive);
         let off = after(passive, BUS_OFF | COUNTERS, 0, 248, 0);

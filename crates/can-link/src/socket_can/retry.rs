@@ -3,15 +3,15 @@
 use std::io;
 use std::time::Duration;
 
-/// The kernel's error number for a full queue. The kernel does not wait for space.
+/// The kernel's error number for a full transmit queue. The kernel itself does not wait for space in the queue.
 const ENOBUFS: i32 = 105;
-/// Pause between two attempts: the duration of a frame on a fast bus.
+/// Pause between two write attempts: the duration of a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Time without space in the queue after which the bus is considered to have failed.
+/// Time without space in the transmit queue after which the bus is considered to have failed.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Calls the write function, and repeats the call while the queue is full. Returns an error with the likely causes
-/// after 10 s without space.
+/// Calls the write function, and repeats the call while the transmit queue is full. After 10 s without space,
+/// returns an error with the likely causes.
 pub(super) fn retry_while_full(
     mut write: impl FnMut() -> io::Result<()>,
     mut pause: impl FnMut(Duration),
@@ -51,7 +51,7 @@ mod tests {
         let mut tries = 0;
         let write = || {
             tries += 1;
-            // After the end of the list, the last result is repeated.
+            // After all results of the list are used, the last result is repeated.
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };
@@ -65,7 +65,7 @@ mod tests {
         let (result, waited, tries) = run(full);
         assert!(result.is_ok());
         assert_eq!((waited, tries), (PAUSE * 999, 1000));
-        // If a signal interrupts the call, it is repeated without a wait.
+        // If a signal interrupts the write, the write is repeated without a pause.
         let (result, waited, _) = run(vec![Some(4), None]);
         assert!(result.is_ok() && waited.is_zero());
     }

@@ -11,14 +11,14 @@ use crate::{
     AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, OpenError,
 };
 
-/// Longest wait for the connection, and for each answer while the bus is opened.
+/// Longest wait for the connection. While the bus is opened, also the longest wait for each answer.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest time for which a send waits for a server that accepts no data.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time that a send waits for space before it reads received bytes, because the server may wait until this client
+/// Time for which a send waits for space before it reads received bytes. The server may accept no data until this client
 /// reads.
 const SEND_SLICE: Duration = Duration::from_millis(20);
-/// Longest wait when the bus is closed until the server accepts the last frames.
+/// Longest time for which a closing bus waits until the server accepts the last frames.
 const END_TIMEOUT: Duration = Duration::from_millis(250);
 /// Largest number of bytes per read.
 const READ: usize = 16 * 1024;
@@ -76,7 +76,7 @@ impl SocketcandBus {
     }
 
     fn set_up(&mut self) -> io::Result<()> {
-        // Frames are small, and the system must send each frame without waiting for further frames.
+        // Frames are small, and the operating system must send each frame without waiting for further frames.
         self.stream.set_nodelay(true)?;
         self.stream.set_read_timeout(self.timeout)?;
         self.stream.set_write_timeout(Some(SEND_SLICE))
@@ -92,7 +92,7 @@ impl SocketcandBus {
         self.expect(step, &Reply::Ok)
     }
 
-    /// Waits for an answer, and stores the bytes after the answer.
+    /// Waits for an answer of the server, and stores the bytes that follow the answer.
     fn expect(&mut self, step: &'static str, answer: &Reply) -> Result<(), CanError> {
         let end = Instant::now() + TIMEOUT;
         let mut buffer = [0; READ];
@@ -124,14 +124,14 @@ impl SocketcandBus {
         }
     }
 
-    /// Waits up to `wait` (`None`: does not wait) for bytes; returns `None` if no byte arrived. The end of the stream
-    /// is returned as an error.
+    /// Waits up to `wait` for bytes (`None`: does not wait). Returns `None` if no byte arrived. At the end of the stream, the
+    /// function returns an error.
     fn read(&mut self, buffer: &mut [u8; READ], wait: Option<Duration>) -> Result<Option<usize>, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
         }
         if !self.glued.is_empty() {
-            // The stored bytes are at most the bytes of one read.
+            // At most the bytes of one read are stored.
             let count = self.glued.len();
             buffer[..count].copy_from_slice(&self.glued);
             self.glued.clear();
@@ -163,7 +163,7 @@ impl SocketcandBus {
         Ok(())
     }
 
-    /// Converts an error. A broken connection is reported as closed.
+    /// Converts an I/O error to a bus error. A broken connection becomes [`CanError::Closed`].
     fn broken(&mut self, step: &'static str, source: io::Error) -> CanError {
         use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset};
         self.closed = true;
@@ -206,7 +206,7 @@ impl SocketcandBus {
                     give_up = Instant::now() + SEND_TIMEOUT;
                 }
                 Err(error) if is_no_data(&error) && Instant::now() < give_up => {
-                    // The socket may be in the mode that does not wait.
+                    // The socket may be in non-blocking mode.
                     if self.receive_queue.len() >= RECEIVE_QUEUE || !self.take_in(Some(SEND_SLICE))? {
                         std::thread::sleep(Duration::from_micros(200));
                     }
@@ -264,7 +264,7 @@ impl CanBus for SocketcandBus {
         }
     }
 
-    /// Returns the state. The protocol reports only bus-off and the recovery from bus-off.
+    /// Returns the state of the controller. The protocol reports only bus-off and the recovery from bus-off.
     fn state(&mut self) -> ControllerState {
         ControllerState::without_counters(self.errors)
     }
@@ -276,8 +276,8 @@ impl CanBus for SocketcandBus {
 
 impl Drop for SocketcandBus {
     fn drop(&mut self) {
-        // If the socket were closed with unread bytes, the connection would be reset, and the server would lose frames
-        // that it has not read yet.
+        // If the socket were closed with unread bytes, the connection would be reset. The server would then lose frames that
+        // it has not read yet.
         let _ = self.stream.shutdown(Shutdown::Write);
         let end = Instant::now() + END_TIMEOUT;
         let mut buffer = [0; READ];

@@ -27,9 +27,9 @@ pub enum ClientEvent {
 pub struct FromClient {
     /// Index of the channel in the list of names that was passed to `bind`.
     pub channel: usize,
-    /// Client.
+    /// Client that caused the event.
     pub client: ClientId,
-    /// Action.
+    /// Action of the client.
     pub event: ClientEvent,
 }
 
@@ -37,13 +37,13 @@ pub struct FromClient {
 /// is on the bus, and then [delivers](Self::deliver) it. Bus order, arbitration and faults are simulated by the host
 /// program.
 pub struct SocketcandGateway {
-    // This field is dropped first, so that threads that wait for the host program end.
+    // The field `events` is dropped first. Threads that wait for space in the event channel then end.
     events: Receiver<FromClient>,
     server: SocketcandServer,
 }
 
 impl SocketcandGateway {
-    /// Listens at an address (with port 0, at a free port) and offers buses with the given names.
+    /// Listens at an address (with port 0, at a free port) and provides buses with the given names.
     pub fn bind(address: impl ToSocketAddrs, channels: &[&str]) -> Result<Self, ListenError> {
         let (sender, events) = sync_channel(WAITING);
         let channel = |(channel, name): (usize, &&str)| {
@@ -62,7 +62,8 @@ impl SocketcandGateway {
         Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
     }
 
-    /// Returns the next event of the clients, in their order, or `None` if no event occurred within `timeout`.
+    /// Returns the next event of the clients, in the order of occurrence, or `None` if no event occurred within
+    /// `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
         // The server owns the other end of the channel and exists as long as this gateway, so the only possible error
         // is a timeout.
@@ -74,8 +75,8 @@ impl SocketcandGateway {
         self.server.deliver(channel, frame, except);
     }
 
-    /// Delivers a frame to one client only. This function is for host programs in which each client is a separate
-    /// member, for example of a [`TimedBus`](crate::TimedBus). Never waits.
+    /// Delivers a frame to one client only. Host programs need this function if each client is a separate member, for
+    /// example of a [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);
     }
@@ -97,7 +98,7 @@ impl SocketcandGateway {
         self.server.url(channel)
     }
 
-    /// Returns the counters.
+    /// Returns the counters of the gateway's server.
     pub fn stats(&self) -> ServerStats {
         self.server.stats()
     }

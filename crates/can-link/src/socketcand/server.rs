@@ -13,7 +13,7 @@ use crate::{CanFrame, CanUrl, ErrorState, ListenError, VirtualHub};
 
 /// Largest number of clients at the same time.
 const MOST_CLIENTS: usize = 64;
-/// Longest time for which a drop of the server waits for the clients' threads.
+/// Longest time for which dropping the server waits for the clients' threads.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Counters of a server.
@@ -23,7 +23,7 @@ pub struct ServerStats {
     pub clients: usize,
     /// Number of accepted connections.
     pub accepted: u64,
-    /// Number of connections closed at once because 64 clients were already connected.
+    /// Number of connections that the server closed at once because 64 clients were already connected.
     pub turned_away: u64,
     /// Number of frames received from clients.
     pub received: u64,
@@ -39,9 +39,9 @@ pub struct ServerStats {
 
 /// A server of the socketcand protocol, compatible with python-can's `socketcand` interface and SavvyCAN.
 ///
-/// A client's frames are sent to all other clients and members, but not back to the client. A client that does not read
-/// misses frames after about 65,000, and is disconnected after 30 s; it never blocks the bus. Dropping the server
-/// closes all connections.
+/// The server forwards a client's frames to all other clients and members, but not back to the client. A client that
+/// does not read misses frames after about 65,000 frames, and is disconnected after 30 s. A client never blocks the
+/// bus. Dropping the server closes all connections.
 ///
 /// ```
 /// use std::time::Duration;
@@ -61,7 +61,7 @@ pub struct SocketcandServer {
 }
 
 impl SocketcandServer {
-    /// Listens at an address (with port 0, at a free port) and offers buses of this process under the given names. A
+    /// Listens at an address (with port 0, at a free port) and provides buses of this process under the given names. A
     /// name must not contain blanks and has at most 16 characters.
     pub fn bind(address: impl ToSocketAddrs, buses: &[(&str, &VirtualHub)]) -> Result<Self, ListenError> {
         let channel = |(name, hub): &(&str, &VirtualHub)| Channel {
@@ -145,7 +145,7 @@ impl SocketcandServer {
 impl Drop for SocketcandServer {
     fn drop(&mut self) {
         self.inner.closing.store(true, Ordering::SeqCst);
-        // The accepting thread waits in a system call; a new connection ends this call.
+        // The accepting thread waits in a system call; a new connection ends this wait.
         let woken = TcpStream::connect_timeout(&reachable(self.address), END_TIMEOUT).is_ok();
         if let Some(acceptor) = self.acceptor.take().filter(|_| woken) {
             let _ = acceptor.join();
@@ -158,7 +158,7 @@ impl Drop for SocketcandServer {
     }
 }
 
-/// Returns the address for connections from this computer to a listener.
+/// Returns the address at which this computer can connect to a listener.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     if address.ip().is_unspecified() {
         address.set_ip(match address.ip() {
@@ -182,8 +182,8 @@ fn accept(listener: &TcpListener, inner: &Arc<Inner>) {
                     inner.turned_away.fetch_add(1, Ordering::Relaxed);
                 }
             }
-            // The client has already disconnected, or the system has no resources for another connection. Other clients
-            // are not affected.
+            // The client has already disconnected, or the operating system has no resources for another connection.
+            // Other clients are not affected.
             Err(_) => std::thread::sleep(Duration::from_millis(5)),
         }
     }

@@ -1,4 +1,4 @@
-//! Session of a client of the server: a thread that reads and, after raw mode begins, another thread that writes.
+//! Session of a client of the server: one thread reads requests. After raw mode begins, a second thread writes frames.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -12,12 +12,13 @@ use super::text::{Request, has_form, push_frame, push_state};
 use crate::virtual_bus::Received;
 use crate::{CanBus, VirtualBus};
 
-/// Time after the answer to `rawmode` in which no frame is sent, because python-can compares all bytes of one read with
-/// the answer.
+/// Time after the answer to `rawmode` in which the server sends no frame, because python-can compares all bytes of one
+/// read with the answer.
 const HELD_BACK: Duration = Duration::from_millis(20);
-/// Largest number of frames that wait for a client: some seconds of a fully loaded bus.
+/// Largest number of frames that are queued for a client: some seconds of a fully loaded bus.
 const WAITING: usize = 65_536;
-/// Largest number of bytes that the system buffers for a client. A larger buffer would only delay the client's frames.
+/// Largest number of bytes that the operating system buffers for a client. A larger buffer would only delay the
+/// client's frames.
 const SEND_BUFFER: usize = 128 * 1024;
 /// Largest number of frames in one write.
 const BATCH: usize = 64;
@@ -33,7 +34,7 @@ struct Out {
 
 struct Output {
     stream: TcpStream,
-    /// Earliest time at which frames are sent.
+    /// Earliest time at which the server may send frames to the client.
     frames_from: Instant,
 }
 
@@ -46,7 +47,7 @@ impl Out {
 /// Serves a client until it disconnects.
 pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
     let mut session = Session { inner, client, opened: None, writer: None };
-    // An error of a client's connection ends only this client.
+    // An error of a client's connection ends only the session of this client.
     let _ = session.run(stream);
     session.end();
 }
@@ -63,9 +64,9 @@ impl Session<'_> {
     fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
         // Each answer must be sent at once in its own segment.
         stream.set_nodelay(true)?;
-        // Detects that a client's computer was switched off.
+        // Keep-alive detects that a client's computer was switched off.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
-        // The system may change this value to its own limits.
+        // The operating system may change the size to its own limits.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
@@ -99,13 +100,14 @@ impl Session<'_> {
         self.inner.not_understood.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// Executes a request. Returns `false` if the connection must end.
+    /// Executes a request of the client. Returns `false` if the connection must end.
     fn execute(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
         match (request, &mut self.opened) {
             (Request::Echo, _) => reply(out, "< echo >")?,
             (Request::Open(name), None) => return self.open(name, out),
             (Request::RawMode, Some((_, member))) => {
-                // From here on the client receives the frames of the bus, which wait in its queue.
+                // From this point the client receives the frames of the bus. The queue of the client stores these
+                // frames.
                 let member = member.second_handle();
                 let mut output = out.lock();
                 member.set_deaf(false);
@@ -178,7 +180,8 @@ fn reply(out: &Out, text: &str) -> io::Result<()> {
     out.lock().stream.write_all(text.as_bytes())
 }
 
-/// Writes frames in its own thread until the member leaves the bus or the client no longer accepts data.
+/// Writes frames to the client until the member leaves the bus or the client no longer accepts data. Runs in its own
+/// thread.
 fn write_frames(
     inner: &Arc<Inner>,
     member: VirtualBus,

@@ -25,7 +25,7 @@ pub(super) enum ClientAction {
     Left,
 }
 
-/// Destination of the frames that the clients of a channel send.
+/// Destination of the frames that the clients of a channel send to the server.
 pub(super) enum Route {
     /// Hub: frames go directly to its other members.
     Hub,
@@ -40,7 +40,7 @@ pub(super) struct Channel {
     pub(super) route: Route,
 }
 
-/// State shared by the threads.
+/// State that all threads of the server share.
 #[derive(Default)]
 pub(super) struct Inner {
     pub(super) channels: Vec<Channel>,

@@ -40,7 +40,7 @@ impl Splitter {
             *bytes = rest;
             match byte {
                 b'<' => {
-                    // A message begins inside another message, so the end of the first message was lost.
+                    // A message begins inside another message, so the end of the outer message was lost.
                     self.noise += u64::from(self.inside);
                     self.inside = true;
                     self.message.clear();

@@ -40,7 +40,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Parses `ID LENGTH BYTE …`, the part after `send`.
+/// Parses the words `ID LENGTH BYTE …` that follow `send`.
 fn send<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     let len = words.next().filter(|word| word.len() == 1 && is_hex(word))?;
@@ -79,14 +79,14 @@ impl<'a> Reply<'a> {
     }
 }
 
-/// Parses `ID TIME DATA`, the part after `frame`.
+/// Parses the words `ID TIME DATA` that follow `frame`.
 fn classic_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     words.next().filter(|word| is_time(word))?;
     CanFrame::classic(id, &bytes::<8>(words)?).ok()
 }
 
-/// Parses `ID FLAGS TIME DATA`, the part after `fdframe`, which servers with CAN FD send.
+/// Parses the words `ID FLAGS TIME DATA` that follow `fdframe`. Servers with CAN FD send this message.
 fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     let flags = words.next().filter(|word| word.len() <= 2 && is_hex(word))?;
@@ -96,7 +96,7 @@ fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     Some(CanFrame::fd(id, &bytes::<64>(words)?).ok()?.with_brs(flags & 1 != 0))
 }
 
-/// Parses `CLASS TIME` or only `CLASS`; any other text is only for display.
+/// Parses `CLASS TIME` or only `CLASS`. The words after these are only for display.
 fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
     let class = words.next().filter(|word| word.len() <= 8 && is_hex(word))?;
     if let Some(time) = words.next() {
@@ -143,7 +143,7 @@ fn is_time(word: &str) -> bool {
     word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.') && word.parse::<f64>().is_ok()
 }
 
-/// Returns `true` if the protocol can transmit the frame, which is only true for classic data frames.
+/// Returns `true` if the protocol can transmit the frame. The protocol can transmit only classic data frames.
 pub(crate) fn has_form(frame: &CanFrame) -> bool {
     !frame.is_fd() && !frame.is_remote()
 }
@@ -161,8 +161,8 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     written.expect("a String takes everything");
 }
 
-/// Appends `< error CLASS TIME >` for a controller that became bus-off or has recovered. Other states would need the
-/// data of an error frame, which the protocol does not transmit.
+/// Appends `< error CLASS TIME >` for a controller that became bus-off or has recovered. Other states would need data
+/// bytes in the error frame, which the protocol does not transmit.
 pub(crate) fn push_state(text: &mut String, state: ErrorState, time: Duration) {
     let class = match state {
         ErrorState::BusOff => CLASS_BUS_OFF,
@@ -272,7 +272,7 @@ mod tests {
         assert_eq!(Reply::parse(&text.replace(" 01 ", " 00 ")), Reply::Frame(fd.with_brs(false)));
     }
 
-    /// python-can 4.6.1 needs exactly these forms. With a single blank, python-can raises an IndexError. With blanks
+    /// python-can 4.6.1 needs exactly these texts. With a single blank, python-can raises an IndexError. With blanks
     /// between the bytes, python-can reads only one byte.
     #[test]
     fn frames_are_written_as_python_can_reads_them() {

@@ -1,4 +1,5 @@
-//! Arbitration: if several members start at once, selects the members that continue to send (ISO 11898-1).
+//! Arbitration (ISO 11898-1). If several members start a frame at the same time, selects the members that
+//! continue to send.
 
 use super::confinement::Counters;
 use super::event::MemberId;

@@ -2,17 +2,17 @@
 
 use crate::{CanFrame, ControllerState};
 
-/// Identifier of a member of a [`TimedBus`](crate::TimedBus), only valid for that bus; another bus may panic. Numbers
-/// increase and are never reused.
+/// Identifier of a member of a [`TimedBus`](crate::TimedBus). The identifier is only valid for that bus; another bus
+/// may panic. Numbers increase and are never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 
-/// Event and the time at which it occurred.
+/// Event on the bus, and the time at which the event occurred.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedEvent {
     /// Virtual time, ns.
     pub at_ns: u64,
-    /// The event.
+    /// Event on the bus.
     pub what: BusEvent,
 }
 
@@ -21,51 +21,51 @@ pub struct TimedEvent {
 pub enum BusEvent {
     /// A member has received a frame.
     Received {
-        /// The receiver.
+        /// Member that received the frame.
         member: MemberId,
         /// The received frame.
         frame: CanFrame,
     },
     /// A member's frame was transmitted and acknowledged.
     Sent {
-        /// The sender.
+        /// Member that sent the frame.
         member: MemberId,
         /// The transmitted frame.
         frame: CanFrame,
     },
-    /// A member's frame is dropped, because its sender sends each frame only once or is bus-off.
+    /// A member's frame is dropped, because the member sends each frame only once or is bus-off.
     Failed {
-        /// The sender.
+        /// Member that sent the frame.
         member: MemberId,
         /// The dropped frame.
         frame: CanFrame,
     },
-    /// Transmitting a frame has failed. The senders of the frame try again, unless they send each frame only once.
+    /// A transmission has failed. The senders repeat the frame, unless they send each frame only once.
     Error {
-        /// The error.
+        /// Reason for the failure.
         error: BusError,
-        /// The frame; for a collision, the frame of the first sender.
+        /// Frame that failed; for a collision, the frame of the first sender.
         frame: CanFrame,
         /// All senders of the frame.
         senders: Vec<MemberId>,
     },
     /// A member's error state has changed.
     State {
-        /// The member.
+        /// Member whose error state changed.
         member: MemberId,
-        /// The new state.
+        /// New state of the member's controller.
         state: ControllerState,
     },
 }
 
-/// Reasons why transmitting a frame fails.
+/// Reasons why a transmission fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusError {
     /// Several members sent the same identifier with different data at the same time, which CAN forbids.
     Collision,
     /// No member acknowledged the frame.
     NotAcknowledged,
-    /// A bit was disturbed on the bus.
+    /// A bit of the frame was disturbed on the bus.
     Disturbed,
 }
 

@@ -1,4 +1,4 @@
-//! End of a frame on the bus, and its effect on the counters.
+//! Completion of a frame on the bus, and its effect on the error counters.
 
 use super::confinement::Counters;
 use super::wire::SUSPENDED;
@@ -18,7 +18,7 @@ impl TimedBus {
         let frame = arbitration.frame;
         let mut senders = arbitration.senders;
         let destroyed = senders.is_empty();
-        // If a sender has left the bus, its frame was cut off.
+        // If a sender has left the bus, its frame is not complete.
         senders.retain(|member| !self.members[member.0].left);
         if senders.is_empty() && !destroyed && error.is_none() {
             error = Some(BusError::Disturbed);

@@ -16,8 +16,8 @@ pub(crate) const INTERMISSION: u32 = 3;
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
 /// Bits that an error passive member waits after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
-/// Number of consecutive recessive bits that a bus-off controller counts as one sequence, and the number of sequences
-/// that it needs to recover.
+/// Number of consecutive recessive bits in one sequence of the recovery from bus-off, and the number of sequences
+/// that a bus-off controller needs.
 pub(crate) const RECESSIVE_RUN: u32 = 11;
 pub(crate) const RECOVERIES: u32 = 128;
 
@@ -101,8 +101,8 @@ fn crc15(crc: u16, bit: bool) -> u16 {
     (crc << 1 ^ if out { 0x4599 } else { 0 }) & 0x7FFF
 }
 
-/// Returns the arbitration key. The frame with the lowest key wins; frames with equal keys are not arbitrated.
-///
+/// Returns the arbitration key of a frame. The frame with the lowest key wins. Frames with equal keys do not lose
+/// arbitration against each other.
 /// The key begins with the base identifier. The next bit is the remote bit of an 11-bit frame, or the recessive
 /// substitute bit of a 29-bit frame, which has the same position.
 pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
@@ -133,7 +133,7 @@ mod tests {
             (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
             (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
         ];
-        // Groups of equal bits, which need stuff bits, occur more often than in random bytes.
+        // The generated payloads contain more groups of equal bits, which need stuff bits, than random bytes do.
         let byte = prop_oneof![any::<u8>(), Just(0), Just(0xFF), Just(0x0F), Just(0xF0)];
         (id, prop::collection::vec(byte, 0..=8), any::<bool>()).prop_map(|(id, data, remote)| match remote {
             true => CanFrame::remote(id, data.len()).unwrap(),
@@ -148,7 +148,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Checks against an independent CRC, and reads the fields at the positions that the standard defines.
+        /// Compares the CRC with an independent implementation, and reads the fields at the positions that the
+        /// standard defines.
         #[test]
         fn fields_stand_where_the_standard_has_them(frame in any_classic()) {
             let wire = WireBits::of(&frame).unwrap();
@@ -157,7 +158,7 @@ mod tests {
                 run = if pair[0] == pair[1] { run + 1 } else { 0 };
                 prop_assert!(run < 5, "never six alike");
             }
-            // The stuff bit of the last group of equal bits may be after the CRC.
+            // The stuff bit of the last group of equal bits may be located after the CRC.
             let mut logical = destuff(wire.bits());
             let crc = logical.split_off(logical.len() - 15);
             // Leading zeros do not change a CRC that starts at 0.
@@ -182,10 +183,10 @@ mod tests {
             prop_assert_eq!(&data[..], frame.data());
         }
 
-        /// The bus arbitrates bit by bit; the keys must produce the same order of frames.
+        /// A bus arbitrates bit by bit; the keys must produce the same order of frames.
         #[test]
         fn keys_order_frames_as_the_wire_does(a in any_classic(), b in any_classic(), near in any::<bool>()) {
-            // The most critical case is that the base identifiers are equal.
+            // Frames with equal base identifiers are the most critical case.
             let b = if near { with_base_of(&a, &b) } else { b };
             let (wa, wb) = (WireBits::of(&a).unwrap(), WireBits::of(&b).unwrap());
             let first = wa.bits().iter().zip(wb.bits()).find(|(a, b)| a != b);
@@ -229,8 +230,8 @@ mod tests {
         found
     }
 
-    /// Bounds from the literature: 111 and 131 bits with 8 bytes before stuffing, 135 and 160 at most, including
-    /// intermission.
+    /// Bounds for 8 bytes from the literature, including intermission: 111 and 131 bits before stuffing, at most 135
+    /// and 160 bits with stuffing.
     #[test]
     fn lengths_lie_between_the_known_bounds() {
         let bits = |frame| classic_frame_bits(&frame).unwrap();

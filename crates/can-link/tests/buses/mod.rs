@@ -1,5 +1,5 @@
-//! Tests of every kind of bus from the user's side: adapters, servers and clients on real lines, and the bus in virtual
-//! time.
+//! Tests of all kinds of buses from the user's side: adapters, servers and clients on real connections, and the bus in
+//! virtual time.
 
 mod slcan;
 mod socketcand;
@@ -35,8 +35,8 @@ fn take(bus: &mut impl CanBus) -> CanFrame {
     }
 }
 
-/// Waits until other threads have finished something. The pauses of this function are shorter than the pauses of
-/// `patience::until`, because some tests wait thousands of times.
+/// Waits until `done` returns `true`. The pauses of this function are shorter than the pauses of `patience::until`,
+/// because some tests wait thousands of times.
 #[track_caller]
 fn until(mut done: impl FnMut() -> bool) {
     let mut patience = Patience::begin();

@@ -32,7 +32,7 @@ impl Running {
             let mut latest = None;
             while adapter.turn(&mut port, &mut bus).is_ok() {
                 if asked.load(Ordering::Relaxed) {
-                    // Bytes written before the stop request may still be in the terminal.
+                    // Bytes that were written before the stop request may still be in the terminal.
                     let latest = *latest.get_or_insert_with(|| Instant::now() + Duration::from_secs(2));
                     if !adapter.is_open() || Instant::now() >= latest {
                         break;
@@ -70,8 +70,8 @@ fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
         node.send(frame).unwrap();
         assert_eq!(take(&mut bus), *frame);
     }
-    // Bursts in both directions at the same time. The two sides do not block each other, and no frame is lost or out of
-    // order.
+    // The test sends bursts in both directions at the same time. The two sides must not block each other, and must not
+    // lose or reorder frames.
     let count = 3000;
     std::thread::scope(|scope| {
         let node = &mut node;
@@ -90,7 +90,7 @@ fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
     }
     assert_eq!(bus.receive(Duration::ZERO).unwrap(), None);
     assert_eq!(bus.state().errors, ErrorState::Warning);
-    // The last frame arrives although no call waits for it.
+    // The last frame must arrive although no call waits for it.
     bus.send(&frame(3, &[])).unwrap();
     drop(bus);
     assert_eq!(take(&mut node), frame(3, &[]));
@@ -195,8 +195,8 @@ fn an_adapter_that_never_answers_is_written_to_all_the_same() {
     assert_eq!(lines[first + 2..], [frames, vec!["C".to_owned()]].concat());
 }
 
-/// The host waits while the adapter's transmit queue is full. A bell means that the frame must be sent again, so no
-/// frame is lost or out of order.
+/// The host waits while the adapter's transmit queue is full. After a bell character the host must send the frame
+/// again, so that no frame is lost or out of order.
 #[test]
 fn refused_frames_are_sent_again_in_order() {
     let (device, adapter) = served(|stream| {
@@ -225,7 +225,7 @@ fn refused_frames_are_sent_again_in_order() {
     for _ in 0..50 {
         assert_eq!(take(&mut bus), frame(0x700, &[]));
     }
-    // The last frame is sent although no call waits for it.
+    // The adapter must receive the last frame although no call waits for it.
     bus.send(&frame(0x100, &[50])).unwrap();
     drop(bus);
     let expected: Vec<_> = (0..=50).map(|number| format!("t1001{number:02X}")).collect();
@@ -273,7 +273,7 @@ fn what_cannot_be_set_is_an_error_that_lists_what_can() {
     assert!(error.contains("data bit rate") && error.contains("5000000"), "{error}");
     let error = open("slcan:/dev/nothing/here@1000000").err().unwrap().to_string();
     assert!(error.contains("plugged in") && error.contains("/dev/nothing/here"), "{error}");
-    // An adapter without CAN FD.
+    // This adapter does not support CAN FD.
     let (device, _adapter) = served(|stream| {
         play(stream, |line| match line.as_bytes() {
             [b'Y', ..] => "\u{7}".to_owned(),
@@ -327,7 +327,7 @@ fn a_port_without_an_adapter_and_one_that_goes_are_distinguished() {
     adapter.join().unwrap();
 }
 
-/// The adapter's side according to the manual: its answers in each state.
+/// Tests the adapter's side according to the manual: the answers of the adapter in each state.
 #[test]
 fn the_adapter_answers_by_the_manual() {
     let mut adapter = SlcanAdapter::new();

@@ -1,4 +1,4 @@
-//! The socketcand protocol on the connection, tested with a client that knows only the protocol.
+//! Tests of the socketcand protocol over TCP, with a client that knows only the protocol.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -20,7 +20,7 @@ impl Raw {
         Self(stream)
     }
 
-    /// Reads once, like python-can.
+    /// Reads once, like python-can does.
     fn read(&mut self) -> String {
         let mut buffer = [0; 256];
         let count = self.0.read(&mut buffer).unwrap();
@@ -56,7 +56,7 @@ impl Raw {
     }
 }
 
-/// Stops a thread, even if a test fails.
+/// Stops a thread when the guard is dropped, even if a test fails.
 struct Guard<'a>(&'a AtomicBool);
 
 impl Drop for Guard<'_> {
@@ -72,7 +72,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let _guard = Guard(&stop);
-        // Frames are sent on the bus all the time.
+        // The thread sends frames on the bus all the time.
         scope.spawn(|| {
             for number in 0.. {
                 node.send(&numbered(number)).unwrap();
@@ -89,7 +89,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
             assert_eq!(client.ask("< open can0 >"), "< ok >");
             client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
-            // Wait that is long enough for frames that the server does not delay. On a busy computer, delayed frames
+            // During this wait, frames that the server does not delay arrive. On a busy computer, delayed frames
             // sometimes also arrive in this time.
             std::thread::sleep(Duration::from_millis(3));
             let first = client.read();
@@ -187,20 +187,20 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
-    // A sender that waited for this member would wait forever.
+    // On this bus, a sender that waits for a member waits forever.
     let hub = VirtualHub::with_timeout(Duration::MAX);
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
     let mut sleeper = Raw::raw_mode(&server);
     let mut listener = open(&server.url("can0")).unwrap();
-    // Number of frames that exceeds the client's queue and the buffers of any system.
+    // Number of frames that exceeds the client's queue and the buffers of every operating system.
     let count = 100_000;
     let (done, waited) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let mut received = 0;
         for number in 0..count {
             node.send(&numbered(number)).unwrap();
-            // A client that reads receives all frames.
+            // A client that reads must receive all frames.
             if number % 1000 == 999 {
                 while received <= number {
                     assert_eq!(take(&mut listener), numbered(received));
@@ -212,7 +212,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     });
     let mut node = waited.recv_timeout(LONGEST).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
-    // The client that did not read is still connected, and now reads the oldest waiting frames. When the queue of the
+    // The client that did not read is still connected, and now reads the oldest queued frames. When the queue of the
     // client has space again, the client receives new frames.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {
@@ -237,7 +237,7 @@ fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
     assert_eq!(client.ask("< open can0 >"), "< ok >");
     assert_eq!(client.ask("< subscribe 0 0 123 >"), "< error unknown command >");
     assert_eq!(client.ask("< rawmode >"), "< ok >");
-    // In raw mode the server sends no error texts, because python-can could not parse them.
+    // In raw mode the server must not send error texts, because python-can could not parse them.
     client.write("< noise >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
     client.write(&"x".repeat(100_000));
     client.write(&format!("< {}", "y".repeat(100_000)));
@@ -249,7 +249,7 @@ fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
     until(|| server.stats().not_carried == 2);
     let stats = server.stats();
     assert!(stats.not_understood >= 9 && stats.received == 0, "{stats:?}");
-    // In the previous mode the client receives no frames.
+    // In the previous mode the client must not receive frames.
     assert_eq!(client.ask("< bcmmode >"), "< ok >");
     node.send(&numbered(8)).unwrap();
     assert_eq!(client.ask("< echo >"), "< echo >");
@@ -268,8 +268,8 @@ fn an_unknown_bus_is_refused_with_what_there_is() {
     assert!(error.contains("opening the bus") && error.contains("there is can0"), "{error}");
 }
 
-/// Frames that a client sent before it disconnected are delivered, even if the client did not read the frames that it
-/// received.
+/// The server must deliver frames that a client sent before it disconnected. This must work even if the client did
+/// not read its received frames.
 #[test]
 fn the_last_frames_of_a_client_are_delivered() {
     let (server, hub) = socketcand_bench();
@@ -295,7 +295,7 @@ fn ten_thousand_visitors_leave_nothing_behind() {
         // The server may already have closed the connection.
         let _ = stream.write_all(texts[number % texts.len()]);
         if number % 16 == 15 {
-            // Limits the number of connections to what the server accepts.
+            // The test never opens more connections than the server accepts.
             until(|| server.stats().accepted > number as u64 && server.stats().clients < 32);
         }
     }

@@ -1,5 +1,5 @@
-//! Tests of the socketcand client: frames that it refuses, and errors if a server disconnects or does not use the
-//! protocol.
+//! Tests of the socketcand client: frames that the client refuses, and errors if a server disconnects or does not use
+//! the protocol.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener};
@@ -40,7 +40,8 @@ fn the_client_refuses_what_the_protocol_cannot_carry() {
     }
 }
 
-/// Invalid servers: the client must return an error for each server, without a panic or an endless wait.
+/// Tests servers that do not use the protocol: the client must return an error for each server, without a panic or an
+/// endless wait.
 #[test]
 fn servers_that_are_none_end_in_words() {
     let end_with = |texts: &'static [&'static str]| {

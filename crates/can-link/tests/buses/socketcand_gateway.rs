@@ -42,7 +42,7 @@ fn a_host_can_run_the_bus_itself() {
     let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));
     assert_eq!(gateway.next(Duration::ZERO), None);
-    // Full queues towards a host program that takes no events do not block the end of the gateway.
+    // Full event queues of a host program that takes no events must not block the end of the gateway.
     std::thread::scope(|scope| {
         scope.spawn(move || while b.send(&numbered(4)).is_ok() {});
         until(|| gateway.stats().received > 1000);
@@ -101,8 +101,8 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
     assert_eq!(stats.frames, u64::from(2 * count));
 }
 
-/// A client receives reports about bus-off and recovery of its own controller, in order with its frames. Other clients
-/// are not informed.
+/// A client must receive reports about bus-off and recovery of its own controller, in order with its frames. Other
+/// clients must not receive these reports.
 #[test]
 fn a_client_receives_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();

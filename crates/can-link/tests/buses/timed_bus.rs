@@ -59,7 +59,7 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
     bus.queue(b, frame(0x100, &[])).unwrap();
     let events = run(&mut bus, 2 * MS);
     assert_eq!(received(&events, listener), [frame(0x100, &[]), remote]);
-    // A frame on the bus is not interrupted.
+    // A frame with a lower identifier does not interrupt a frame that is already on the bus.
     bus.queue(a, frame(0x700, &[])).unwrap();
     assert_eq!(bus.advance_to(2 * MS + 10_000), None);
     bus.queue(b, frame(0x000, &[])).unwrap();
@@ -70,7 +70,8 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// A simple model of the bus: the lowest of the first frames of all queues is sent next, without a gap.
+    /// Compares the bus with a simple model: of the first frames of all queues, the frame with the lowest identifier is
+    /// sent next, without a gap.
     #[test]
     fn frames_come_in_the_order_of_a_simple_model(ids in prop::collection::vec(prop::collection::vec(0..0x800_u32, 0..12), 2..6)) {
         let mut bus = TimedBus::new(250_000, 0);
@@ -104,7 +105,7 @@ proptest! {
         prop_assert!(errors(&events).is_empty());
     }
 
-    /// For any sequence of calls, each call ends, and equal calls produce equal events.
+    /// Any sequence of calls must end, and equal calls must produce equal events.
     #[test]
     fn any_calls_are_repeatable_and_end(calls in prop::collection::vec((0..9_u8, 0..5_usize, 0..40_u32, any::<u64>()), 1..120), seed in any::<u64>()) {
         let all = || {
@@ -135,8 +136,9 @@ proptest! {
     }
 }
 
-/// D-05: if two nodes send the same identifier with different data at once, a collision is reported. Both nodes repeat
-/// their frames, as controllers do, until one node is error passive and no longer destroys the frame of the other node.
+/// D-05: if two nodes send the same identifier with different data at the same time, the bus reports a collision. Both
+/// colliding nodes repeat their frames, as CAN controllers do. The collisions end when one node is error passive and no
+/// longer destroys the frame of the other node.
 #[test]
 fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -221,7 +223,7 @@ fn d_07_frames_alike_bit_for_bit_look_like_one() {
     assert_eq!((bus.pending(a), bus.pending(b)), (0, 0));
 }
 
-/// D-03 and bus load: the load is the number of bits sent per second divided by the bit rate.
+/// D-03: the bus load is the number of bits sent per second divided by the bit rate.
 #[test]
 fn the_load_is_the_share_of_bits() {
     for bitrate in [1_000_000, 500_000, 250_000, 125_000] {

@@ -12,7 +12,7 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
     let events = run(&mut bus, 100 * MS);
     assert!(errors(&events).len() > 500 && errors(&events).iter().all(|e| *e == BusError::NotAcknowledged));
     assert_eq!((bus.state(alone).errors, bus.state(alone).tec), (ErrorState::Passive, Some(128)));
-    // When the node is error passive, it waits for eight more bits before each attempt.
+    // An error passive node waits for eight more bits before each attempt.
     let times: Vec<_> = events
         .iter()
         .filter(|event| matches!(event.what, BusEvent::Error { .. }))
@@ -20,7 +20,7 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
         .collect();
     let (active, passive) = (times[1] - times[0], times[101] - times[100]);
     assert_eq!(passive - active, 8000);
-    // A member that receives without acknowledging does not help; the next member acknowledges.
+    // A member that receives without acknowledging does not end the errors; the next member acknowledges.
     let mute = bus.join();
     bus.set_acknowledges(mute, false);
     assert!(received(&run(&mut bus, 101 * MS), mute).is_empty());
@@ -55,7 +55,8 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     let events = run(&mut bus, 100 * MS);
     let is_back = |event: &TimedEvent| matches!(event.what, BusEvent::State { member, .. } if member == a);
     let back = events.iter().position(is_back).unwrap();
-    // No member acknowledges the other frame, and each attempt to send this frame ends with 11 recessive bits.
+    // No member acknowledges the frame of the other node, and each attempt to send this frame ends with 11 recessive
+    // bits.
     assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
     assert_eq!(received(&events, a), [frame(0x200, &[])]);
     bus.queue(a, frame(0x100, &[1])).unwrap();
@@ -75,8 +76,8 @@ fn recovery_on_an_idle_bus_takes_1408_bit_times() {
     assert_eq!((back.at_ns, bus.state(a).errors), (100 * MS + 1408 * 2000, ErrorState::Active));
 }
 
-/// ISO 11898-1: on a busy bus there are 11 consecutive recessive bits once per frame, so a controller recovers after
-/// 128 frames.
+/// ISO 11898-1: on a busy bus, each frame ends with one sequence of 11 recessive bits (including the intermission),
+/// so a controller recovers after 128 frames.
 #[test]
 fn recovery_on_a_busy_bus_takes_128_frames() {
     let mut bus = TimedBus::new(1_000_000, 7);
@@ -88,7 +89,7 @@ fn recovery_on_a_busy_bus_takes_128_frames() {
         bus.advance_to(50 * MS);
     }
     bus.set_disturbance(0.0);
-    // The frame waits for the recovery, and no other frame waits during this time.
+    // The frame of the bus-off member waits for the recovery. The frames of the other member are not delayed.
     bus.queue(a, frame(0x001, &[])).unwrap();
     for _ in 0..200 {
         bus.queue(b, frame(0x200, &[0x55; 8])).unwrap();
@@ -100,7 +101,7 @@ fn recovery_on_a_busy_bus_takes_128_frames() {
     assert_eq!(bus.state(a).errors, ErrorState::Active);
 }
 
-/// A reset brings a member back at once, with all counters at 0.
+/// A reset member must be on the bus again at once, with all counters at 0.
 #[test]
 fn a_reset_member_is_on_the_bus_again() {
     let mut bus = TimedBus::new(1_000_000, 7);
@@ -152,7 +153,7 @@ fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
     assert!(stats.lost > 10 && stats.doubled > 5);
     assert_eq!(received(&events, b).len() as u64, 200 - stats.lost + stats.doubled);
     assert_eq!((errors(&events), bus.state(b).rec), (vec![], Some(0)));
-    // Each frame arrives 1 ms after it was on the bus.
+    // Each frame must arrive 1 ms after it was on the bus.
     let sent: Vec<_> =
         events.iter().filter(|e| matches!(e.what, BusEvent::Sent { .. })).map(|e| e.at_ns).collect();
     let times = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);

@@ -38,7 +38,7 @@ pub struct JointReport {
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: u8,
-    /// State byte that the node sent.
+    /// State byte of the node.
     pub state: NodeState,
     /// Present motor-control faults.
     pub mc_current: u8,
@@ -61,11 +61,11 @@ pub struct GripperReport {
     pub pressure1: bool,
     /// `true` if the second vacuum level is reached.
     pub pressure2: bool,
-    /// State byte that the node sent.
+    /// State byte of the node.
     pub state: NodeState,
-    /// Error bits.
+    /// Error bits of the gripper.
     pub errors: u8,
-    /// Warning bits.
+    /// Warning bits of the gripper.
     pub warnings: u8,
 }
 
@@ -76,7 +76,7 @@ pub enum Answer {
     Joint {
         /// Node number, 0..5.
         node: u8,
-        /// Decoded report.
+        /// Decoded report of the joint.
         report: JointReport,
     },
     /// Answer of the gripper to Move, 0x206.
@@ -106,8 +106,8 @@ impl Answer {
         }
     }
 
-    /// Decodes the frame of an answer. The controller uses this function. The function is inlined. Otherwise a report is stored by bytes
-    /// and copied by words, which stalls the processor of a PC.
+    /// Decodes the frame of an answer. The controller uses this function. The function is inlined, because a report that is stored by
+    /// bytes and copied by words stalls the processor of a PC.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);
@@ -137,7 +137,7 @@ impl Answer {
     /// Returns the frame of the answer. Nodes use this function. A joint report has 20 bytes if it contains a motor temperature, and
     /// otherwise 16 bytes. Values saturate.
     ///
-    /// An invalid node number is sent as 15, and the controller ignores frames from node 15.
+    /// If the node number is invalid, the frame contains the node number 15. The controller ignores frames from node 15.
     pub fn emit(&self, scale: Scale) -> Frame {
         match self {
             Self::Joint { node, report } => emit_joint(*node, report, scale),
@@ -174,7 +174,7 @@ fn joint(frame: &Frame, scale: Scale) -> JointReport {
 }
 
 fn emit_joint(node: u8, report: &JointReport, scale: Scale) -> Frame {
-    // Number 6 is the gripper. A joint with this number must not be taken for the gripper.
+    // Node 6 is the gripper. The controller must not mistake a joint with the number 6 for the gripper.
     let node = if usize::from(node) == GRIPPER { u8::MAX } else { node };
     let id = id::answer(id::MOVE, node);
     let mut frame = match report.motor_temperature {

@@ -1,7 +1,7 @@
-//! Bit words of the bus. Each word is a table with bit, name, text and meaning.
+//! Bit words of the bus. A table for each word contains the number, name, text and meaning of each bit.
 
-/// Declares words of bits. A row of a word contains the meaning (as documentation), the name of the mask, the bit number and the text of
-/// the bit.
+/// Declares bit words. Each row of a word contains the meaning of a bit (as documentation), the name of its mask, its number and its
+/// text.
 ///
 /// Each word becomes a module with a mask for each bit, and with the texts in `NAMES`.
 #[doc(hidden)]
@@ -28,45 +28,45 @@ macro_rules! bit_words {
 bit_words! {
     /// Warning bits of a node.
     warning: u8 {
-        /// Position not accurate.
+        /// The position is not accurate.
         POSITION_NOT_ACCURATE = 0, "position not accurate";
         /// The position is outside the working area.
         OUTSIDE_WORKING_AREA = 1, "outside working area";
-        /// Magnetic field of the encoder out of range.
+        /// The magnetic field of the encoder is out of range.
         MAGNETIC_FIELD = 2, "magnetic field of the encoder out of range";
-        /// Safety line active.
+        /// The safety line is active.
         SAFETY_LINE = 3, "safety line active";
     }
 
     /// Error bits of a node.
     error: u8 {
-        /// Position encoder failed (reported only by the oldest drives).
+        /// The position encoder failed (reported only by the oldest drives).
         POSITION_ENCODER = 0, "position encoder";
-        /// Motor-control fault. The motor-control bits show which motor-control fault occurred.
+        /// A motor-control fault occurred. The motor-control bits show its kind.
         MOTOR_CONTROL = 1, "motor-control fault";
-        /// Joint over-speed.
+        /// The joint exceeded its over-speed limit.
         OVER_SPEED = 2, "over-speed";
-        /// Gate driver reports a hardware fault.
+        /// The gate driver reports a hardware fault.
         HARDWARE = 3, "hardware fault of the gate driver";
     }
 
-    /// Motor-control fault bits of a joint (present faults, and faults that have occurred).
+    /// Motor-control fault bits of a joint. Present faults and faults that have occurred use the same bits.
     motor_control: u8 {
         /// The current loop took too long.
         FOC_DURATION = 0, "current loop took too long";
-        /// Supply voltage too high.
+        /// The supply voltage is too high.
         OVER_VOLTAGE = 1, "over-voltage";
-        /// Supply voltage too low.
+        /// The supply voltage is too low.
         UNDER_VOLTAGE = 2, "under-voltage";
-        /// Power stage too hot.
+        /// The power stage is too hot.
         OVER_TEMPERATURE = 3, "over-temperature";
-        /// Motor did not start.
+        /// The motor did not start.
         START_UP = 4, "start-up failed";
-        /// Speed feedback lost.
+        /// The speed feedback was lost.
         SPEED_FEEDBACK = 5, "speed feedback lost";
-        /// Hardware over-current.
+        /// The hardware detected an over-current.
         OVER_CURRENT = 6, "over-current";
-        /// Software error.
+        /// The drive software detected an error.
         SOFTWARE = 7, "software error";
     }
 
@@ -80,7 +80,7 @@ bit_words! {
         SAFETY_LINE = 2, "safety line";
         /// Monitors the bus.
         BUS_WATCHDOG = 3, "bus watchdog";
-        /// Trips on over-speed. If this bit is 0, the trip is off.
+        /// Enables the over-speed trip. If the bit is 0, the drive does not trip on over-speed.
         OVER_SPEED_TRIP = 4, "over-speed trip";
         with
         /// Default configuration bits of a joint, 0x17.
@@ -90,7 +90,7 @@ bit_words! {
     }
 }
 
-/// Texts of the set bits, separated by commas. The text is `-` if no bit is set, and `bit N` for a bit without a text.
+/// Texts of the set bits, separated by commas. If no bit is set, the output is `-`. A bit without a text is shown as `bit N`.
 ///
 /// ```
 /// use jtc_bus::{Bits, warning};
@@ -101,7 +101,7 @@ bit_words! {
 pub struct Bits<'a>(pub u32, pub &'a [&'a str]);
 
 impl<'a> Bits<'a> {
-    /// Returns the number and the text of each set bit; the text is empty if the list has no text for the bit.
+    /// Returns the number and the text of each set bit. The text is empty if the list of texts has no text for the bit.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &'a str)> + use<'a> {
         let (word, names) = (self.0, self.1);
         (0..u32::BITS)

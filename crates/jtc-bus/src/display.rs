@@ -1,11 +1,12 @@
-//! Text of frames.
+//! Text form of bus frames.
 
 use core::fmt::{Display, Formatter, Result};
 
 use crate::{Answer, Bits, Frame, GRIPPER, GripperReport, Joint, JointReport, Request, Scale, Target};
 use crate::{config, error, id, motor_control, warning};
 
-/// Text of a decoded frame of the bus. A frame that cannot be decoded is shown with the reason and its bytes.
+/// Text form of a decoded bus frame. If a frame cannot be decoded, the text contains the reason and the bytes
+/// of the frame.
 ///
 /// ```
 /// use jtc_bus::{Decoded, Request, Scale};
@@ -14,7 +15,7 @@ use crate::{config, error, id, motor_control, warning};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Decoded<'a> {
-    /// The frame.
+    /// Frame to display.
     pub frame: &'a Frame,
     /// Scale of the velocities in the frame.
     pub scale: Scale,

@@ -10,14 +10,15 @@ const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// Bit of the delimiter after the checksum. The bit rate falls within this bit, and it rises within an earlier bit (BRS). Both changes
-/// occur at the same fraction of the bit, so one of the two bits is counted as a nominal bit and the other bit as a data bit.
+/// Bit of the delimiter after the checksum. The bit rate switches to the nominal rate within this bit, and it switches to the data rate
+/// within the BRS bit. Both switches of the bit rate occur at the same fraction of a bit. The code therefore counts one of the two bits
+/// as a nominal bit, and the other bit as a data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
-/// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). The time
-/// includes the intermission.
+/// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). The
+/// duration of the frame includes the intermission.
 ///
-/// The result is exact, because it includes the stuff bits of this payload. The result does not include repetitions and error frames.
+/// The duration is exact, because it includes the stuff bits of this payload. The duration does not include repetitions and error frames.
 pub fn duration_ns(frame: &Frame) -> u32 {
     let mut stuffer = Stuffer::default();
     // The bits before the data phase are start, identifier, RRS, IDE, FDF, reserved and BRS.
@@ -32,7 +33,7 @@ pub fn duration_ns(frame: &Frame) -> u32 {
         stuffer.push(u32::from(*byte), 8);
     }
     let crc_bits = STUFF_COUNT_BITS + if frame.data().len() <= 16 { 17 } else { 21 };
-    // A fixed stuff bit is sent before the stuff count and after every four of the bits that follow.
+    // The sender inserts a fixed stuff bit before the stuff count, and one after every four of the bits that follow.
     let fixed_stuff_bits = 1 + crc_bits / 4;
     let data = stuffer.bits - before + crc_bits + fixed_stuff_bits + CRC_DELIMITER_BITS;
     nominal * NOMINAL_NS + data * DATA_NS
@@ -49,8 +50,8 @@ struct Stuffer {
 impl Stuffer {
     fn push(&mut self, value: u32, width: u32) {
         for at in (0..width).rev() {
-            // After five equal bits, the stuff bit is sent before the next bit. After the last bit of the payload, the fixed stuff bit is
-            // sent instead of this stuff bit.
+            // After five equal bits, the sender inserts a stuff bit before the next bit. After the last bit of the payload, the fixed stuff
+            // bit replaces this stuff bit.
             if self.run == 5 {
                 self.bits += 1;
                 self.last = self.last.map(|bit| !bit);
@@ -81,8 +82,9 @@ mod tests {
 
     #[test]
     fn j10_stuff_bits_are_those_of_the_payload() {
-        // Start and identifier are 12 zeros. With RRS and IDE, these are 14 zeros and need two stuff bits. FDF is 1, the reserved bit is 0,
-        // and BRS is 1. ESI is 0 and the length is 1010. The last 0 of the length and the 128 zeros of the payload need 25 stuff bits.
+        // The start bit and the identifier are 12 zeros. With RRS and IDE, these are 14 zeros and need two stuff bits. FDF is 1, the
+        // reserved bit is 0, and BRS is 1. ESI is 0 and the length is 1010. The last 0 of the length and the 128 zeros of the payload need
+        // 25 stuff bits.
         let frame = Frame::new(0x000, &[0; 16]).unwrap();
         assert_eq!(duration_ns(&frame), (29 + 2) * 1_000 + (1 + 4 + 128 + 21 + 6 + 1 + 25) * 200);
     }

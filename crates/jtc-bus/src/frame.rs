@@ -9,7 +9,7 @@ pub const MAX_LEN: usize = 24;
 ///
 /// The payload has a length that CAN FD can send: 0..8, 12, 16, 20 or 24 bytes.
 ///
-/// The frame is aligned in memory, so that it is copied by words.
+/// Frames are aligned in memory, so that the processor copies them by words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(align(4))]
 pub struct Frame {
@@ -79,7 +79,7 @@ impl Frame {
         }
     }
 
-    /// Returns `N` bytes of the payload from offset `at`. Bytes after the payload are 0, as in the receive buffer of a node.
+    /// Returns `N` bytes of the payload from offset `at`. Bytes after the end of the payload are 0, as in the receive buffer of a node.
     #[inline]
     pub(crate) fn get<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
@@ -100,7 +100,7 @@ impl Frame {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// Returns the payload as little-endian words, with zeros after its end.
+    /// Returns the payload as little-endian words, with zeros after the end of the payload.
     #[inline]
     pub fn words(&self) -> [u32; MAX_LEN / 4] {
         let mut words = [0; MAX_LEN / 4];
@@ -173,27 +173,27 @@ pub enum FrameError {
     UnknownId(u16),
     /// The frame is too short for its identifier.
     TooShort {
-        /// Identifier.
+        /// Identifier of the frame.
         id: u16,
-        /// Bytes received.
+        /// Length of the received payload, bytes.
         len: u8,
-        /// Bytes needed.
+        /// Required length of the payload, bytes.
         need: u8,
     },
     /// A byte has a value that is not valid in its frame.
     BadValue {
-        /// Identifier.
+        /// Identifier of the frame.
         id: u16,
         /// Offset of the byte in the payload.
         at: u8,
-        /// Its value.
+        /// Invalid value of the byte.
         value: u8,
     },
     /// The frame is not a CAN FD data frame with an 11-bit identifier and at most 24 bytes.
     WrongFormat {
         /// Identifier as received, up to 29 bits.
         id: u32,
-        /// Bytes received.
+        /// Length of the received payload, bytes.
         len: u8,
     },
 }

@@ -2,8 +2,8 @@
 
 use crate::{Answer, Decoded, Frame, POSITION_FULL_SCALE, Request, Scale, duration_ns};
 
-/// Uses the first two bytes as the identifier and the remaining bytes as the payload. Parses the frame as a request and as an answer,
-/// encodes each result, and compares it with the frame.
+/// Uses the first two bytes as the identifier and the remaining bytes as the payload. Parses the frame as a request and as an answer.
+/// Encodes the request and the answer again, and compares the result with the frame.
 pub fn bus_frame(data: &[u8]) {
     let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
     let id = u16::from_be_bytes(*id);

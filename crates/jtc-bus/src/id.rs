@@ -16,14 +16,14 @@ pub const CHANGE_FSM: u16 = 0x010;
 pub const RESET_ALL: u16 = 0x0A0;
 /// Broadcast with the working mode and configuration bits.
 pub const CHANGE_MODE: u16 = 0x0F0;
-/// Reset of node 0. The identifiers for nodes 1..6 are the next numbers. The node does not answer.
+/// Reset of node 0. The identifiers for nodes 1..6 are the numbers that follow. The node does not answer.
 pub const RESET: u16 = RESET_ALL | UNICAST;
 
-/// Answer of node 0 to Move. The identifiers of nodes 1..6 are the next numbers.
+/// Answer of node 0 to Move. The identifiers of nodes 1..6 are the numbers that follow.
 pub const MOVE_ANSWER: u16 = answer(MOVE, 0);
-/// Answer of node 0 to ChangeFsm. The identifiers of nodes 1..6 are the next numbers.
+/// Answer of node 0 to ChangeFsm. The identifiers of nodes 1..6 are the numbers that follow.
 pub const FSM_ANSWER: u16 = answer(CHANGE_FSM, 0);
-/// Answer of node 0 to ChangeMode. The identifiers of nodes 1..6 are the next numbers.
+/// Answer of node 0 to ChangeMode. The identifiers of nodes 1..6 are the numbers that follow.
 pub const MODE_ANSWER: u16 = answer(CHANGE_MODE, 0);
 
 /// Returns the id of the answer of `node` (0..6) to a request.
@@ -41,8 +41,8 @@ pub const fn node(id: u16) -> u8 {
     (id & 0x00F) as u8
 }
 
-/// Returns the node bits of the identifier for a node number. Returns 15 for an invalid number. No node has number 15, so the frame does
-/// not reach a wrong node.
+/// Returns the node bits of the identifier for a node number. For an invalid number, the function returns 15. No node has number 15, so
+/// the frame does not reach a wrong node.
 pub(crate) const fn on_wire(node: u8) -> u16 {
     if (node as usize) < crate::NODES { node as u16 } else { 0x00F }
 }

@@ -8,7 +8,7 @@ use crate::{GRIPPER, JOINTS, NODES, NodeState, id};
 mod field {
     /// Start of the torques in Move, two bytes per joint.
     pub(super) const TORQUE: usize = 0;
-    /// Move: pump.
+    /// Offset of the pump byte in Move.
     pub(super) const PUMP: usize = 12;
     /// Start of the mode and configuration bytes of the joints in ChangeMode.
     pub(super) const MODE: usize = 0;
@@ -19,8 +19,8 @@ mod field {
     pub(super) const MODE_LEN: usize = 16;
 }
 
-/// State that the controller can request from a node. The controller does not send other values (J-16), because some drives interpret any
-/// other value, such as their own state, as a command to move.
+/// State that the controller can request from a node. The controller sends no other state values (J-16). Some drives interpret any other
+/// value, such as their own state, as a command to move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Target {
@@ -39,7 +39,7 @@ impl Target {
     /// Returns the target for a byte in the wire format.
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match NodeState::new(byte) {
-            // The controller cannot request Start. In a request, the byte of Start means that no change is requested.
+            // The controller cannot request the state Start. In a request, the byte of Start means that no change is requested.
             NodeState::START => Some(Self::NoChange),
             NodeState::INIT => Some(Self::Init),
             NodeState::READY => Some(Self::Ready),
@@ -55,9 +55,9 @@ pub enum Request {
     /// Torque of each joint and state of the pump (identifier 0x000). Encoding limits each torque to its range (J-13) and converts NaN to
     /// 0.
     Move {
-        /// Torque at the joint, N·m.
+        /// Torque of each joint, N·m.
         torque: [f64; JOINTS],
-        /// `true` switches the vacuum pump on.
+        /// `true` switches the vacuum pump on, `false` switches it off.
         pump: bool,
     },
     /// Requested state of each node (identifier 0x010, J-16).
@@ -81,7 +81,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// Returns a Move with zero torques and this state of the pump, which is the first frame after an error (J-12).
+    /// Returns a Move with zero torques and this state of the pump. The controller sends this frame first after an error (J-12).
     pub const fn zero_torque(pump: bool) -> Self {
         Self::Move { torque: [0.0; JOINTS], pump }
     }
@@ -121,7 +121,8 @@ impl Request {
             id::MOVE => {
                 frame.need(field::MOVE_LEN as u8)?;
                 let torque = core::array::from_fn(|joint| {
-                    // The operations have the same order as in the drives. The tick of the controller does not parse requests.
+                    // The drives compute the torque with the same operations in the same order. The tick of the controller does not parse
+                    // requests.
                     let raw = i16::from_be_bytes(frame.get(field::TORQUE + 2 * joint));
                     f64::from(raw) * TORQUE_FULL_SCALE / f64::from(i16::MAX)
                 });

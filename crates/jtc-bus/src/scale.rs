@@ -11,7 +11,7 @@ pub const TORQUE_FULL_SCALE: f64 = 360.0;
 /// protocol.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Velocity that the integer 32767 represents, rad/s. The value is 2.0, or 6.283185 on older drives.
+    /// Velocity that the integer 32767 represents, rad/s. The velocity scale is 2.0, or 6.283185 on older drives.
     pub velocity: f64,
 }
 
@@ -40,8 +40,8 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
-/// Returns the physical value of a 16-bit integer. The quotient is computed first, because its value is the same for every answer of a
-/// tick. On the board a division takes as long as seven multiplications.
+/// Returns the physical value of a 16-bit integer. The quotient of the scale is computed first, because it is the same for every answer of
+/// a tick. On the board a division takes as long as seven multiplications.
 #[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
@@ -91,7 +91,7 @@ mod tests {
             assert_eq!((raw, long), (0, 0));
             return;
         }
-        // The sign never changes, but a value below half a unit may become 0.
+        // The sign must never change, but a value below half a unit may become 0.
         assert!(f64::from(raw) * value >= 0.0, "{value} became {raw}");
         assert!(f64::from(long) * value >= 0.0, "{value} became {long}");
         if value.abs() >= TORQUE_FULL_SCALE {

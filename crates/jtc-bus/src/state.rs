@@ -14,7 +14,7 @@ use core::fmt;
 pub struct NodeState(u8);
 
 impl NodeState {
-    /// Start.
+    /// State Start, the first state of a drive.
     pub const START: Self = Self(0);
     /// Init. The motor is off, and the node waits for its configuration.
     pub const INIT: Self = Self(1);
@@ -45,18 +45,18 @@ impl NodeState {
         self.0
     }
 
-    /// Returns the name of the state in manuals and statuses.
+    /// Returns the name of the state as manuals and statuses write it.
     pub const fn name(self) -> &'static str {
         self.texts().0
     }
 
-    /// Returns a description of the activity of the node, for a bus log.
+    /// Returns a text for a bus log that describes what the node is doing.
     pub const fn description(self) -> &'static str {
         self.texts().1
     }
 
     /// Returns the name and the description of the state. The meaning of the states 14, 15 and 16 depends on the generation of the drive.
-    /// The text therefore says only that the node is between two states.
+    /// The description of these states therefore says only that the node is between two states.
     const fn texts(self) -> (&'static str, &'static str) {
         match self {
             Self::START => ("Start", "start"),
@@ -87,7 +87,7 @@ impl NodeState {
         matches!(self.0, 10..=16)
     }
 
-    /// Returns true in Fault and in its fault reaction.
+    /// Returns true in the states Fault and Fault reaction active.
     pub const fn is_fault(self) -> bool {
         matches!(self, Self::FAULT_REACTION | Self::FAULT)
     }

@@ -5,14 +5,14 @@
 /// Kernel clock of the CAN controller, Hz.
 pub const KERNEL_CLOCK_HZ: u32 = 85_000_000;
 
-/// Division of a bit into periods of the kernel clock.
+/// Bit timing in periods of the kernel clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
     /// Kernel clock periods per time quantum.
     pub prescaler: u16,
-    /// Quanta from the end of the synchronisation quantum to the sample point, including propagation.
+    /// Time quanta from the end of the synchronisation quantum to the sample point, including the propagation segment.
     pub segment1: u8,
-    /// Quanta after the sample point.
+    /// Time quanta after the sample point.
     pub segment2: u8,
     /// Highest number of quanta by which a resynchronisation may lengthen or shorten the bit.
     pub jump_width: u8,
@@ -51,16 +51,16 @@ pub const DATA_BIT_RATE: u32 = 5_000_000;
 pub const NOMINAL: BitTiming = BitTiming::at(NOMINAL_BIT_RATE);
 /// Bit timing in the data phase.
 pub const DATA: BitTiming = BitTiming::at(DATA_BIT_RATE);
-/// Offset of the transmitter delay compensation: time from the measured loop delay to the secondary sample point, in kernel clock periods.
-/// With this offset the secondary sample point is at the sample point of the receivers.
+/// Offset of the transmitter delay compensation, in kernel clock periods: the time from the measured loop delay to the secondary sample
+/// point. With this offset the secondary sample point is at the same position in the bit as the sample point of the receivers.
 pub const TDC_OFFSET: u8 = {
-    // The hardware supports compensation only with prescalers 1 and 2.
+    // The CAN controller supports the transmitter delay compensation only with prescalers 1 and 2.
     assert!(DATA.prescaler <= 2);
     let offset = DATA.prescaler as u32 * DATA.sample_point();
     assert!(offset <= 127);
     offset as u8
 };
-/// Window of the filter for the measured delay. The value 0 switches the filter off.
+/// Window of the filter for the measured loop delay. The value 0 switches this filter off.
 pub const TDC_FILTER: u8 = 0;
 
 #[cfg(test)]

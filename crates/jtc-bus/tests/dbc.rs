@@ -1,4 +1,4 @@
-//! Compares `joint-bus.dbc` with the code. The file must decode the values that the code has encoded.
+//! Compares `joint-bus.dbc` with the code. The DBC file must decode the values that the code has encoded.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -21,11 +21,11 @@ fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
     (byte * 8 + 7 - bit..).take(signal.size as usize).map(|place| place / 8 * 8 + 7 - place % 8)
 }
 
-/// Decodes the signals of a frame with the file, in the units of the file.
+/// Decodes the signals of a frame with the DBC file, in the units of this file.
 fn decoded(frame: &Frame) -> BTreeMap<String, f64> {
     let id = MessageId::Standard(frame.id);
     let message = DBC.messages.iter().find(|message| message.id == id).expect("the file has this frame");
-    // The short form of a report does not contain the last signals.
+    // A report of 16 bytes does not contain the last signals.
     let held = |signal: &&Signal| (signal.start_bit / 8) < frame.data().len() as u64;
     message.signals.iter().filter(held).map(|signal| (signal.name.clone(), value(signal, frame))).collect()
 }
@@ -41,7 +41,7 @@ fn value(signal: &Signal, frame: &Frame) -> f64 {
     raw as f64 * signal.factor + signal.offset
 }
 
-/// Inserts the bits of a byte under the names in the file.
+/// Inserts the bits of a byte under their names in the DBC file.
 fn flags(into: &mut BTreeMap<String, f64>, prefix: &str, suffix: &str, byte: u8, names: &[(&str, u8)]) {
     for (name, mask) in names {
         let set = f64::from(u8::from(byte & mask != 0));

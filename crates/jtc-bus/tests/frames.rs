@@ -86,7 +86,7 @@ fn j11_joint_answer_of_16_and_20_bytes() {
             assert_eq!(answer, Ok(Answer::Joint { node, report: long }));
         }
         assert_eq!(Answer::Joint { node, report: long }.emit(SCALE), frame(id, &bytes[..20]));
-        // Only the long form contains the bytes from offset 16.
+        // Only a report of 20 bytes contains the bytes from offset 16.
         let mut short = frame(id, &bytes[..16]);
         assert_eq!(Answer::Joint { node, report }.emit(SCALE), short);
         short.id += 1;

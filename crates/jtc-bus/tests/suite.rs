@@ -1,5 +1,4 @@
-//! Test program with all tests of the crate, so that only one program must be linked. Each file in this directory is a module of the
-//! program.
+//! All tests of the crate in one test program, which shortens linking. Each file in this directory is a module of the program.
 mod dbc;
 mod frames;
 mod fuzz_regressions;

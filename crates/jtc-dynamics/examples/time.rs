@@ -1,4 +1,4 @@
-//! Prints a name and the time in nanoseconds of each call: the minimum over many batches of calls.
+//! Measures the duration of each function, and prints its name and time in nanoseconds: the minimum over many batches of calls.
 //!
 //! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, with a FILE that contains an arm and its states (format:
 //! `lines/mod.rs`). `references/dynamics/anchors.py --ours` creates this file and measures the times of this crate and of other

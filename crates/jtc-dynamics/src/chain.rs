@@ -1,15 +1,15 @@
 //! The arm in the form that the recursions use: modified Denavit-Hartenberg frames and base inertial parameters.
 //!
-//! These frames and parameters do not change the joint torques, but need fewer multiplications in each call:
+//! With these frames and parameters, the joint torques stay the same, but each call needs fewer multiplications:
 //!
 //! * **Frames** (modified Denavit-Hartenberg: Craig, Introduction to Robotics). Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b).
 //!   Rz(b) is added to the position of the joint, and Rz(a) becomes part of the previous frame. The remaining transform Rx(α)·Rz(q +
 //!   offset) needs only two plane rotations. The origin of a frame is the point of its joint axis from which the vector to the next origin
 //!   is perpendicular to the axis.
 //! * **Base (minimal) inertial parameters** (Gautier and Khalil, Direct calculation of minimum set of inertial parameters of serial robots,
-//!   1990). The part of a link's inertia that is symmetric about its joint axis (the mass, the first and the second moment along the axis)
-//!   has the same motion with or without the rotation of the link. This symmetric part is added to the previous link, one link after the
-//!   other from the wrist to the base. Each link keeps seven parameters, which do not include a mass.
+//!   1990). A part of a link's inertia is symmetric about the joint axis: the mass, and the first and second moment along the axis. The
+//!   motion of this part does not depend on the rotation of the link. The symmetric part is therefore added to the previous link, one link
+//!   after the other from the wrist to the base. Each link keeps seven parameters, which do not include a mass.
 
 use crate::model::{ArmModel, JOINTS, Link, Origin, symmetric};
 use crate::payload::Payload;
@@ -21,18 +21,18 @@ use crate::trig::{angle, sin_cos};
 /// Largest difference (rad) between an angle of a joint origin and a multiple of π/2 at which the multiple replaces the angle. Many arm
 /// models write π/2 with six digits, and the wire format uses f32.
 const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
-/// Sine or cosine of the angle between two axes that is treated as 0. In products of rotations by right angles, rounding causes small
-/// values instead of 0.
+/// Limit below which the sine or cosine of the angle between two axes is treated as 0. Products of rotations by right angles contain such
+/// small values because of rounding.
 const ALIGNED: f64 = 1e-12;
 
 /// Direction of a joint's axis relative to the axis of the previous joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axes {
-    /// Parallel, in the same or in the opposite direction: sin α = 0.
+    /// The axes are parallel, with the same or the opposite direction: sin α = 0.
     Parallel,
-    /// At a right angle: α = π/2. The parameters are chosen so that α is never negative.
+    /// The axes are at a right angle: α = π/2. The parameters are chosen so that α is never negative.
     Perpendicular,
-    /// Any other direction; the recursion then saves no multiplications.
+    /// The axes have any other direction; the recursion then saves no multiplications.
     Any,
 }
 
@@ -45,9 +45,9 @@ pub(crate) trait Shape {
 
 /// An arm of any shape.
 pub(crate) struct AnyShape;
-/// Three parallel axes, followed by two at right angles: an arm whose wrist axes do not meet in one point.
+/// Three parallel axes, followed by two axes at right angles: an arm whose wrist axes do not meet in one point.
 pub(crate) struct ThreeParallel;
-/// Two parallel axes, followed by three at right angles: an arm with a spherical wrist.
+/// Two parallel axes, followed by three axes at right angles: an arm with a spherical wrist.
 pub(crate) struct TwoParallel;
 
 impl Shape for AnyShape {
@@ -104,7 +104,7 @@ impl KnownShape {
 /// offset).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointTransform {
-    /// sin α, which is not negative, and cos α.
+    /// sin α, which is not negative, and cos α of this joint.
     pub sin: f64,
     pub cos: f64,
     /// Direction of the joint axis, from the shape of the arm.
@@ -116,8 +116,8 @@ pub(crate) struct JointTransform {
     pub p: [f64; 2],
 }
 
-/// The base inertial parameters of a link in its own frame. Mass, first moment along z and the integral of z² are zero, because these
-/// values have been added to the previous link.
+/// The base inertial parameters of a link in its own frame. Mass, first moment along z and the integral of z² are zero, because the
+/// previous link includes them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BaseInertialParameters {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
@@ -164,7 +164,7 @@ impl Inertia {
         about_com.placed(&about_z(0.0, 1.0), &payload.com).placed(&flange.rotation, &flange.xyz)
     }
 
-    /// Returns the inertia in a frame in which the current frame has the origin `p` (m) and the rotation `r`.
+    /// Returns the inertia in the frame in which the current frame has the origin `p` (m) and the rotation `r`.
     fn placed(&self, r: &Mat3, p: &[f64; 3]) -> Self {
         let h = apply(r, &self.h);
         let mut j = congruent(r, &self.j);
@@ -211,7 +211,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 pub(crate) struct Chain {
     pub transforms: [JointTransform; JOINTS],
     pub base_parameters: [BaseInertialParameters; JOINTS],
-    /// Negative gravity after the Rx(α) of the first joint, m/s². Gravity has the effect of an upward acceleration of the base.
+    /// Negative gravity after the Rx(α) of the first joint, m/s². Gravity acts like an upward acceleration of the base.
     pub base_acceleration: [f64; 3],
     pub placements: [Placement; 7],
     /// First moments (`hx`, `hy`) of a massless arm that carries 1 kg at the flange, kg·m.

@@ -1,8 +1,8 @@
 //! Mass matrix, computed by the composite-rigid-body algorithm, and forward dynamics, computed from the LDLᵀ factors of the mass matrix
 //! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 6). The bias torques are computed by recursive Newton-Euler.
 
-// Matrix elements are named by their indices, as in the formulas. Unrolled loops over a triangle of a matrix contain index pairs for which
-// nothing is computed.
+// Matrix elements are named by their indices, as in the formulas. Unrolled loops over a triangle of a matrix also run for index pairs
+// outside the triangle, but compute nothing for them.
 #![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
 use crate::chain::{AnyShape, BaseInertialParameters, Chain, JointTransform};
@@ -13,8 +13,8 @@ use crate::unroll::unroll;
 /// A square matrix over the joints.
 pub(crate) type JointMat = [[f64; JOINTS]; JOINTS];
 
-/// A composite rigid body: a link and all links after it. The composite is described by its first and second moments of mass about the
-/// link's origin. Base inertial parameters do not include a mass: see [`crate::chain`].
+/// A composite rigid body: a link and all links after it. The parameters are the first and second moments of mass about the link's origin.
+/// Base inertial parameters do not include a mass: see [`crate::chain`].
 #[derive(Clone, Copy)]
 struct Composite {
     h: [f64; 3],
@@ -115,14 +115,14 @@ pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
 /// Smallest ratio of a pivot to its diagonal entry that is not treated as a rounding error.
 const PIVOT_MIN: f64 = 1.0e-14;
 
-/// Solves M·x = b for a symmetric positive definite M, given by its lower triangle. The result is 0 for a joint whose pivot is zero or a
-/// rounding error.
+/// Solves M·x = b for a symmetric positive definite M, given by its lower triangle. The solution x is 0 for a joint whose pivot is zero or
+/// a rounding error.
 #[inline(always)]
 fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     let mut inverse = [0.0; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
         let floor = m[K][K] * PIVOT_MIN;
-        // The rows above are complete. m[K][I] contains L·D and is replaced by L.
+        // The rows above row K are complete. m[K][I] contains L·D and is replaced by L.
         unroll!(I in [0, 1, 2, 3, 4] {
             if I < K {
                 let scaled = m[K][I];
@@ -138,7 +138,7 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
             }
         });
         let reciprocal = 1.0 / m[K][K];
-        // A bit mask avoids a branch.
+        // A bit mask replaces a branch.
         let mask = u64::from(m[K][K] > floor).wrapping_neg();
         inverse[K] = f64::from_bits(reciprocal.to_bits() & mask);
     });
@@ -159,7 +159,7 @@ pub(crate) fn felt_inertia(chain: &Chain, q: &JointVec, rotor: &JointVec) -> Joi
     core::array::from_fn(|k| felt(m, k))
 }
 
-/// Like [`felt_inertia`], for one joint.
+/// Like [`felt_inertia`], but returns the inertia of one joint only.
 pub(crate) fn felt_inertia_of(chain: &Chain, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
     felt(with_rotors(chain, q, rotor), joint)
 }

@@ -167,7 +167,7 @@ impl Motion {
     ) -> Self {
         let [x, y] = t.p;
         let reach = |k: usize| {
-            // If the axes are parallel, y is 0.
+            // If the axes are parallel, the y coordinate of the shift is 0.
             let way = if t.axes == Axes::Parallel { u[k][0] * x } else { u[k][0] * x + u[k][1] * y };
             self.acc[k] + way
         };
@@ -224,7 +224,7 @@ fn wrenches<S: Shape>(
     let acc = rz_back(trig.sin[0], trig.cos[0], chain.base_acceleration);
     let first = &chain.base_parameters[0];
     out[0][2][1] = qdd[0] * (first.xx + first.yy) + (acc[1] * first.hx - acc[0] * first.hy);
-    // The first link only rotates about its axis, so most elements of U and of the motion of the second link are zero.
+    // The first link only rotates about its axis. Most elements of U and of the motion of the second link are therefore zero.
     let t = &chain.transform::<S>(1);
     let (s, c) = (trig.sin[1], trig.cos[1]);
     let square = qd[0] * qd[0];
@@ -261,7 +261,7 @@ pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec
     }
 }
 
-/// Like [`inverse`], compiled for one arm shape. Each shape has its own function, so that its machine code can be inspected.
+/// Like [`inverse`], compiled for one arm shape. Each shape has its own function, so that developers can inspect the machine code.
 #[inline(never)]
 fn inverse_of<S: Shape>(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
     recursion::<S>(chain, &JointSinesCosines::new(chain, q), qd, qdd)
@@ -287,7 +287,8 @@ pub(crate) fn recursion<S: Shape>(
     torque
 }
 
-/// Returns the joint torques at rest, N·m. The base inertial parameters do not include a mass, so only moments are needed, and no forces.
+/// Returns the joint torques at rest, N·m. The base inertial parameters do not include a mass, so the recursion needs only moments and no
+/// forces.
 #[inline(always)]
 pub(crate) fn gravity_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec {
     static_torque(chain, trig, |k| [chain.base_parameters[k].hx, chain.base_parameters[k].hy])

@@ -10,7 +10,7 @@ use crate::trig::{sin_cos, sqrt};
 pub struct Pose {
     /// Rotation matrix, row major. The columns of this matrix are the axes of the frame, expressed in the base frame.
     pub rotation: [[f64; 3]; 3],
-    /// Origin in the base frame, m.
+    /// Origin of the frame in the base frame, m.
     pub position: [f64; 3],
 }
 

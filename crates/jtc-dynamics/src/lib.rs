@@ -68,7 +68,7 @@ impl Dynamics {
     }
 
     /// Returns the joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the weight of
-    /// the arm itself. These torques are the gravity force on 1 kg multiplied by the transposed Jacobian of the flange.
+    /// the arm itself. The torques are the gravity force on 1 kg multiplied by the transposed Jacobian of the flange.
     pub fn flange_torque(&self, q: &JointVec) -> JointVec {
         inverse::flange_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
@@ -79,14 +79,14 @@ impl Dynamics {
         forward::mass_matrix(&self.chain, q)
     }
 
-    /// Returns the inertia (kg·m²) that acts on each joint at the positions `q` (rad) while all other joints are free to move. This is the
-    /// inertia that a torque on this joint alone accelerates, and the smallest possible value. `rotor` has the same meaning as in
-    /// [`Dynamics::forward`]. The value is infinite for a joint without inertia.
+    /// Returns the inertia (kg·m²) that acts on each joint at the positions `q` (rad) while all other joints are free to move. A torque on
+    /// this joint alone accelerates this inertia, which is the smallest possible value. `rotor` has the same meaning as in
+    /// [`Dynamics::forward`]. The felt inertia is infinite for a joint without inertia.
     pub fn felt_inertia(&self, q: &JointVec, rotor: &JointVec) -> JointVec {
         forward::felt_inertia(&self.chain, q, rotor)
     }
 
-    /// Like [`Dynamics::felt_inertia`], for one joint; `joint` counts from 0.
+    /// Like [`Dynamics::felt_inertia`], but returns the inertia of one joint only; `joint` counts from 0.
     #[inline(never)]
     pub fn felt_inertia_of(&self, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
         forward::felt_inertia_of(&self.chain, q, rotor, joint)
@@ -107,7 +107,7 @@ impl Dynamics {
     }
 
     /// Returns the poses, in the base frame (m), of the joint frames from base to wrist and of the flange, at the positions `q` (rad). Each
-    /// joint frame is the joint frame of the model after the rotation of the joint.
+    /// joint frame is the joint frame of the model after the rotation of that joint.
     pub fn forward_kinematics(&self, q: &JointVec) -> [Pose; 7] {
         kinematics::forward_kinematics(&self.chain, q)
     }

@@ -1,4 +1,4 @@
-//! The model of an arm (joint origins, link masses and inertias), and the check that such a body can exist.
+//! The model of an arm (joint origins, link masses and inertias), and the check that an arm with these numbers can exist.
 
 use core::fmt;
 
@@ -67,7 +67,7 @@ pub enum ModelError {
     NotFinite {
         /// Index of the joint or link that contains `field`, 0..7.
         index: usize,
-        /// The number.
+        /// Number that is NaN or infinite.
         field: Field,
         /// Value of the number, in the unit of `field`.
         value: f64,
@@ -76,35 +76,35 @@ pub enum ModelError {
     AngleTooLarge {
         /// Index of the joint or link that contains `field`, 0..7.
         index: usize,
-        /// The number.
+        /// Field that contains the angle.
         field: Field,
-        /// Its value, rad.
+        /// Value of the angle, rad.
         value: f64,
         /// Largest magnitude, rad.
         limit: f64,
     },
     /// A mass is negative.
     MassNegative {
-        /// Link, 0..7.
+        /// Index of the link, 0..7.
         link: usize,
-        /// Mass, kg.
+        /// Mass of the link, kg.
         mass: f64,
     },
-    /// One of the links 1..=5 has no mass.
+    /// A link from 1 to 5 has no mass.
     MassZero {
         /// Link number, 1..=5.
         link: usize,
     },
     /// A link with mass has a negative principal moment of inertia.
     InertiaNegative {
-        /// Link, 0..7.
+        /// Index of the link, 0..7.
         link: usize,
         /// Smallest principal moment, kg·m²; at least 0 is required.
         moment: f64,
     },
     /// A principal moment of a link with mass is larger than the sum of the other two, which is impossible.
     InertiaTriangle {
-        /// Link, 0..7.
+        /// Index of the link, 0..7.
         link: usize,
         /// Largest principal moment, kg·m².
         moment: f64,

@@ -20,21 +20,21 @@ pub struct Payload {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PayloadError {
-    /// A number is NaN or infinite.
+    /// A number of the payload is NaN or infinite.
     NotFinite,
-    /// The mass is negative.
+    /// The mass of the payload is negative.
     MassNegative {
-        /// Mass, kg.
+        /// Mass of the payload, kg.
         mass: f64,
     },
     /// The payload has an inertia but no mass.
     MassZero,
-    /// The smallest principal moment of inertia is negative.
+    /// The smallest principal moment of inertia of the payload is negative.
     InertiaNegative {
         /// The smallest principal moment, kg·m².
         moment: f64,
     },
-    /// The largest principal moment of inertia is larger than the sum of the other two.
+    /// The largest principal moment of inertia of the payload is larger than the sum of the other two principal moments.
     InertiaTriangle {
         /// The largest principal moment, kg·m².
         moment: f64,
@@ -67,7 +67,7 @@ impl fmt::Display for PayloadError {
 impl core::error::Error for PayloadError {}
 
 impl Payload {
-    /// No payload.
+    /// A payload without mass, which means that the arm has no payload.
     pub const NONE: Self = Self { mass: 0.0, com: [0.0; 3], inertia: [0.0; 6] };
 
     /// Checks that the payload is physically possible (J-60). The requirements are those of [`crate::ArmModel::check`] for a link.
@@ -102,9 +102,9 @@ impl Payload {
     }
 }
 
-/// Base inertial parameters of the links of an arm (Gautier and Khalil 1990), including the payload. All mass-dependent values of the arm's
-/// dynamics are in these parameters. The parameters are linear in the masses and in the first and second moments of the bodies. Therefore
-/// an interpolation between two physical arms with the same joints is also physical.
+/// Base inertial parameters of the links of an arm (Gautier and Khalil 1990), including the payload. All values of the arm's dynamics that
+/// depend on masses are in these parameters. The parameters are linear in the masses and in the first and second moments of the bodies. An
+/// interpolation between two physical arms with the same joints is therefore also physical.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
 

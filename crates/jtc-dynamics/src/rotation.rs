@@ -1,4 +1,4 @@
-//! Rotation matrices, and the principal moments of a symmetric matrix; the precomputation and the kinematics use this 3×3 algebra.
+//! Rotation matrices, and the principal moments of a symmetric matrix. The precomputation and the kinematics use these 3×3 matrices.
 
 use crate::trig::{sin_cos, sqrt};
 
@@ -90,7 +90,7 @@ fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, 
         // The moments are equal within the precision of the square root, so any rotation is valid.
         return (a, b, 0.0, ac, bc);
     }
-    // The smaller of the two possible rotations.
+    // The tangent of the smaller of the two possible rotation angles.
     let t = ab / (half + root.copysign(half));
     let c = 1.0 / sqrt(1.0 + t * t);
     let s = t * c;
@@ -128,7 +128,7 @@ mod tests {
             prop_assert!((x - angle.cos()).abs() < 4e-16 && (y - angle.sin()).abs() < 4e-16, "{x} {y}");
         }
 
-        /// A rotation does not change the principal moments, even if they are equal, zero or negative, in any unit.
+        /// A rotation must not change the principal moments, even if they are equal, zero or negative, in any unit.
         #[test]
         fn principal_moments_are_those_before_a_turn(
             moments in prop::array::uniform3(prop_oneof![Just(0.0), Just(1.0), Just(-1.0), -2.0..2.0f64, -1e-9..1e-9f64]),

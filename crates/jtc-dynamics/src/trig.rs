@@ -1,14 +1,14 @@
 //! Sine, cosine and square root of f64 without the standard library. Sine and cosine have no branches that depend on the argument.
 //!
-//! A table contains sine and cosine of 128 directions. The values of the nearest direction are rotated by the remaining angle. This angle
-//! is at most π/128, so that short polynomials suffice.
+//! A table contains sine and cosine of 128 directions. The functions rotate the values of the nearest direction by the remaining
+//! angle. The remaining angle is at most π/128, so that short polynomials suffice.
 
 /// Number of directions per full turn in the table; a power of two.
 const DIRECTIONS: usize = 128;
 /// Reciprocal of the angle between two directions, 1/rad.
 const PER_RAD: f64 = 20.371832715762604;
-/// The angle between two directions, π/64, in two parts. The first has 28 significant bits, so that its product with a number of
-/// steps below 2^25 is exact.
+/// The angle between two directions, π/64, in two parts. The first part has 28 significant bits, so its product with a number of steps
+/// below 2^25 is exact.
 const STEP: [f64; 2] = [0.049087385181337595, 3.100292436501689e-11];
 /// 1.5·2^52. Adding this constant rounds a number to an integer and leaves this integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
@@ -81,8 +81,8 @@ pub const SIN_COS_MAX: f64 = 1.0e9;
 /// Returns sine and cosine of `x` (rad).
 ///
 /// The absolute error of sine and cosine is at most 2^-52 (2.3e-16) for |x| ≤ 1e6. For larger |x| the error grows to half the spacing of
-/// f64 numbers around `x`. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions, for every
-/// value of `x`.
+/// f64 numbers around `x`. If |x| is above [`SIN_COS_MAX`], or `x` is NaN, both results are NaN. Every call executes the same
+/// instructions, for every value of `x`.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * PER_RAD + ROUND;
@@ -97,8 +97,8 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (sin + (cos * s + sin * c), cos + (cos * c - sin * s))
 }
 
-/// Returns the square root of a finite `x` ≥ 0 by Newton's method, with a relative error of at most 2^-52. Returns 0 for a NaN, for
-/// negative numbers, and for numbers below the normal range. The computation needs five divisions.
+/// Returns the square root of a finite `x` ≥ 0 by Newton's method, with a relative error of at most 2^-52. Returns 0 for NaN, for negative
+/// numbers, and for numbers below the normal range. The computation needs five divisions.
 pub fn sqrt(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return 0.0;
@@ -111,8 +111,8 @@ pub fn sqrt(x: f64) -> f64 {
     y
 }
 
-/// Returns the angle in (−π, π] of a direction that is given by its sine and cosine. The function is used for precomputation, and never in
-/// the tick.
+/// Returns the angle in (−π, π] of a direction with the given sine and cosine. The precomputation uses this function; the tick never uses
+/// it.
 pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     use core::f64::consts::{FRAC_PI_2, PI};
     let mut angle = if cos >= sin.abs() {

@@ -159,7 +159,7 @@ proptest! {
         prop_assert!(close(&d.inverse(&q, &NONE, &NONE), &d.gravity_torque(&q), largest(&whole).max(1.0), 1e-13));
     }
 
-    /// The velocity torques are a quadratic function: twice the velocities cause four times the torques.
+    /// The velocity torques must be a quadratic function of the velocities: twice the velocities cause four times the torques.
     #[test]
     fn j40_velocity_torque_is_quadratic(model in arms::model(), q in arms::vector(3.2), qd in arms::vector(3.0)) {
         let d = Dynamics::new(&model, [0.0; 3]);
@@ -167,7 +167,7 @@ proptest! {
         prop_assert!(close(&two, &one.map(|t| 4.0 * t), largest(&two), 1e-13));
     }
 
-    /// The power of the velocity torques is ½·qdᵀ·Ṁ·qd, in which Ṁ is the time derivative of the mass matrix.
+    /// The power of the velocity torques must be ½·qdᵀ·Ṁ·qd, in which Ṁ is the time derivative of the mass matrix.
     #[test]
     fn j40_power_is_the_change_of_the_kinetic_energy(
         model in arms::model(), q in arms::vector(3.2), qd in arms::vector(2.0)
@@ -232,8 +232,8 @@ proptest! {
     }
 }
 
-/// Expected values for the arm of the existing device, computed by another program. In that program gravity has the opposite direction, as
-/// for a hanging arm, and joint 3 is 10 mm higher.
+/// Compares the gravity torque with values for the arm of the existing device, computed by another program. In that program gravity has
+/// the opposite direction, as for a hanging arm, and joint 3 is 10 mm higher.
 #[test]
 fn j40_gravity_torque_of_the_default_arm_hanging() {
     let mut model = arms::avena();
@@ -249,7 +249,8 @@ fn j40_gravity_torque_of_the_default_arm_hanging() {
     }
 }
 
-/// The torque that holds a mass is the derivative of its potential energy, which is computed here from the heights in forward kinematics.
+/// The torque that holds a mass must be the derivative of its potential energy. The test computes this energy from the heights in forward
+/// kinematics.
 #[test]
 fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     let gravity = [1.3, -0.7, -9.81];
@@ -268,8 +269,8 @@ fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     }
 }
 
-/// Compares the felt inertia with the mass matrix of all joints, and the flange speed with the distance between two positions at close
-/// times.
+/// Compares the felt inertia with the mass matrix of all joints. Compares the flange speed with the distance between two positions at
+/// close times.
 #[test]
 fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     let mut random = random_from(11);
@@ -319,7 +320,8 @@ fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     assert!(close(pose.rotation.as_flattened(), wanted.as_flattened(), 1.0, 1e-15));
 }
 
-/// π/2 and π with six digits or rounded to f32 are treated as the exact angles. An angle with a larger difference is not changed.
+/// The crate treats π/2 and π with six digits or rounded to f32 as the exact angles. The crate does not change an angle with a larger
+/// difference.
 #[test]
 fn j06_j40_angles_next_to_a_right_angle_are_right_angles() {
     let poses = |rpy: [f64; 3]| {
@@ -348,7 +350,7 @@ fn j40_the_flange_is_placed_by_the_seventh_joint() {
     assert!(close(&poses[6].position, &along, 1.0, 1e-15));
 }
 
-/// With rotor inertias, the energy of the arm stays constant during a free fall of one second (RK4 at 1 ms).
+/// With rotor inertias, the energy of the arm must stay constant during a free fall of one second (RK4 at 1 ms).
 #[test]
 fn j40_free_fall_keeps_the_energy() {
     let model = arms::avena();
@@ -398,8 +400,8 @@ fn j40_a_joint_without_inertia_stays_finite() {
 }
 
 proptest! {
-    /// The felt inertia is the largest inertia that can be subtracted from the joint. If more is subtracted, the arm has a motion without
-    /// positive kinetic energy.
+    /// The felt inertia must be the largest inertia that can be subtracted from the joint. After a larger subtraction, the arm would have
+    /// a motion without positive kinetic energy.
     #[test]
     fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
         model in arms::model(),

@@ -1,4 +1,4 @@
-//! The check that an arm model is physical (J-06).
+//! Tests the check that an arm model is physical (J-06).
 use crate::arms;
 
 use jtc_dynamics::{ArmModel, Field, ModelError};
@@ -126,7 +126,7 @@ fn j06_angles_without_a_meaning_are_refused() {
     );
 }
 
-/// The error contains the largest allowed angle.
+/// The error must contain the largest allowed angle.
 #[test]
 fn j06_an_angle_at_the_limit_is_accepted() {
     let mut model = arms::avena();
@@ -143,12 +143,13 @@ fn j06_an_angle_at_the_limit_is_accepted() {
 }
 
 /// A body at the limit is still valid after its numbers have been rounded to f32, as in the ArmModel frame. A body with a deviation 100
-/// times as large as this rounding is not valid. The test checks light and heavy bodies.
+/// times as large as this rounding error is not valid. The test checks light and heavy bodies.
 #[test]
 fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
     let off = f64::from(f32::EPSILON);
     for unit in [1e-6, 1e-3, 1.0, 1e3] {
-        // For a rod, one moment is slightly below zero. For a plate, one moment is slightly above the sum of the others.
+        // For a rod, one principal moment is slightly below zero. For a plate, one principal moment is slightly above the sum of the other
+        // two.
         for (shape, defect) in [([0.0, 1.0, 1.0], [-1.0, 0.0, 0.0]), ([1.0, 1.0, 2.0], [0.0, 0.0, 1.0])] {
             let check = |off: f64| {
                 let [a, b, c]: [f64; 3] = core::array::from_fn(|i| unit * (shape[i] + off * defect[i]));
@@ -196,8 +197,8 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The inertia of point masses is accepted in every orientation. The inertia is refused if the value subtracted from a moment is larger
-    /// than the contribution of the masses.
+    /// The check accepts the inertia of point masses in every orientation. The check rejects the inertia if the test subtracts more from a
+    /// moment than the point masses contribute to it.
     #[test]
     fn j06_what_points_of_mass_make_is_accepted(
         points in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 1..6)

@@ -1,4 +1,5 @@
-//! A payload at the flange (J-60): comparison with the same body as a link, comparison with energies, and rejection of impossible bodies.
+//! Tests of a payload at the flange (J-60): comparison with the same body as a link, comparison with energies, and rejection of impossible
+//! bodies.
 use crate::arms;
 
 use std::f64::consts::FRAC_PI_2;
@@ -8,7 +9,7 @@ use proptest::prelude::*;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// Random payloads that consist of point masses, which can represent any rigid body.
+/// Generates random payloads that consist of point masses. Point masses can represent any rigid body.
 fn payload() -> impl Strategy<Value = Payload> {
     let point = (0.01..2.0f64, prop::array::uniform3(-0.3..0.3f64));
     prop::collection::vec(point, 1..6).prop_map(|points| of_points(&points))
@@ -63,8 +64,8 @@ fn alone(model: &ArmModel, payload: &Payload) -> ArmModel {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Torques are linear in the masses of the bodies: the total torque is the torque of the arm, plus the torque of the payload on joints
-    /// without mass.
+    /// Torques are linear in the masses of the bodies. The total torque must be the torque of the arm plus the torque of the payload on an
+    /// arm without mass.
     #[test]
     fn j60_a_payload_adds_the_torques_of_a_link_that_it_would_be(
         model in arms::model(), payload in payload(), gravity in prop::array::uniform3(-10.0..10.0f64),
@@ -82,7 +83,7 @@ proptest! {
         prop_assert_eq!(both.flange_torque(&q), arm.flange_torque(&q));
     }
 
-    /// The potential and kinetic energy of the points of the payload are computed and differentiated numerically.
+    /// The test computes the potential and kinetic energy of the points of the payload, and differentiates the energies numerically.
     #[test]
     fn j60_a_payload_adds_the_energies_of_its_points(
         model in arms::model(), points in prop::collection::vec((0.01..2.0f64, prop::array::uniform3(-0.3..0.3f64)), 1..5),
@@ -111,7 +112,8 @@ proptest! {
         prop_assert!((half(&both) - half(&arm) - kinetic).abs() < 1e-6 * kinetic.max(1.0), "{kinetic} J");
     }
 
-    /// The interpolation between an arm with one payload and the same arm with another payload equals the arm with the interpolated payload.
+    /// The interpolation between an arm with one payload and the same arm with another payload must equal the arm with the interpolated
+    /// payload.
     #[test]
     fn j60_the_way_between_two_payloads_is_straight(
         model in arms::model(), a in payload(), b in payload(), share in 0.0..=1.0f64,
@@ -138,7 +140,7 @@ fn j60_no_payload_is_the_arm_itself_to_the_bit() {
     assert_eq!(plain.inverse(&q, &qd, &qdd), without.inverse(&q, &qd, &qdd));
 }
 
-/// The requirements for a payload are the same as for a link (J-06).
+/// The requirements for a payload are the same as the requirements for a link (J-06).
 #[test]
 fn j60_what_is_no_body_is_refused() {
     let good = Payload { mass: 2.0, com: [0.0, 0.0, 0.1], inertia: [0.02, 0.0, 0.0, 0.02, 0.0, 0.01] };

@@ -12,7 +12,7 @@ fn random(state: &mut u64) -> f64 {
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// A hash of the bits of results.
+/// Hash of the bits of the results.
 struct Sum(u64);
 
 impl Sum {
@@ -26,7 +26,8 @@ impl Sum {
 }
 
 /// Compares a hash of the bits of all results for 1 000 arm states. Fused multiply-add, another order of operations or another polynomial
-/// changes the hash. After such a change, a developer must update the number below, and old recordings can no longer be replayed.
+/// changes the hash. After such a change, a developer must update the expected hash in this test, and old recordings can no longer be
+/// replayed.
 #[test]
 fn j40_results_are_the_same_bits_everywhere() {
     let d = Dynamics::new(&arms::avena(), [0.0, 0.0, -9.81]);
@@ -44,7 +45,7 @@ fn j40_results_are_the_same_bits_everywhere() {
     assert_eq!(sum.0, 0x700f_d817_6e8b_cbd5, "{:#018x}", sum.0);
 }
 
-/// Like the test above, for arms with random angles. A host may upload any arm model, and recordings with that model must also be
+/// Compares the hash for arms with random angles. A host may upload any arm model, and recordings with that model must also be
 /// replayable.
 #[test]
 fn j40_every_arm_is_made_ready_to_the_same_bits() {

@@ -1,6 +1,6 @@
 //! Arms and states in a text format with one record per line. A `model` line has 136 numbers (7 joint origins xyz rpy; 7 links: origin, ixx
-//! ixy ixz iyy iyz izz, mass; gravity). If the arm has a payload, ten more follow (mass, centre of mass, ixx ixy ixz iyy iyz izz in the
-//! flange frame). A `state` line has 30 numbers (q, qd, qdd, torque and rotor inertia of six joints).
+//! ixy ixz iyy iyz izz, mass; gravity). If the arm has a payload, ten more numbers follow (mass, centre of mass, ixx ixy ixz iyy iyz izz in
+//! the flange frame). A `state` line has 30 numbers (q, qd, qdd, torque and rotor inertia of six joints).
 use jtc_dynamics::{ArmModel, JointVec, Link, Origin, Payload};
 
 pub(crate) enum Line {

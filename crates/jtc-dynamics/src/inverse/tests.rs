@@ -1,4 +1,4 @@
-//! Operations that the recursion omits for arms of known shape.
+//! Tests that the operations omitted for arms of known shape do not change the result.
 extern crate std;
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,7 +8,8 @@ use super::*;
 use crate::model::{ArmModel, Link, Origin};
 use crate::payload::Payload;
 
-/// Arms whose axes have the directions of a shape, with random roll and yaw angles. Some neighbouring joints have the same axis.
+/// Generates arms whose axes have the directions of a shape, with random roll and yaw angles. Some neighbouring joints have the
+/// same axis.
 fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     let right = || prop::sample::select(std::vec![FRAC_PI_2, -FRAC_PI_2, 1.570796, -1.5707974]);
     let straight = || prop::sample::select(std::vec![0.0, PI, -PI, 3.141592, 1e-6]);
@@ -58,7 +59,7 @@ proptest! {
     }
 }
 
-/// Axes that are nearly parallel, nearly at a right angle, or in another direction.
+/// Tests axes that are nearly parallel, nearly at a right angle, or in another direction.
 #[test]
 fn j40_an_arm_of_another_shape_is_any() {
     for bend in [0.3, 2.1e-6, FRAC_PI_2 + 2.1e-6] {

@@ -26,7 +26,7 @@ fn triple(scale: f64) -> impl Strategy<Value = [f64; 3]> {
     prop::array::uniform3(-scale..scale)
 }
 
-/// Random angles. Many of the random angles are equal or close to angles of real arms.
+/// Generates random angles. Many of these angles are equal or close to angles of real arms.
 fn rpy() -> impl Strategy<Value = [f64; 3]> {
     use std::f64::consts::{FRAC_PI_2, PI};
     let special = prop::sample::select(vec![0.0, FRAC_PI_2, -FRAC_PI_2, PI, 1.570796, 3.141592, 1.0e-9]);
@@ -37,7 +37,7 @@ fn origin(reach: f64) -> impl Strategy<Value = Origin> {
     (prop_oneof![4 => triple(reach), 1 => Just([0.0; 3])], rpy()).prop_map(|(xyz, rpy)| Origin { xyz, rpy })
 }
 
-/// A link with the inertia of a box of random size and with a random hollow part.
+/// Generates a link with the inertia of a box of random size and with a random hollow part.
 fn link() -> impl Strategy<Value = Link> {
     (origin(0.3), prop::array::uniform3(0.02..0.5f64), 0.2..9.0f64).prop_map(|(origin, [x, y, z], mass)| {
         let (x, y, z) = (mass * x * x, mass * y * y, mass * z * z);
@@ -45,14 +45,14 @@ fn link() -> impl Strategy<Value = Link> {
     })
 }
 
-/// A random physical arm.
+/// Generates a random physical arm.
 pub(crate) fn model() -> impl Strategy<Value = ArmModel> {
     (prop::array::uniform7(origin(0.8)), prop::array::uniform7(link()))
         .prop_map(|(joints, links)| ArmModel { joints, links })
         .prop_filter("inertia of a body", |m| m.check().is_ok())
 }
 
-/// Six random numbers within ±`scale`.
+/// Generates six random numbers within ±`scale`.
 pub(crate) fn vector(scale: f64) -> impl Strategy<Value = JointVec> {
     prop::array::uniform6(-scale..scale)
 }

@@ -1,5 +1,5 @@
-//! Measures the processing time to simulate one millisecond of arm, drives, bus and controller while the arm follows a
-//! motion. Prints one JSON object.
+//! Measures the processor time for one simulated millisecond of arm, drives, bus and controller while the arm follows
+//! a motion. Prints one JSON object.
 use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::ExecCommand;
 use test_kit::clock::CpuTime;
@@ -27,7 +27,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    // The result is not the minimum, because the motion and the hold after the motion have different costs.
+    // The example does not use the minimum, because a tick during the motion and a tick after the motion have
+    // different costs.
     let ns = times[times.len() / 10];
     println!(
         "{{\"name\":\"simulated_millisecond\",\"ns\":{ns:.1},\"real_time_factor\":{:.0},\"state\":\"{:?}\"}}",

@@ -1,5 +1,5 @@
-//! Model of the true arm: rigid bodies, rotors with gears, friction, end stops and walls. The equations are integrated with the
-//! Runge-Kutta method in steps of at most 1 ms.
+//! Model of the true arm: rigid bodies, rotors with gears, friction, end stops and walls. The Runge-Kutta method integrates the
+//! equations in steps of at most 1 ms.
 //!
 //! The true arm intentionally differs from the model in the controller (see [`ModelError`](crate::ModelError)).
 use jtc_core::{Config, Friction, Parameters};
@@ -23,22 +23,22 @@ const STOP_DAMPING: f64 = 200.0;
 const BRAKE_DECELERATION: f64 = 40.0;
 /// Inertia that represents a closed brake, kg·m².
 const BRAKED: f64 = 1e9;
-/// Smallest inertia of a rotor, kg·m². A lighter rotor would cross its whole range within a few steps.
+/// Smallest inertia of a rotor, kg·m². A rotor with less inertia would cross its whole range within a few steps.
 const LIGHTEST: f64 = 0.02;
-/// Largest rotation of a joint in a sub-step, rad. A joint with a speed of 100 rad/s or more needs several sub-steps
-/// per millisecond.
+/// Largest rotation of a joint in a sub-step, rad. A joint with a speed of 100 rad/s or more needs several sub-steps per
+/// millisecond.
 const LARGEST_TURN: f64 = 0.1;
-/// Maximum number of sub-steps per step that a high speed requires.
+/// Maximum number of sub-steps per step for fast joints.
 const MOST_SUBSTEPS: f64 = 32.0;
-/// Largest phase angle of a vibration at a wall or gear in one sub-step, rad. The next constant is the largest decay of
-/// the vibration in one sub-step.
+/// Largest phase angle of a vibration at a wall or gear in one sub-step, rad. `LARGEST_DECAY` is the largest decay of the
+/// vibration in one sub-step.
 const LARGEST_PHASE: f64 = 0.5;
 const LARGEST_DECAY: f64 = 1.0;
-/// Maximum number of sub-steps per step that walls and gears require. If walls require more sub-steps, the damping of
-/// the walls is reduced.
+/// Maximum number of sub-steps per step for walls and gears. If walls require more sub-steps, the simulation reduces the
+/// damping of the walls.
 const MOST_STIFF_SUBSTEPS: f64 = 64.0;
-/// Decay in one sub-step above which the damping is reduced. The Runge-Kutta method is unstable for a decay of 2.7 or
-/// more.
+/// Decay in one sub-step above which the simulation reduces the damping. The Runge-Kutta method is unstable for a decay of 2.7
+/// or more.
 const UNSTABLE_DECAY: f64 = 2.0;
 /// Time between two updates of the temperatures, s.
 const WARMING: f64 = 0.05;
@@ -60,7 +60,7 @@ pub struct SimArm {
     pub rotor_inertia: JointVec,
     /// Friction per joint.
     pub friction: [SimFriction; JOINTS],
-    /// Speed up to which friction polynomials are valid, rad/s. Above this speed, friction continues as a straight line
+    /// Speed up to which friction polynomials are valid, rad/s. Above this speed, the friction continues as a straight line
     /// that does not decrease.
     pub polynomial_speed: JointVec,
     /// Friction around standstill.
@@ -70,14 +70,14 @@ pub struct SimArm {
     /// Elasticity of the gears, which are rigid by default. An elastic gear transfers 0.01 kg·m² of the rotor's inertia
     /// to its link.
     pub gears: [Gear; JOINTS],
-    /// Largest torque of the drive, N·m. The drive limits larger torque commands and does not report this.
+    /// Largest torque of the drive, N·m. The drive limits larger torque commands, but does not report this limitation.
     pub torque_ceiling: JointVec,
-    /// Temperature of the air and of the bearings at the start, °C.
+    /// Temperature of the air, and of the bearings at the start, °C.
     pub ambient: f64,
 }
 
 impl SimArm {
-    /// Creates the arm with these settings and parameters, and with end stops 0.04 rad outside the position limits.
+    /// Creates the arm from the controller's settings and parameters, with end stops 0.04 rad outside the position limits.
     pub fn new(config: &Config, parameters: &Parameters) -> Self {
         let friction = match &parameters.friction {
             Friction::Polynomial(c) => core::array::from_fn(|j| SimFriction::Polynomial(c[j])),
@@ -88,7 +88,7 @@ impl SimArm {
             model: parameters.model,
             payload: config.payload,
             gravity: config.gravity,
-            // A real drive always has a rotor, even if the arm file contains no inertia for this rotor.
+            // A real drive always has a rotor, even if the arm file contains no rotor inertia for it.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
             // Friction was measured only within the velocity limits of the arm.
@@ -112,7 +112,7 @@ impl Default for SimArm {
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
-    /// Inertias without carried payloads. The next field includes the carried payloads.
+    /// Inertias without carried payloads. `dynamics` includes the carried payloads.
     bare: LinkInertias,
     carried: Vec<Payload>,
     contacts: Vec<Contact>,
@@ -122,19 +122,19 @@ pub struct Arm {
     friction: FrictionTorques,
     /// Deflection of the bristles in the friction model for each joint, rad.
     bristles: JointVec,
-    /// Friction heat since the last update of the temperatures, J. The next field is the time since that update, s.
+    /// Friction heat since the last update of the temperatures, J. `since` is the time since that update, s.
     heat: JointVec,
     since: f64,
-    /// Position, rad.
+    /// Position of each joint, rad.
     pub q: JointVec,
-    /// Velocity, rad/s.
+    /// Velocity of each joint, rad/s.
     pub qd: JointVec,
-    /// Position of the motors, converted to the joint side of the gears, rad. If the gears are rigid, this is the
-    /// position of the links.
+    /// Position of the motors, converted to the joint side of the gears, rad. If the gears are rigid, these are the positions
+    /// of the links.
     pub motor: JointVec,
     /// Velocity of the motors, converted to the joint side of the gears, rad/s.
     pub motor_speed: JointVec,
-    /// Bearing temperature, °C.
+    /// Bearing temperature of each joint, °C.
     pub temperature: JointVec,
     /// `true` for joints with a closed brake.
     pub braked: [bool; JOINTS],
@@ -147,7 +147,7 @@ impl Arm {
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
         let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
         let elastic = parts.gears.iter().any(Gear::is_elastic);
-        // The springs of the gears already carry their loads, so that the links are at rest.
+        // The springs of the gears are already deflected by their loads, so that the links are at rest.
         let load = dynamics.gravity_torque(&q);
         let motor = core::array::from_fn(|j| {
             let gear = &parts.gears[j];
@@ -192,7 +192,7 @@ impl Arm {
         self.step_pushed(tau, &[0.0; JOINTS], dt);
     }
 
-    /// Like [`step`](Self::step), with additional torques `outside` (N·m) on the links.
+    /// Like [`step`](Self::step), with additional torques `outside` (N·m) that act on the links.
     pub fn step_pushed(&mut self, tau: &JointVec, outside: &JointVec, dt: f64) {
         let fastest = self.qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut substeps = (fastest * dt / LARGEST_TURN).ceil().clamp(1.0, MOST_SUBSTEPS);
@@ -213,14 +213,14 @@ impl Arm {
         }
     }
 
-    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share of
-    /// the walls' damping for which this number is sufficient.
+    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share of the
+    /// walls' damping for which this number of sub-steps is sufficient.
     fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
         let (mut square, mut decay) = (0.0, 0.0);
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));
         for (j, gear) in self.parts.gears.iter().enumerate() {
             if gear.is_elastic() {
-                // Uses the smallest possible inertia on both sides.
+                // The computation uses the smallest possible inertia on both sides of the gear.
                 let mobility = 1.0 / OUTPUT + 1.0 / (link[j] - OUTPUT);
                 square = f64::max(square, gear.stiffness * mobility);
                 decay = f64::max(decay, gear.damping * mobility);
@@ -282,7 +282,7 @@ impl Arm {
         let of = |payload: &Payload| {
             Dynamics::with_payload(&self.parts.model, self.parts.gravity, payload).inertias().numbers()
         };
-        // The inertias are linear in the bodies, so they can be added.
+        // The inertial parameters are linear in the bodies, so they can be added.
         let (mut sum, none) = (self.bare.numbers(), of(&Payload::NONE));
         for payload in payloads {
             let with = of(payload);
@@ -296,9 +296,9 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Returns the inertia of the rotors for a step of `dt`, kg·m². The inertia is increased if a light rotor, with
-    /// steep friction or at an end stop, would have a time constant below `dt`. Fourth-order Runge-Kutta is unstable if
-    /// `dt` is at least 2.7 time constants.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m². A light rotor with steep friction or at an end stop may
+    /// have a time constant below `dt`. The inertia of such a rotor is increased, because fourth-order Runge-Kutta is unstable
+    /// if `dt` is at least 2.7 time constants.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -315,7 +315,8 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Updates temperatures and friction, which change so slowly that an update in every millisecond is not necessary.
+    /// Updates temperatures and friction. Temperatures and friction change so slowly that an update in every millisecond is not
+    /// necessary.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;
@@ -326,8 +327,8 @@ impl Arm {
         self.refresh_friction();
     }
 
-    /// Integrates with the classical fourth-order Runge-Kutta method. The bristles of the friction model are too stiff
-    /// for this method. [`FrictionTorques::bend`] moves the bristles with the velocities of the stages.
+    /// Integrates with the classical fourth-order Runge-Kutta method. The bristles of the friction model are too stiff for this
+    /// method. [`FrictionTorques::bend`] moves the bristles with the velocities of the stages.
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;
@@ -389,13 +390,13 @@ impl Arm {
         }
     }
 
-    /// Updates the friction curves for the current temperature.
+    /// Updates the friction curves to the current temperature.
     fn refresh_friction(&mut self) {
         let scale = core::array::from_fn(|j| self.friction_scale[j] * self.friction_fault[j]);
         self.friction.warm(&self.temperature, &scale);
     }
 
-    /// Applies a change of `friction_fault` at once.
+    /// Updates the friction after a change of `friction_fault`.
     pub fn friction_changed(&mut self) {
         self.friction.forget_tables();
         self.refresh_friction();

@@ -14,18 +14,18 @@ use jtc_wire::{
 
 /// Number of the serial line of the host. The simulation has only one serial line.
 const LINE: usize = 0;
-/// Maximum number of bytes that wait for the parser. The number is the size of the ring buffer that the DMA of the
-/// board fills.
+/// Maximum number of bytes that wait for the parser. The number of bytes is the size of the ring buffer that the DMA of
+/// the board fills.
 const RING: usize = 32 * 1024;
 /// Length of a tick, µs.
 const TICK_US: u32 = 1000;
 /// Maximum number of bytes that are passed to the parser at once.
 const CHUNK: usize = 4096;
 
-/// Number of ticks for storing an arm, equal to the erase time of a flash sector.
+/// Number of ticks that storing an arm takes, equal to the erase time of a flash sector.
 const STORE_MS: u32 = 2_000;
 
-/// Number of polls of the parser between two ticks, which represents a processor with free time.
+/// Number of polls of the parser between two ticks. The polls represent a processor with free time.
 const POLLS: usize = 64;
 
 /// A host frame that the controller executed.
@@ -51,12 +51,12 @@ impl From<&LinkEvent<'_>> for Worked {
     }
 }
 
-/// Inputs of a tick, except bytes from the host.
+/// Inputs of a tick, except the bytes from the host.
 #[derive(Clone, Copy, Debug)]
 pub struct Pins<'a> {
-    /// Answers of the nodes.
+    /// Answers of the nodes on the joint bus.
     pub bus: &'a [Frame],
-    /// State of the bus.
+    /// State of the joint bus.
     pub bus_state: BusState,
     /// Level of the safety input.
     pub safety_input: bool,
@@ -69,7 +69,7 @@ pub struct Pins<'a> {
 struct Memory {
     arm: Option<Vec<u8>>,
     sequence: u32,
-    /// Image that is being written, and the number of ticks until the image is stored.
+    /// Arm image that is being written, and the number of ticks until it is stored.
     writing: Option<(Vec<u8>, u32)>,
 }
 
@@ -88,7 +88,7 @@ pub struct Board {
     missed: u32,
     /// Frames that the tick has executed.
     pub worked: Vec<Worked>,
-    /// Number of bytes from the host that were lost because the ring was full.
+    /// Number of bytes from the host that were lost because the ring buffer was full.
     pub lost_bytes: u64,
     /// Number of resets by the watchdog.
     pub watchdog_resets: u32,
@@ -108,7 +108,7 @@ fn recorder_memory() -> [Vec<Block>; 3] {
 }
 
 impl Board {
-    /// Creates a board that was just switched on. The non-volatile memory of the board contains this arm.
+    /// Creates a board that was just switched on. The non-volatile memory of the board contains `arm`.
     pub fn new(config: Config, arm: Option<Vec<u8>>, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
         let mut board = Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
@@ -159,7 +159,7 @@ impl Board {
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
-        // The recorder's memory keeps its contents. The recorder is informed of a reset by the watchdog as a failure.
+        // The recorder's memory keeps its contents. The recorder treats a reset by the watchdog as a failure.
         self.recorder = Recorder::new(recorder.into_memory(), resets > 0);
         self.boot();
     }
@@ -174,7 +174,8 @@ impl Board {
         self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))
     }
 
-    /// Returns the last tick's answer to an extension request, if the outputs of that tick had `answer_line` set.
+    /// Returns the answer to an extension request from the last tick. The answer is valid if the outputs of that tick had
+    /// `answer_line` set.
     pub fn answer_frame(&self) -> &[u8] {
         self.controller.answer_frame()
     }
@@ -206,12 +207,12 @@ impl Board {
         self.recorder.clear();
     }
 
-    /// Returns the controller, for a replay of a recording.
+    /// Returns the controller. A replay of a recording needs this controller.
     pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
         &self.controller
     }
 
-    /// Returns the status of the last tick, if the outputs of that tick had `status` set.
+    /// Returns the status of the last tick. The status is valid if the outputs of that tick had `status` set.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         self.controller.status_frame()
     }
@@ -221,19 +222,19 @@ impl Board {
         &self.telemetry
     }
 
-    /// Handles bytes that have arrived by `now_us`, between ticks. Searches the bytes for urgent commands and passes
-    /// them to the parser.
+    /// Handles bytes that have arrived by `now_us`, between ticks. Searches the bytes for urgent commands, and passes the
+    /// bytes to the parser.
     pub fn receive(&mut self, now_us: u64, bytes: &[u8]) {
         self.watch.scan(LINE, now_us, bytes);
         self.ring.extend(bytes);
         if self.ring.len() > RING {
-            // For too long, the host has sent more bytes than the controller can execute. The waiting bytes are lost,
-            // but a Stop in these bytes is still executed.
+            // The host has sent more bytes than the controller can execute, for too long. The waiting bytes are lost, but
+            // a Stop in these bytes is still executed.
             self.lost_bytes += self.ring.len() as u64;
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // The parser accepts bytes while a frame is executed, as on the real board. If the bytes had to wait, the
+        // The parser accepts bytes while a frame is executed, as on the real board. If bytes waited during this time, the
         // parser would detect a gap.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
@@ -258,7 +259,7 @@ impl Board {
         moved
     }
 
-    /// Skips a tick. Returns `true` if the watchdog resets the board because of this event.
+    /// Skips a tick. Returns `true` if the watchdog resets the board because of the missed tick.
     pub fn miss(&mut self) -> bool {
         self.worked.clear();
         self.missed += 1;

@@ -22,22 +22,23 @@ const BUS_OFF: u16 = 255;
 /// Recovery time of a controller from bus-off, 128 times 11 recessive bits, µs.
 const RECOVERY_US: u32 = 1408;
 
-/// Bit that is set in the identifier of an answer.
+/// Bit in the identifier that marks an answer.
 const RESPONSE: u16 = 0x200;
-/// Largest number of waiting frames from nodes outside the simulation.
+/// Largest number of queued frames from nodes outside the simulation.
 const FOREIGN_MAX: usize = 64;
 
 /// Largest number of bytes of a frame on this bus.
 const LEN_MAX: usize = 24;
 
-/// Returns the duration of a CAN FD frame with `len` bytes (up to 24) at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
+/// Returns the duration of a CAN FD frame with `len` bytes (up to 24) at 1 and 5 Mbit/s, µs. The duration includes the usual
+/// share of stuff bits.
 pub const fn frame_us(len: usize) -> u32 {
     const TIMES: [u32; LEN_MAX + 1] = {
         let mut times = [0; LEN_MAX + 1];
         let mut len = 0;
         while len <= LEN_MAX {
-            // 31 bits are sent at the nominal rate. ESI, DLC and data are sent at five times this rate, with one stuff
-            // bit per ten bits. The stuff count and the CRC follow the data.
+            // A frame has 31 bits at the nominal rate. ESI, DLC and data are sent at five times this rate, with one stuff bit
+            // per ten bits. The stuff count and the CRC follow the data.
             let crc = if len > 16 { 31 } else { 27 };
             let tenths = (5 + 8 * len as u32) * 11 + crc * 10;
             times[len] = 31 + (tenths + 25) / 50;
@@ -57,7 +58,7 @@ pub struct BusFault {
     pub corrupted: f64,
     /// Share of answers that reach the controller with changed contents, 0..1.
     pub garbled: f64,
-    /// `true` if the bus cable of the controller is cut. In this case the controller receives no frames, and no node
+    /// `true` if the bus cable of the controller is cut. With a cut cable, the controller receives no frames, and no node
     /// receives its frames.
     pub cut: bool,
     /// `true` if the controller is forced to stay bus-off.
@@ -88,7 +89,7 @@ pub struct BusStatistics {
 pub struct TimedFrame {
     /// Time from the start of the tick to the end of the frame, µs.
     pub end_us: u32,
-    /// The frame.
+    /// Frame on the joint bus.
     pub frame: Frame,
 }
 
@@ -114,14 +115,14 @@ pub struct Bus {
     pub jitter: Jitter,
     /// `true` if another device on the bus, such as an analyser, also acknowledges frames.
     pub monitored: bool,
-    /// Current faults.
+    /// Current faults of the bus.
     pub fault: BusFault,
     /// Counters of the bus since the start.
     pub statistics: BusStatistics,
 }
 
 impl Bus {
-    /// Creates a bus for drives with these scales of values.
+    /// Creates a bus for drives with the value scales `scales`.
     pub fn new(scales: [Scale; JOINTS], seed: u64) -> Self {
         Self {
             scales,
@@ -138,7 +139,7 @@ impl Bus {
         }
     }
 
-    /// Returns the frames of the last tick with their times.
+    /// Returns the frames of the last tick with the times at which they ended.
     pub fn frames(&self) -> &[TimedFrame] {
         &self.log
     }
@@ -185,7 +186,7 @@ impl Bus {
         BusState { acknowledged, bus_off: self.off_us.is_some() }
     }
 
-    /// Counts down the bus-off time. Returns `true` while the controller is bus-off.
+    /// Counts down the recovery time from bus-off. Returns `true` while the controller is bus-off.
     fn recovering(&mut self) -> bool {
         if self.fault.bus_off {
             if self.off_us.is_none() {
@@ -224,7 +225,7 @@ impl Bus {
         true
     }
 
-    /// Passes a request to every node, and queues the answers.
+    /// Passes a request to every node, and queues the nodes' answers.
     fn reach_nodes(&mut self, now_us: u64, request: &NodeRequest, nodes: &mut Nodes, time: u32) {
         for node in 0..NODES {
             if self.fault.lost > 0.0 && self.rng.f64() < self.fault.lost {
@@ -238,7 +239,7 @@ impl Bus {
         }
     }
 
-    /// Transmits a frame, and repeats it after each error. Returns `false` if the time was too short for the frame.
+    /// Transmits a frame, and repeats the frame after each error. Returns `false` if the tick has too little time for the frame.
     fn carry(&mut self, frame: &Frame, time: &mut u32, from_controller: bool) -> bool {
         let length = frame_us(frame.data().len());
         while self.fault.corrupted > 0.0 && self.rng.f64() < self.fault.corrupted {
@@ -271,8 +272,8 @@ impl Bus {
         true
     }
 
-    /// Transmits the answers in the order of arbitration. When the bus is free, the ready answer with the lowest
-    /// identifier is transmitted next.
+    /// Transmits the answers in the order of arbitration. When the bus is free, it transmits the ready answer with the lowest
+    /// identifier.
     fn answers(&mut self, time: &mut u32, received: &mut Vec<Frame>) {
         while !self.pending.is_empty() && *time < TICK_US {
             let ready = |p: &Pending| p.ready_us <= *time;
@@ -300,8 +301,8 @@ impl Bus {
         }
     }
 
-    /// Transmits as many frames of nodes outside the simulation as the time in the tick permits. The controller
-    /// receives answers, and the nodes receive all other frames.
+    /// Transmits as many frames of nodes outside the simulation as the time in the tick permits. The controller receives
+    /// answers, and the nodes receive all other frames.
     fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
         while let Some(frame) = self.foreign.front().copied() {
             if !self.carry(&frame, time, false) {
@@ -316,7 +317,7 @@ impl Bus {
         }
     }
 
-    /// Queues a frame from a node outside this simulation. Returns `false` if too many frames are already waiting.
+    /// Queues a frame from a node outside this simulation. Returns `false` if the queue is full.
     pub fn put(&mut self, frame: Frame) -> bool {
         let room = self.foreign.len() < FOREIGN_MAX;
         if room {
@@ -344,7 +345,7 @@ impl Bus {
         Frame::new(id, &data).unwrap_or(frame)
     }
 
-    /// Drops all waiting frames, because the controller was reset.
+    /// Resets the error counter and ends bus-off, because the controller was reset.
     pub fn clear(&mut self) {
         self.errors = 0;
         self.off_us = None;

@@ -6,8 +6,8 @@ use crate::arm::SimArm;
 use crate::drive::DriveConfig;
 use crate::faults::FaultPlan;
 
-/// Over-speed limit of a drive divided by the velocity limit of its joint. For the default arm, the result is the limit
-/// of real drives.
+/// Over-speed limit of a drive divided by the velocity limit of its joint. For the default arm, this quotient gives the
+/// over-speed limit of real drives.
 const OVER_SPEED: f64 = 1.2;
 
 /// Distance of the start position from the nearest limit, rad, for a joint that cannot reach 0.
@@ -29,7 +29,7 @@ pub struct ModelError {
 }
 
 impl ModelError {
-    /// No deviation, so that the model in the controller is exact.
+    /// No deviation: the model in the controller is exact.
     pub const NONE: Self = Self { mass: 0.0, friction: 0.0, mass_factors: None, friction_factors: None };
 }
 
@@ -59,12 +59,13 @@ impl ModelError {
 /// Support of the arm while its drives are not enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
-    /// No support, so that a joint without torque falls.
+    /// The arm has no support, so a joint without torque falls.
     None,
-    /// Stand that supports the arm until all joints are enabled for the first time. After that, the arm has no support.
+    /// A stand supports the arm until all joints are enabled for the first time. After the first enable, the arm has no
+    /// support.
     Stand,
-    /// Holding brakes; each is open only while the drive of its joint is enabled. Real drives have no brakes. With
-    /// brakes, the simulated arm is in a usable pose after an error.
+    /// Each joint has a holding brake, which is open only while the drive of the joint is enabled. Real drives have no
+    /// brakes. With brakes, the simulated arm is in a usable pose after an error.
     Brakes,
 }
 
@@ -87,16 +88,17 @@ pub struct SimConfig {
     pub drives: [DriveConfig; JOINTS],
     /// `true` if a gripper is on the bus.
     pub gripper: bool,
-    /// Joints (bit n = joint n) whose drive is not simulated, because it is on another bus (see
+    /// Bit mask of joints (bit n = joint n) whose drive is not simulated, because the drive is on another bus (see
     /// [`BusTap`](crate::BusTap)).
     pub absent_drives: u8,
-    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node does this.
+    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node acknowledges
+    /// them.
     pub bus_monitored: bool,
     /// Largest delay between the end of an answer on the bus and its arrival at the controller, ticks. For each
-    /// millisecond, the simulation draws a delay from the seed. The order of the answers does not change. If the value
-    /// is 0, answers arrive in the next tick.
+    /// millisecond, the simulation draws a delay from the seed. The delays do not change the order of the answers. If
+    /// the value is 0, answers arrive in the next tick.
     pub answer_jitter_ms: u8,
-    /// Bit rate of the serial line, bit/s. If the rate is `None`, transmission takes no time.
+    /// Bit rate of the serial line, bit/s. With `None`, transmission takes no time.
     pub baud: Option<u32>,
     /// Inter-byte timeout, µs. A frame ends after this time of silence on the serial line (J-03).
     pub inter_byte_timeout_us: u32,
@@ -149,8 +151,8 @@ impl SimConfig {
     }
 }
 
-/// Returns the angle nearest to 0 that is not too close to the limits of a joint, rad. Many arms have joints that
-/// cannot reach 0.
+/// Returns the start angle of a joint, rad: the angle nearest to 0 that is not too close to the limits of the joint.
+/// Many arms have joints that cannot reach 0.
 fn near_zero(joint: &JointConfig) -> f64 {
     let (low, high) = (joint.position_min, joint.position_max);
     let distance = END_DISTANCE.min(0.5 * (high - low));

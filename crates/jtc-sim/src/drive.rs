@@ -1,5 +1,5 @@
-//! Drive of a joint with the properties of real drives. The properties are a slow first enable, a coarse encoder, a
-//! delayed speed, and no timeout of the torque.
+//! Drive of a joint with the properties of real drives: a slow first enable, a coarse encoder, a delayed speed, and no
+//! timeout of the torque.
 use jtc_bus::{NodeState, config as config_bit, error as error_bit};
 
 use crate::inbox::Inbox;
@@ -22,9 +22,9 @@ pub struct Drive {
     ceiling: f64,
     states: States,
     encoders: Encoders,
-    /// Number of ticks until the drive has booted.
+    /// Number of ticks until the drive has finished booting.
     booting: u32,
-    /// `true` if a configuration was accepted since the last reset.
+    /// `true` if the drive has accepted a configuration since its last reset.
     configured: bool,
     mode: u8,
     bits: u8,
@@ -73,7 +73,7 @@ impl Drive {
         drive
     }
 
-    /// Restarts the processor, so that configuration and motor alignment are lost.
+    /// Restarts the processor of the drive. The configuration and the motor alignment are lost.
     pub fn reset(&mut self) {
         self.states = States::new();
         self.booting = self.config.boot_ms;
@@ -96,12 +96,12 @@ impl Drive {
         }
     }
 
-    /// Returns the state byte.
+    /// Returns the state byte of the drive.
     pub fn state(&self) -> NodeState {
         self.states.state()
     }
 
-    /// Returns the torque on the joint, N·m.
+    /// Returns the torque that the drive applies to the joint, N·m.
     pub fn torque(&self) -> f64 {
         self.config.delivers * self.torque
     }
@@ -168,7 +168,7 @@ impl Drive {
             self.errors |= error_bit::HARDWARE;
         }
         if self.errors != 0 && !self.states.reacting() {
-            // The remainder of the fault reaction is executed in the next ticks.
+            // The drive executes the remaining steps of the fault reaction in the next ticks.
             self.states.enter(NodeState::FAULT_REACTION, &self.config);
         }
     }

@@ -168,7 +168,7 @@ fn outside_the_working_area_only_inward_torque_acts() {
 fn j16_safety_line_drops_to_ready_without_an_error() {
     let mut drive = enabled();
     drive.fault.safety_line = true;
-    // The state changes in one tick, without a transition.
+    // The drive must change its state in one tick, without a transition.
     run(&mut drive, 1, 0.5);
     assert_eq!(drive.state(), NodeState::READY);
     let report = command(&mut drive, 0.0);
@@ -215,7 +215,7 @@ fn a_request_of_zero_cancels_a_pending_one() {
     change(&mut drive, NodeState::START);
     run(&mut drive, 5, 0.5);
     assert_eq!(drive.state(), NodeState::INIT);
-    // A completed transition also clears a pending request.
+    // A completed transition must also clear a pending request.
     change(&mut drive, NodeState::READY);
     run(&mut drive, 1, 0.5);
     change(&mut drive, NodeState::ENABLED);

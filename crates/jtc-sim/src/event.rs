@@ -43,12 +43,12 @@ pub enum Event {
     },
     /// A host frame was processed.
     Frame {
-        /// Type byte.
+        /// Type byte of the frame.
         frame_type: u8,
     },
-    /// Bytes that are not a valid frame arrived.
+    /// The controller received bytes that are not a valid frame.
     BadFrame {
-        /// Reason.
+        /// Reason why the frame is invalid.
         status: FrameStatus,
     },
     /// A fault begins.
@@ -78,12 +78,12 @@ impl fmt::Display for Event {
     }
 }
 
-/// An event with its time.
+/// An event with the time at which it occurred.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogEntry {
     /// Time since the start of the simulation, µs.
     pub time_us: u64,
-    /// The event.
+    /// Event of the simulation.
     pub event: Event,
 }
 

@@ -75,12 +75,14 @@ pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
-/// Largest coordinate of a position in the base frame, and of the centre of mass of a load in the flange frame, m.
+/// Largest coordinate of a position in the base frame, m. The limit also applies to the centre of mass of a load in the flange
+/// frame.
 const PLACE_MAX: f64 = 10.0;
 const COM_MAX: f64 = 2.0;
 /// Largest mass of a load, kg.
 const MASS_MAX: f64 = 100.0;
-/// Range of the stiffness, and largest damping, of walls, in N/m and N·s/m at the flange, or in N·m/rad and N·m·s/rad at a joint.
+/// Range of the stiffness, and largest damping, of walls. The units are N/m and N·s/m at the flange, and N·m/rad and N·m·s/rad at
+/// a joint.
 const STIFFNESS: (f64, f64) = (1.0, 1e6);
 const DAMPING_MAX: f64 = 1e4;
 const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
@@ -98,7 +100,7 @@ impl FaultPlan {
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
     ) -> Result<Self, FaultFileError> {
         let syntax = |e: toml::de::Error| FaultFileError::Syntax(e.to_string());
-        // The format is checked first, because other formats may have other keys.
+        // The format is checked first, because files of other formats may have other keys.
         let Head { format } = toml::from_str(text).map_err(syntax)?;
         if format != Some(FORMAT) {
             return Err(FaultFileError::Format { found: format });
@@ -303,7 +305,7 @@ impl Reader<'_> {
     }
 
     fn in_range(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<f64, FaultFileError> {
-        // The condition is also false for NaN.
+        // The comparison is also false for NaN.
         if value >= low && value <= high {
             Ok(value)
         } else {
@@ -311,7 +313,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reports keys that were not used. Such keys are mistakes in the file.
+    /// Reports keys that were not used. Unused keys are mistakes in the fault file.
     fn nothing_left(&self) -> Result<(), FaultFileError> {
         let e = &self.entry;
         let keys = [

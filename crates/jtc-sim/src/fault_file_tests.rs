@@ -1,4 +1,4 @@
-//! Tests of fault files: accepted files and reported mistakes.
+//! Tests of fault files: accepted files, and mistakes that the reader reports.
 use proptest::prelude::*;
 
 use super::*;
@@ -45,7 +45,7 @@ fn every_kind_is_read_by_its_own_name() {
         let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n\
                     position_m = [0, 0, 1]\nnormal = [0, 0, 1]\nstiffness_n_m = 1e4\ndamping_ns_m = 10\nside = \"above\"\n\
                     stiffness_nm_rad = 1e4\ndamping_nms_rad = 10\nmass_kg = 2\ncom_m = [0, 0, 0.1]\n";
-        // Removes unnecessary keys until the file is accepted. The error messages contain the keys.
+        // The test removes unnecessary keys until the file is accepted. The error messages contain the keys.
         let mut keys: Vec<&str> = keys.lines().collect();
         let fault = loop {
             let text = format!("format = 2\n[[fault]]\nkind = \"{kind}\"\nat_s = 1\n{}", keys.join("\n"));
@@ -147,7 +147,7 @@ fn files_that_counted_from_0_are_refused_with_what_to_change() {
     }
     let message = FaultPlan::from_toml(&format!("format = 1\n{old}")).unwrap_err().to_string();
     assert!(message.contains("format = 1 is not supported"), "{message}");
-    // An unknown format is rejected, with any keys.
+    // A file with an unknown format is rejected, independent of its keys.
     let later = "format = 3\nepoch = \"noon\"\n[[fault]]\nkind = \"push\"\nlimb = 1";
     let message = FaultPlan::from_toml(later).unwrap_err().to_string();
     assert!(message.contains("format = 3 is not supported"), "{message}");

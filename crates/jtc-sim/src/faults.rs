@@ -43,65 +43,65 @@ fault_kinds! {
     };
     /// The motor control reports faults.
     MotorFault "motor-fault" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
         /// Bits of the fault byte.
         bits: u8,
     };
     /// The gate driver reports a fault.
     HardwareFault "hardware-fault" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
     };
     /// A drive enters its fault state once, without an error bit.
     FaultState "fault-state" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
     };
     /// A drive answers requests for another state, but stays in its current state.
     IgnoresState "ignores-state" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
     };
     /// The encoder reading has an offset.
     EncoderJump "encoder-jump" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
         /// Offset of the position, rad.
         rad: f64,
     };
     /// A drive reports its position as inaccurate.
     NotAccurate "not-accurate" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
     };
     /// The friction of a joint is multiplied by a factor.
     Friction "friction" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
         /// Factor of the true friction.
         factor: f64,
     };
-    /// The bearing of a joint has this temperature.
+    /// The bearing of a joint keeps this temperature.
     Temperature "temperature" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
         /// Temperature, °C.
         celsius: f64,
     };
-    /// Receptions fail.
+    /// Receivers on the joint bus miss frames.
     FramesLost "frames-lost" {
-        /// Probability of a failure for each reception, 0..1.
+        /// Probability that a receiver misses a frame, 0..1.
         probability: f64,
     };
     /// Frames are destroyed on the bus and repeated.
     FramesCorrupted "frames-corrupted" {
-        /// Probability for each frame, 0..1.
+        /// Probability that a frame is destroyed, 0..1.
         probability: f64,
     };
     /// Answers reach the controller with changed contents.
     FramesGarbled "frames-garbled" {
-        /// Probability for each answer, 0..1.
+        /// Probability that an answer is changed, 0..1.
         probability: f64,
     };
     /// The controller is forced to stay bus-off.
@@ -117,12 +117,12 @@ fault_kinds! {
     };
     /// Bytes from the host are lost.
     SerialLost "serial-lost" {
-        /// Probability for each byte, 0..1.
+        /// Probability that a byte is lost, 0..1.
         probability: f64,
     };
     /// Bits of bytes from the host are flipped.
     SerialFlipped "serial-flipped" {
-        /// Share of the bytes, 0..1.
+        /// Probability that one bit of a byte is flipped, 0..1, for each byte.
         probability: f64,
     };
     /// Bytes from the host are delayed until the fault ends.
@@ -131,16 +131,16 @@ fault_kinds! {
     TickOverrun "tick-overrun";
     /// A person pushes a joint.
     Push "push" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
-        /// Torque, N·m.
+        /// Torque of the push, N·m.
         torque: f64,
     };
     /// The flange touches a wall; see [`Wall::Plane`].
     Wall "wall" {
-        /// Point of the surface in the base frame, m.
+        /// Point of the wall's surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall, as a vector in the base frame. The length of the vector must not be 0.
+        /// Direction out of the wall, as a vector in the base frame. The length of this normal vector must not be 0.
         normal: [f64; 3],
         /// Stiffness, N/m.
         stiffness: f64,
@@ -149,11 +149,11 @@ fault_kinds! {
     };
     /// A joint touches a wall; see [`Wall::Joint`].
     JointWall "joint-wall" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
         /// Angle at which the wall begins, rad.
         rad: f64,
-        /// Side of the angle that the wall occupies.
+        /// Side of the angle on which the wall is.
         side: Side,
         /// Stiffness, N·m/rad.
         stiffness: f64,
@@ -162,14 +162,14 @@ fault_kinds! {
     };
     /// The arm has picked up a point mass.
     Payload "payload" {
-        /// Mass, kg.
+        /// Mass of the point mass, kg.
         mass: f64,
         /// Centre of mass in the flange frame, m.
         com: [f64; 3],
     };
     /// The brake of a joint stays closed while its drive is enabled.
     BrakeClosed "brake-closed" {
-        /// Joint.
+        /// Joint that the fault affects.
         joint: Joint,
     };
     /// A hand guides the arm in Teaching.
@@ -241,9 +241,9 @@ impl FaultKind {
 /// Condition that starts a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// The fault starts at this time after the start of the simulation, ms.
+    /// The fault starts this time after the start of the simulation, ms.
     At(u64),
-    /// The fault starts at this time after the controller first enters a state, ms.
+    /// The fault starts this time after the controller first enters the state, ms.
     InState(ControllerState, u64),
     /// The fault starts when the point index of the trajectory reaches this value in Operate.
     AtPoint(u32),
@@ -256,8 +256,8 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Condition that starts the fault.
     pub trigger: Trigger,
-    /// Duration, ms. The value 0 is treated as 1, because faults begin and end only at whole milliseconds. If it is
-    /// `None`, the fault never ends.
+    /// Duration of the fault, ms. A duration of 0 is treated as 1, because faults begin and end only at whole
+    /// milliseconds. With `None`, the fault never ends.
     pub duration_ms: Option<u64>,
 }
 

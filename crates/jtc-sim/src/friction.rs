@@ -1,28 +1,29 @@
-//! Friction of the simulated joints, as a function of speed and temperature, and around standstill.
+//! Friction of the simulated joints as a function of speed and temperature, including the friction around standstill.
 //!
-//! In motion, both friction models follow one measured curve (polynomial or table). Around zero speed, the models
-//! differ. [`FrictionModel::LuGre`] sticks, breaks away and slips like real gears. In [`FrictionModel::Smooth`]
-//! friction changes its sign over a small range of speed, so the model can neither stick nor hunt.
+//! In motion, both friction models follow one measured curve (polynomial or table). The models differ around zero speed.
+//! [`FrictionModel::LuGre`] sticks, breaks away and slips like real gears. In [`FrictionModel::Smooth`] friction changes its sign over
+//! a small range of speed, so the model can neither stick nor hunt.
 //!
-//! Above its range of speeds, a curve continues as a straight line that does not decrease. An extrapolated cubic would
+//! Above the measured speeds, the curve continues as a straight line that does not decrease. An extrapolated cubic polynomial would
 //! drive the joint (c3 < 0), or become too steep for the integration steps.
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
 /// Largest natural frequency of a rotor on its friction bristles that steps of 1 ms integrate accurately, rad/s.
 const STIFFEST: f64 = 800.0;
-/// Lower bound of the friction level in divisions, N·m.
+/// Smallest friction level that the code uses as a divisor, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
 
 /// True friction of a joint as a function of speed, without the effects around standstill.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum SimFriction {
-    /// No friction.
+    /// The joint has no friction.
     Frictionless,
-    /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = sign(v), up to [`SimArm::polynomial_speed`](crate::SimArm).
+    /// The friction torque is (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = sign(v), up to
+    /// [`SimArm::polynomial_speed`](crate::SimArm).
     Polynomial([f64; 6]),
-    /// Measured table.
+    /// The friction torque is interpolated in a measured table.
     Table(TableOf<f32>),
 }
 
@@ -45,7 +46,7 @@ impl Default for FrictionModel {
     }
 }
 
-/// This is the LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of
+/// The friction model is the LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of
 /// mean deflection z (rad), with
 ///
 /// - dz/dt = v − σ0·|v|/g(v)·z,
@@ -82,18 +83,18 @@ impl Default for LuGre {
 pub(crate) struct FrictionTorques {
     model: FrictionModel,
     curves: [SimFriction; JOINTS],
-    /// Polynomial coefficients, with one row per power. The coefficients are zero for joints with a table.
+    /// Polynomial coefficients, with one row per power. The coefficients are zero for joints with a friction table.
     k: [JointVec; 4],
-    /// Speed at which the straight line begins, rad/s. The next field is the slope of this line, N·m·s/rad. For joints with a table,
-    /// the speed and the slope are zero.
+    /// Speed at which the straight line of the curve begins, rad/s. The next field is the slope of this straight line, N·m·s/rad. For
+    /// joints with a friction table, the speed and the slope are zero.
     reach: JointVec,
     slope: JointVec,
-    /// Velocities and torques of joints with a table.
+    /// Velocities and torques of the joints that have a friction table.
     tables: [Option<Box<Points>>; JOINTS],
     any_table: bool,
-    /// Temperature of the tables, °C.
+    /// Temperature for which `tables` was computed, °C.
     table_temperature: JointVec,
-    /// σ0, N·m/rad.
+    /// Stiffness σ0 of the bristles, N·m/rad.
     stiffness: JointVec,
     /// Damping σ1 of the bristles at standstill, N·m·s/rad.
     damping: JointVec,
@@ -137,7 +138,7 @@ impl FrictionTorques {
         new
     }
 
-    /// Updates the curves to these bearing temperatures (°C), and multiplies the curves by `scale`.
+    /// Updates the friction curves to the bearing temperatures (°C), and multiplies the curves by `scale`.
     pub(crate) fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
         for j in 0..JOINTS {
             let t = temperature[j];
@@ -151,8 +152,8 @@ impl FrictionTorques {
                     self.slope[j] = self.polynomial_slope(j, self.reach[j]).max(0.0);
                 }
                 SimFriction::Table(table) => {
-                    // The condition is also false for NaN, which is the value at the start. In this case the tables are
-                    // updated.
+                    // The comparison is also false for NaN, which is the initial temperature. With the initial temperature, the code
+                    // therefore updates the tables.
                     if (t - self.table_temperature[j]).abs() < 0.02 {
                         continue;
                     }
@@ -168,13 +169,13 @@ impl FrictionTorques {
         }
     }
 
-    /// Causes the next call of [`warm`](Self::warm) to update the tables too, because a scale has changed.
+    /// Makes the next call of [`warm`](Self::warm) update the tables, because a scale has changed.
     pub(crate) fn forget_tables(&mut self) {
         self.table_temperature = [f64::NAN; JOINTS];
     }
 
-    /// Returns the friction torque, which acts against the motion, for velocities `v` (rad/s) and bristle deflections
-    /// `z` (rad), N·m.
+    /// Returns the friction torque for velocities `v` (rad/s) and bristle deflections `z` (rad), N·m. The torque acts against the
+    /// motion.
     #[inline]
     pub(crate) fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
         let [k0, k1, k2, k3] = &self.k;
@@ -192,8 +193,8 @@ impl FrictionTorques {
                 core::array::from_fn(|j| {
                     let (v, load) = (v[j], self.stiffness[j] * z[j]);
                     let (b, level) = lugre.stribeck(v * inverse, k0[j]);
-                    // The term σ1(v)·dz/dt is computed with one denominator, because divisions need most of the time of
-                    // this function.
+                    // The code computes the term σ1(v)·dz/dt with one denominator, because divisions need most of the time of this
+                    // function.
                     let bending = (v * level - v.abs() * load * b) / (b * level);
                     load + self.damping[j] * bending + viscous(j)
                 })
@@ -209,8 +210,8 @@ impl FrictionTorques {
         out
     }
 
-    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad; the result is at least 0. The effects
-    /// around standstill are excluded, because a separate bound exists for their slope.
+    /// Returns the slope of the friction curve at velocities `v` (rad/s), N·m·s/rad; the result is at least 0. The slope does not
+    /// include the effects around standstill, because their slope has a separate limit.
     pub(crate) fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),
@@ -246,8 +247,8 @@ impl FrictionTorques {
 }
 
 impl LuGre {
-    /// For a velocity `r`, in multiples of the Stribeck speed, and a Coulomb torque (N·m), returns b = 1 + r² and
-    /// b·g(v) in N·m. The inverse of b decreases from 1 at standstill to 0 far above the Stribeck speed.
+    /// Returns b = 1 + r² and b·g(v) in N·m, for a Coulomb torque (N·m) and a velocity `r` in multiples of the Stribeck speed. The
+    /// inverse of b decreases from 1 at standstill to 0 far above the Stribeck speed.
     #[inline]
     fn stribeck(&self, r: f64, coulomb: f64) -> (f64, f64) {
         let b = 1.0 + r * r;
@@ -279,10 +280,10 @@ impl Points {
         Self { velocity: table.velocity.map(f64::from), torque }
     }
 
-    /// Interpolates linearly between the points, and extrapolates with the last segments.
+    /// Interpolates linearly between the points of the table, and extrapolates with the first and last line segments.
     fn at(&self, v: f64) -> f64 {
         let i = self.segment(v);
-        // A segment beyond an end of the table begins at this end of the table.
+        // Beyond an end of the table, the line segment begins at this end of the table.
         let from = i + usize::from(v > self.velocity[19]);
         self.torque[from] + (v - self.velocity[from]) * self.slope(v)
     }
@@ -300,13 +301,13 @@ impl Points {
     }
 
     /// Returns the Coulomb torque, N·m. In each direction, the line through the two slowest points is extended to
-    /// standstill. The result is the mean of the two torques at standstill.
+    /// standstill. The Coulomb torque is the mean of the two torques at standstill.
     fn coulomb(&self) -> f64 {
         let (x, y) = (&self.velocity, &self.torque);
         let start = |near: usize, far: usize, sign: f64| {
             let slope = (y[far] - y[near]) / (x[far] - x[near]);
-            // The result is limited to the torque of the slowest point. If the curve decreases at low speed, its
-            // Coulomb torque is the torque of that point.
+            // The Coulomb torque is limited to the torque of the slowest point. If the curve decreases at low speed, the Coulomb
+            // torque is the torque of that point.
             (sign * (y[near] - slope * x[near])).clamp(0.0, (sign * y[near]).max(0.0))
         };
         let above = x.iter().position(|&v| v > 0.0).filter(|&i| i + 1 < x.len());
@@ -317,8 +318,7 @@ impl Points {
         }
     }
 
-    /// Removes the Coulomb torque from the points, so that they contain only the viscous part, and returns the Coulomb
-    /// torque.
+    /// Removes the Coulomb torque from the points, and returns the Coulomb torque. The points then contain only the viscous part.
     fn take_coulomb(&mut self) -> f64 {
         let coulomb = self.coulomb();
         for (v, torque) in self.velocity.iter().zip(&mut self.torque) {

@@ -63,13 +63,14 @@ fn at_speed_both_models_are_the_measured_curve() {
 fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
     for curve in [polynomial(), table()] {
         let torques = with(FrictionModel::LuGre(LuGre::default()), curve);
-        // The torque rises to 1.2 times 6 N·m within one second. After that it is zero. The deflection is about 1e-4
-        // rad, and the elastic part of it returns to zero.
+        // The torque rises to 1.2 times 6 N·m within one second, and is zero after that. The deflection is about 1e-4
+        // rad, and its elastic part returns to zero.
         let held = rotor(&torques, 1e-3, 2.0, |t, _| if t < 1.0 { t * 1.2 * 6.0 } else { 0.0 });
         let (loaded, released) = (held[999][0], held[1999][0]);
         assert!((0.8e-4..4e-4).contains(&loaded), "{loaded} rad");
         assert!(released < loaded - 0.8e-4 && held[1999][1].abs() < 1e-6, "{released} rad");
-        // The torque rises to three times 6 N·m in three seconds. The rotor breaks away at stiction, 1.4 times 6 N·m.
+        // The torque rises to three times 6 N·m in three seconds. The rotor must break away at the stiction torque,
+        // 1.4 times 6 N·m.
         let away = rotor(&torques, 1e-3, 3.0, |t, _| t * 6.0);
         let left = away.iter().position(|x| x[0] > 1e-3).unwrap_or(0) as f64 * 1e-3;
         assert!((1.35..1.5).contains(&left), "it left at {left} of 6 N·m");
@@ -110,7 +111,7 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
         for speed in [1e-6, 1e-4, 1e-2, 1.0, 30.0] {
             let mut z = [0.0; JOINTS];
             for k in 0..500 {
-                // The rotor moves forward and back.
+                // The rotor moves forward and back in turns.
                 let v = if k / 100 % 2 == 0 { speed } else { -speed };
                 z = torques.bend(&z, &[v; JOINTS], dt);
                 assert!(z[0].abs() <= longest * (1.0 + 1e-9), "{} rad at {speed} rad/s, {dt} s", z[0]);
@@ -140,7 +141,7 @@ fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
             let mut before = there;
             for v in [1.1 * end, 3.0, 10.0, 300.0] {
                 let torque = at(v);
-                // The tolerance covers the remaining part of the Stribeck curve.
+                // The tolerance covers the part of the Stribeck curve that remains at this speed.
                 assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
                 assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
                 before = torque;

@@ -8,7 +8,7 @@ use crate::request::NodeRequest;
 const PUMP_LAG: u32 = 100;
 /// Number of ticks with the pump on until the first and the second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
-/// Code of the gripper for the transition from Ready or Enabled to Init.
+/// Code that the gripper reports during the transition from Ready or Enabled to Init.
 const TO_INIT: NodeState = NodeState::new(14);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
 /// Number of ticks after power-up in which the gripper does not answer.
@@ -24,7 +24,7 @@ pub struct Gripper {
     pin: bool,
     /// Speed of the pump motor, 0..PUMP_LAG.
     speed: u32,
-    /// Number of ticks with vacuum, at most the number for the second level.
+    /// Number of ticks with vacuum. The count ends at the number for the second level.
     vacuum: u32,
     reacts_to_safety: bool,
     line_before: bool,
@@ -57,7 +57,7 @@ impl Gripper {
         }
     }
 
-    /// Restarts the processor.
+    /// Restarts the processor of the gripper.
     pub fn reset(&mut self) {
         self.state = NodeState::START;
         self.age = 0;
@@ -67,7 +67,7 @@ impl Gripper {
         self.reacts_to_safety = false;
     }
 
-    /// Returns the state byte.
+    /// Returns the state byte of the gripper.
     pub fn state(&self) -> NodeState {
         self.state
     }
@@ -95,7 +95,7 @@ impl Gripper {
                 self.command = pump;
                 Some(Answer::Gripper(self.report()))
             }
-            // `NodeRequest` has a separate variant for this request.
+            // `NodeRequest` has the separate variant `ChangeFsm` for this request.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);
@@ -117,7 +117,8 @@ impl Gripper {
         }
     }
 
-    /// Executes a request in the interrupt, so that the answer already contains the code of the transition.
+    /// Executes a ChangeFsm request in the interrupt, so that the answer already contains the code of the
+    /// transition.
     fn change(&mut self, request: NodeState) {
         self.state = match (request, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -143,15 +144,15 @@ impl Gripper {
         }
     }
 
-    /// Simulates a millisecond.
+    /// Simulates one millisecond of the gripper.
     pub fn tick(&mut self) {
         if self.booting > 0 {
             self.booting -= 1;
             return;
         }
         self.age = self.age.saturating_add(1);
-        // Only a change of the line to danger has an effect. If the gripper is enabled while the line is already
-        // unsafe, it stays enabled.
+        // The gripper reacts only when the safety line changes to danger. If the gripper is enabled while the
+        // safety line is already unsafe, it stays enabled.
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
         if edge && self.reacts_to_safety && self.state == NodeState::ENABLED {

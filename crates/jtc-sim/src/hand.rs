@@ -52,8 +52,8 @@ pub(crate) struct Hand {
     led: Option<Led>,
 }
 
-/// State since Teaching began, which contains the pose of the arm at that time, the duration of the motion to the first
-/// point (s), and elapsed time (s).
+/// State since Teaching began: the pose of the arm at that time, the duration of the motion to the first point (s), and
+/// the elapsed time (s).
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,
@@ -67,7 +67,7 @@ impl Hand {
     }
 
     /// Returns the hand's torque in this millisecond, N·m, for an arm with the positions `q` and velocities `qd`. The
-    /// hand waits until Teaching begins. At the end of the path or of Teaching it releases the arm (`None`).
+    /// hand waits until Teaching begins. At the end of the path or of Teaching, the hand releases the arm (`None`).
     pub(crate) fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
             return if self.led.is_some() { None } else { Some([0.0; JOINTS]) };
@@ -89,7 +89,8 @@ impl Hand {
         }))
     }
 
-    /// Returns the target of the hand. The target first moves smoothly to the first point, and then follows the path.
+    /// Returns the joint positions to which the hand pulls the arm. The target first moves smoothly to the first point,
+    /// and then follows the path.
     fn wanted(&self, led: &Led, t: f64) -> JointVec {
         if t >= led.approach_s {
             return self.path.at(t - led.approach_s);
@@ -117,7 +118,7 @@ mod tests {
     fn a_hand_waits_for_teaching_pulls_with_bounded_force_and_lets_go() {
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]; 11], 0.01).unwrap());
         assert_eq!(hand.torque(false, &[0.0; 6], &[0.0; 6]), Some([0.0; 6]));
-        // If the arm does not move, the torque of the hand rises only to its limit.
+        // If the arm does not move, the torque of the hand must rise only to its limit.
         let mut strongest = 0.0f64;
         let mut ms = 0;
         while let Some(torque) = hand.torque(true, &[0.0; 6], &[0.0; 6]) {

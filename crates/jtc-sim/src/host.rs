@@ -1,7 +1,8 @@
 //! Small host for tests, soak runs and the fault matrix. The host creates frames, receives statuses, and plans simple
 //! motions.
 //!
-//! The real client library is `jtc-host`. With this small host, tests of the simulation do not depend on `jtc-host`.
+//! The real client library is `jtc-host`. Because of this small host, tests of the simulation do not depend on
+//! `jtc-host`.
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin};
 use jtc_wire::{
     ACCELERATION_SCALE, ExecCommand, FrameType, HEADER, POSITION_SCALE, RawPoint, STATUS_LEN, Status,
@@ -10,7 +11,7 @@ use jtc_wire::{
 
 use crate::world::World;
 
-/// Returns a frame with header, length and CRC around `body`.
+/// Returns a frame that consists of header, length, `body` and CRC.
 pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(body.len() + 6);
     bytes.extend([HEADER, frame_type as u8]);
@@ -29,7 +30,7 @@ pub fn use_defaults() -> Vec<u8> {
         .collect()
 }
 
-/// Returns the frame of an arm model. The controller receives the numbers of the model as rounded 32-bit floats.
+/// Returns the frame with an arm model. The controller receives the numbers of the model as rounded 32-bit floats.
 pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     let origin = |o: &Origin| o.xyz.into_iter().chain(o.rpy);
     let joints = model.joints.iter().flat_map(origin);
@@ -64,8 +65,9 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
     segments.iter().enumerate().map(make).collect()
 }
 
-/// Returns a motion from standstill to standstill, with a point every `step_ms`. The motion goes from `from` to `to`
-/// (rad) in `seconds` and back, `times` times. The motion follows a quintic with zero acceleration at both ends.
+/// Returns a motion that starts and ends at standstill, with a point every `step_ms`. The motion goes from `from` to
+/// `to` (rad) in `seconds` and back, `times` times. The motion follows a quintic polynomial with zero acceleration at
+/// both ends.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,
@@ -100,9 +102,10 @@ fn quintic(a: &JointVec, b: &JointVec, u: f64, seconds: f64) -> RawPoint {
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     bytes: Vec<u8>,
-    /// Latest status.
+    /// Latest received status.
     pub last: Option<Status>,
-    /// Responses in the received statuses, oldest first, which remain until the caller removes these responses.
+    /// Responses in the received statuses, oldest first. Each response remains in the list until the caller removes
+    /// it.
     pub responses: Vec<jtc_wire::Response>,
     /// Number of received bytes.
     pub received: u64,
@@ -122,8 +125,8 @@ impl Listener {
         }
         while self.bytes.len() >= STATUS_LEN {
             let Some(status) = Status::parse(&self.bytes[..STATUS_LEN]) else {
-                // After a reset of the controller, a received status may be incomplete. The host searches for the
-                // beginning of the next status.
+                // After a reset of the controller, a received status may be incomplete. The host then searches for
+                // the beginning of the next status.
                 self.bytes.remove(0);
                 continue;
             };

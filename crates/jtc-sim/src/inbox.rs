@@ -3,7 +3,7 @@ use std::collections::VecDeque;
 
 use crate::request::NodeRequest;
 
-/// Time between two requests below which the two cause a single interrupt, µs.
+/// Time between two requests below which both requests cause only one interrupt, µs.
 const BACK_TO_BACK_US: u64 = 250;
 /// Number of requests that the receive buffer can store.
 const DEPTH: usize = 3;

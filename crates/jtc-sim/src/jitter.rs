@@ -15,14 +15,14 @@ pub struct Jitter {
 }
 
 impl Jitter {
-    /// Creates the state without a delay. A value of [`most_ms`](Self::most_ms) above 0 adds a delay.
+    /// Creates the model without a delay. A value of [`most_ms`](Self::most_ms) above 0 adds a delay.
     pub fn new(seed: u64) -> Self {
         let rng = fastrand::Rng::with_seed(seed ^ 0x6A69_7474);
         Self { most_ms: 0, rng, now: 0, waiting: VecDeque::new() }
     }
 
     /// Processes a tick. The frames in `received` with index `first` or higher have arrived in this millisecond.
-    /// Replaces these frames by the frames whose delay has ended.
+    /// `delay` replaces the new frames by the frames whose delay has ended.
     pub fn delay(&mut self, received: &mut Vec<Frame>, first: usize) {
         self.now += 1;
         if self.most_ms == 0 && self.waiting.is_empty() {
@@ -42,7 +42,7 @@ impl Jitter {
 mod tests {
     use super::*;
 
-    /// All answers arrive in order and within the maximum delay, and each possible delay occurs.
+    /// All answers must arrive in order and within the maximum delay, and each possible delay must occur.
     #[test]
     fn answers_are_late_but_none_is_lost_or_overtaken() {
         for most_ms in 0..=3u8 {

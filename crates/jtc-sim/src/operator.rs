@@ -1,5 +1,5 @@
-//! Operator who uses the small host to start the controller, to upload and execute trajectories, and to wait in virtual
-//! time.
+//! Operator for tests. The operator uses the small host to start the controller, to upload and execute trajectories,
+//! and to wait in virtual time.
 use core::fmt;
 
 use jtc_bus::{JOINTS, NodeState};
@@ -10,18 +10,18 @@ use crate::config::SimConfig;
 use crate::host::{self, Listener};
 use crate::world::World;
 
-/// Error of an operator.
+/// Reason why an action of the operator failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OperatorError {
     /// A condition was not fulfilled in time.
     Late {
-        /// Expected condition.
+        /// Condition for which the operator waited.
         waited_for: &'static str,
-        /// Time waited, ms.
+        /// Duration of the wait, ms.
         ms: u64,
-        /// State of the controller when the wait ended.
+        /// State of the controller at the end of the wait.
         state: ControllerState,
-        /// Error word when the wait ended.
+        /// Error word of the controller at the end of the wait.
         errors: u16,
     },
     /// The controller rejected a frame.
@@ -44,11 +44,11 @@ impl fmt::Display for OperatorError {
 
 impl std::error::Error for OperatorError {}
 
-/// An operator and a simulation.
+/// An operator with a simulation.
 pub struct Operator {
-    /// The simulation.
+    /// Simulation that the operator uses.
     pub world: World,
-    /// Collector of the data from the device.
+    /// Collector of the bytes that the device sends.
     pub listener: Listener,
 }
 
@@ -63,7 +63,7 @@ impl Operator {
         self.world.telemetry().state
     }
 
-    /// Simulates a millisecond.
+    /// Simulates one millisecond.
     pub fn step(&mut self) {
         self.world.step();
         self.listener.listen(&mut self.world);
@@ -74,8 +74,8 @@ impl Operator {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Simulates until `done` returns `true`, but at most `ms` milliseconds. The error contains `waited_for` as the
-    /// description of the condition.
+    /// Simulates until `done` returns `true`, but at most `ms` milliseconds. If the time ends first, the error contains
+    /// `waited_for` as the description of the condition.
     pub fn wait(
         &mut self,
         waited_for: &'static str,
@@ -95,18 +95,18 @@ impl Operator {
         Err(OperatorError::Late { waited_for, ms, state: telemetry.state, errors: telemetry.errors })
     }
 
-    /// Sends a frame and waits for its response, which must report no error.
+    /// Sends a frame and waits for the controller's response, which must report no error.
     pub fn ask(&mut self, frame: &[u8]) -> Result<(), OperatorError> {
         let response = self.response(frame)?;
         let good = response.status == FrameStatus::NoError && response.data == DataStatus::NoError;
         if good { Ok(()) } else { Err(OperatorError::Refused(response)) }
     }
 
-    /// Sends a frame and waits for its response.
+    /// Sends a frame and waits for the controller's response.
     pub fn response(&mut self, frame: &[u8]) -> Result<Response, OperatorError> {
         self.listener.responses.clear();
         self.world.host_write(frame);
-        // The transmission of a long frame takes time.
+        // The limit is long, because the transmission of a long frame takes time.
         for _ in 0..8_000 {
             self.step();
             if !self.listener.responses.is_empty() {

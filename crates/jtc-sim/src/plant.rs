@@ -1,5 +1,5 @@
 //! Devices on the joint bus (drives and gripper), and the arm that the drives move. The plant does not depend on a
-//! particular controller. The plant works with the simulated controller of [`World`](crate::World), or with any
+//! particular controller. The plant works with the simulated controller of [`World`](crate::World), and with any
 //! controller that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
@@ -16,24 +16,24 @@ use crate::request::NodeRequest;
 /// Duration of a drive's tick and of a step of the arm, s.
 const TICK: f64 = 1e-3;
 
-/// Answer of a node, with the time from the end of the request until the answer is ready (µs), and the frame.
+/// Answer of a node: the time from the end of the request until the answer is ready (µs), and the frame.
 pub type ReadyAnswer = (u32, Frame);
 
 /// True state of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Truth {
-    /// Position, rad.
+    /// Position of each joint, rad.
     pub q: JointVec,
-    /// Velocity, rad/s.
+    /// Velocity of each joint, rad/s.
     pub qd: JointVec,
-    /// Position of the motors, converted to the joint side of the gears, rad. If the gears are rigid, it is equal to
-    /// `q`.
+    /// Position of the motors, converted to the joint side of the gears, rad. If the gears are rigid, the position is
+    /// equal to `q`.
     pub motor: JointVec,
-    /// Torque of the drives, N·m.
+    /// Torque of each drive, N·m.
     pub torque: JointVec,
-    /// Torque that pushes, a hand and walls cause at the joints, N·m.
+    /// Torque on each joint from pushes, a hand and walls, N·m.
     pub outside: JointVec,
-    /// Bearing temperature, °C.
+    /// Bearing temperature of each joint, °C.
     pub temperature: JointVec,
 }
 
@@ -56,7 +56,7 @@ pub struct Plant {
     pub(crate) nodes: Nodes,
     pub(crate) arm: Arm,
     truth: Truth,
-    /// Torque of pushes on the joints, N·m. The next field is the torque of a hand.
+    /// Torque of pushes on each joint, N·m. The torque of a hand is in the next field.
     push: JointVec,
     pub(crate) hand: JointVec,
     model: ArmModel,
@@ -123,14 +123,14 @@ impl Plant {
         self.nodes.any_on_bus()
     }
 
-    /// Simulates one millisecond, in which drives and gripper execute their tick and the arm moves. `safety_output` is
-    /// `true` if the controller's safety output has the level that means no error.
+    /// Simulates one millisecond. Drives and gripper execute their tick, and the arm moves. `safety_output` is `true`
+    /// if the controller's safety output has the level that means no error.
     pub fn step(&mut self, safety_output: bool) {
         self.step_nodes(safety_output);
         self.step_arm();
     }
 
-    /// Simulates a millisecond of the arm without drives, for a controller without a joint bus. The torques (N·m) act
+    /// Simulates one millisecond of the arm without drives, for a controller without a joint bus. The torques (N·m) act
     /// on the joints, and are limited to the maximum torques of the drives. Brakes are open, and drives and gripper do
     /// nothing. NaN counts as zero torque.
     pub fn step_free(&mut self, torque: &JointVec) {
@@ -192,7 +192,8 @@ impl Plant {
         self.truth.temperature = self.arm.temperature;
     }
 
-    /// Applies the immediate effect of a node's fault when the fault begins. Ignores other faults.
+    /// Applies the immediate effect of a node's fault when the fault begins. Ignores faults that have no immediate
+    /// effect.
     pub fn begin(&mut self, kind: FaultKind) {
         match kind {
             FaultKind::NodeReboot { node } => match self.nodes.drives.get_mut(usize::from(node)) {
@@ -267,7 +268,7 @@ impl Plant {
         &self.model
     }
 
-    /// Returns the state bytes of joints and gripper (255 without a gripper).
+    /// Returns the state bytes of the joints and the gripper (255 without a gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.nodes.states()
     }

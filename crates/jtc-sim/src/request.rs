@@ -5,14 +5,14 @@ use jtc_bus::{Frame, NODES, NodeState, Request, id};
 /// A request that has reached a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeRequest {
-    /// ChangeFsm, with the state byte of each node as transmitted.
+    /// ChangeFsm request, with the state byte of each node as transmitted.
     ChangeFsm([NodeState; NODES]),
-    /// Any other request.
+    /// A request other than ChangeFsm.
     Other(Request),
 }
 
 impl NodeRequest {
-    /// Returns the request that a frame contains. `None` for answers and for frames that are not requests to nodes.
+    /// Returns the request in a frame. Returns `None` for answers and for frames that are not requests to nodes.
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
             // Missing bytes of a short frame count as 0, which does not request a change.

@@ -1,19 +1,20 @@
-//! Serial line to the host, with both directions at the baud rate, and faults in the direction to the device.
+//! Serial line to the host. Both directions of the line have the same baud rate, and the direction to the device can
+//! have faults.
 use std::collections::VecDeque;
 
 /// Picoseconds per microsecond. With this resolution, the duration of a byte at any usual bit rate is accurate enough
 /// for simulations of several days.
 const PS_PER_US: u64 = 1_000_000;
 
-/// One direction of the line.
+/// A direction of the serial line.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Duration of a byte (10 bits), ps; 0 if bytes have no delay.
+    /// Duration of a byte (10 bits), ps; 0 if transmission takes no time.
     byte_ps: u64,
     queue: VecDeque<u8>,
     /// Time at which the first byte of the queue has arrived, ps.
     front_ps: u64,
-    /// Number of bytes that have arrived.
+    /// Number of bytes that have arrived at the receiver.
     pub carried: u64,
 }
 
@@ -24,11 +25,11 @@ impl Line {
         Self { byte_ps, queue: VecDeque::new(), front_ps: 0, carried: 0 }
     }
 
-    /// Adds bytes to the line at `now_us`, after the bytes that are already waiting.
+    /// Adds bytes to the line at `now_us`, after the bytes that are already on the line.
     pub fn write(&mut self, now_us: u64, bytes: &[u8]) {
         if self.queue.is_empty() {
-            // The last byte may have ended within the millisecond. In this case the transmitter has been idle since the
-            // end of that byte.
+            // The last byte may have ended within the millisecond. The transmitter has then been idle since the end of
+            // the last byte.
             self.front_ps = now_us * PS_PER_US + self.byte_ps;
         }
         self.queue.extend(bytes);

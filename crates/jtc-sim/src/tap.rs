@@ -17,25 +17,26 @@ pub struct BusTap<B> {
     pub sent: u64,
     /// Number of frames taken from the other bus.
     pub taken: u64,
-    /// Number of frames from the other bus that are not valid on the joint bus, or that arrived while its queue was
-    /// full.
+    /// Number of frames from the other bus that the tap rejected. A rejected frame is not valid on the joint
+    /// bus, or arrived while the queue of the joint bus was full.
     pub refused: u64,
 }
 
 impl<B: CanBus> BusTap<B> {
-    /// Connects `bus` to a simulation.
+    /// Connects `bus` to the joint bus of a simulation.
     pub fn new(bus: B) -> Self {
         Self { bus, sent: 0, taken: 0, refused: 0 }
     }
 
-    /// Sends the frames of the simulated bus, and takes frames of nodes on the other bus, which are transmitted in the
-    /// next millisecond. The caller must call this function after each `World::step`.
+    /// Sends the frames of the simulated bus to the other bus, and takes frames of nodes on the other bus. The
+    /// simulation transmits these frames in the next millisecond. The caller must call this function after each
+    /// `World::step`.
     pub fn exchange(&mut self, world: &mut World) -> Result<(), CanError> {
         for timed in world.bus_frames() {
             let frame = &timed.frame;
             let converted =
                 Id::standard(u32::from(frame.id)).and_then(|id| CanFrame::fd_padded(id, frame.data()));
-            // Every frame of the joint bus has an identifier and a length that can be converted.
+            // The conversion succeeds for every frame of the joint bus, because its identifier and length are valid.
             let Ok(converted) = converted else { continue };
             self.bus.send(&converted)?;
             self.sent += 1;

@@ -17,16 +17,16 @@ const PUSH_MAX_S: f64 = 60.0;
 pub enum TypedEvent {
     /// A push on a joint.
     Push {
-        /// Joint.
+        /// Joint that is pushed.
         joint: Joint,
         /// Torque in the joint's positive direction, N·m.
         torque: f64,
-        /// Duration, s.
+        /// Duration of the push, s.
         seconds: f64,
     },
     /// A hand that guides the arm along the joint positions of a trajectory file in Teaching.
     Hand {
-        /// File name as typed.
+        /// File name as the user typed it.
         file: String,
     },
 }
@@ -47,20 +47,20 @@ impl fmt::Display for TypedEvent {
 /// Reasons why a typed line is not an event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TypedEventError {
-    /// Unknown event.
+    /// The event is unknown.
     Unknown(String),
-    /// A push with the wrong number of words. Three words must follow the name.
+    /// A push has the wrong number of words. Three words must follow the word `push`.
     PushWords(usize),
-    /// An invalid word of a push, and the permitted range.
+    /// A word of a push is invalid. The error contains the permitted range of the word.
     Value {
         /// Name of the value.
         what: &'static str,
-        /// Word as typed.
+        /// Word as the user typed it.
         word: String,
         /// Smallest and largest permitted value.
         allowed: (f64, f64),
     },
-    /// A hand without a file.
+    /// A hand event has no file name.
     NoFile,
 }
 
@@ -89,7 +89,8 @@ impl fmt::Display for TypedEventError {
 impl std::error::Error for TypedEventError {}
 
 impl TypedEvent {
-    /// Returns the event that a line describes. `None` for an empty line or a comment (`#`).
+    /// Returns the event that a line describes. Returns `None` for an empty line or a comment
+    /// (`#`).
     pub fn parse(line: &str) -> Result<Option<Self>, TypedEventError> {
         let line = line.trim();
         let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));

@@ -34,8 +34,8 @@ pub struct World {
     /// Clock with which the board measures silence on its serial line, µs. The next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
-    /// Longest silence on the serial line that the board measures, µs. If it is `None`, the board measures the silence
-    /// in virtual time.
+    /// Longest silence on the serial line that the board measures, µs. With `None`, the board measures the silence in
+    /// virtual time.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
@@ -116,7 +116,7 @@ impl World {
         world
     }
 
-    /// Simulates a millisecond.
+    /// Simulates one millisecond.
     pub fn step(&mut self) {
         self.step_faults();
         self.receive();
@@ -132,7 +132,7 @@ impl World {
         self.note();
     }
 
-    /// Begins and ends faults.
+    /// Begins and ends the faults of this millisecond.
     fn step_faults(&mut self) {
         let telemetry = self.board.telemetry();
         let (state, point) = (telemetry.state, telemetry.point);
@@ -203,7 +203,7 @@ impl World {
         self.plant.set_faults(self.faults.active());
     }
 
-    /// Passes bytes from the host to the parser.
+    /// Passes bytes from the host to the board's parser.
     fn receive(&mut self) {
         let now = self.now_us();
         let mut fresh = Vec::new();
@@ -222,7 +222,7 @@ impl World {
             self.heard_us = self.line_us;
         }
         if let Some(exchange) = &mut self.exchange {
-            // Without a tick, the safety output pin keeps its level.
+            // If the tick is missed, the safety output pin keeps its level.
             let safety_output = self.safety_output;
             **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }
@@ -278,7 +278,7 @@ impl World {
         }
     }
 
-    /// Applies the effects of a board reset on the rest of the simulation.
+    /// Applies the effects of a board reset on the other parts of the simulation.
     fn restart(&mut self) {
         self.safety_output = false;
         self.bus.clear();

@@ -1,4 +1,4 @@
-//! Start of the arm from power-on to position hold, with the real protocol.
+//! Test of the start of the arm from power-on to position hold, with the real protocol.
 use jtc_core::ControllerState;
 use jtc_sim::host::{Listener, use_defaults};
 use jtc_sim::{SimConfig, World};

@@ -21,7 +21,7 @@ fn path() -> HandPath {
     HandPath::new((0..=400).map(at).collect(), 0.01).unwrap()
 }
 
-/// Returns the largest distance of joint `j` from its first position over `ms`, rad.
+/// Returns the largest distance of joint `j` from its first position over `ms` milliseconds, rad.
 fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
     (0..ms).fold(0.0, |far: f64, _| {
         operator.step();
@@ -33,7 +33,7 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    // This push is smaller than the push at which the joint would yield.
+    // This push is too small to make the joint yield.
     operator.world.push(Joint::ALL[2], 30.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");
@@ -60,7 +60,7 @@ fn a_push_of_a_fault_file_concerns_the_joint_counted_from_1() {
 fn j25_a_hand_leads_the_taught_arm_along_its_path_and_lets_go() {
     let mut operator = held(FaultPlan::default());
     operator.world.lead(path());
-    // The hand waits until Teaching begins.
+    // The hand must wait until Teaching begins.
     assert!(farthest(&mut operator, 0, 1000) < 1e-3);
     operator.teach().unwrap();
     let (mut led, mut fastest) = ([0.0f64; 6], 0.0f64);

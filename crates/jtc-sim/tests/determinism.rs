@@ -1,4 +1,4 @@
-//! Simulations with equal seeds produce equal bytes on both links.
+//! Simulations with equal seeds must produce equal bytes on the joint bus and on the host link.
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use jtc_sim::{Fault, FaultKind, FaultPlan, Operator, SimConfig, Trigger, host};

@@ -5,7 +5,7 @@ use jtc_sim::{Arm, FrictionModel, Gear, SimArm, SimFriction};
 
 const TICK: f64 = 1e-3;
 const POSE: [f64; JOINTS] = [0.3, 0.4, -0.7, 0.4, 0.6, -0.2];
-/// Part of the rotor inertia that belongs to the link, kg·m².
+/// Part of the rotor inertia that turns with the link, kg·m².
 const OUTPUT: f64 = 0.01;
 
 fn frictionless(gears: [Gear; JOINTS]) -> SimArm {
@@ -39,7 +39,7 @@ fn energy(arm: &Arm) -> f64 {
             sum += 0.5 * rotor * arm.qd[j].powi(2);
         }
     }
-    // The coordinate frames of the joints are also the coordinate frames of the links.
+    // The joint frames are also the frames of the links.
     let poses = dynamics.forward_kinematics(&arm.q);
     for (link, pose) in parts.model.links[1..].iter().zip(&poses) {
         let com: f64 = (0..3).map(|i| pose.rotation[2][i] * link.origin.xyz[i]).sum();
@@ -65,7 +65,7 @@ fn an_arm_on_undamped_gears_keeps_its_energy() {
     }
 }
 
-/// The change of energy equals the work of the drives minus the dissipation in the damping.
+/// The change of energy must equal the work of the drives minus the dissipation in the damping.
 #[test]
 fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     let gear = Gear { stiffness: 8_000.0, damping: 15.0 };
@@ -93,8 +93,8 @@ fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     assert!(most > 5.0 && (change - work).abs() < 2e-3 * most, "{change} J, {work} J put in");
 }
 
-/// The test gives each joint, one after the other, an elastic gear and a blocked motor. The link of this joint
-/// oscillates at √(K/J).
+/// In turn, each joint has an elastic gear and a blocked motor. The link of this joint must oscillate at
+/// √(K/J).
 #[test]
 fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     for joint in 0..JOINTS {
@@ -106,7 +106,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
         arm.q[joint] += 1e-4;
         let inertia = Dynamics::new(&arm.parts().model, [0.0; 3]).mass_matrix(&POSE)[joint][joint] + OUTPUT;
         let expected = (stiffness / inertia).sqrt();
-        // Measures ten whole periods between crossings of the middle position.
+        // The test measures ten whole periods between crossings of the middle position.
         let (mut t, mut first, mut crossings) = (0.0, None, 0);
         let dt = 1e-4;
         while crossings <= 10 {
@@ -132,7 +132,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     }
 }
 
-/// With a blocked motor, a loaded link moves down by the torque divided by the stiffness.
+/// With a blocked motor, a loaded link must move down by the torque divided by the stiffness.
 #[test]
 fn a_loaded_link_rests_at_torque_over_stiffness() {
     let gear = Gear { stiffness: 20_000.0, damping: 200.0 };
@@ -149,8 +149,8 @@ fn a_loaded_link_rests_at_torque_over_stiffness() {
     }
 }
 
-/// With increasing stiffness, the motion of the arm approaches the motion of an arm with rigid gears, also with
-/// friction.
+/// With increasing stiffness, the motion of the arm must approach the motion of an arm with rigid gears. The
+/// test also includes friction.
 #[test]
 fn stiff_gears_move_the_arm_as_rigid_ones_do() {
     for model in [FrictionModel::default(), FrictionModel::Smooth { width: 0.01 }] {

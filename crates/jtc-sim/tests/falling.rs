@@ -3,8 +3,8 @@ use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{ControllerState, error};
 use jtc_sim::{Operator, SimConfig, Support, host};
 
-/// Returns an arm that the controller holds with the upper arm bent forward by this angle, so that gravity pulls the
-/// upper arm down.
+/// Returns an arm that the controller holds. The upper arm is bent forward by the angle `shoulder`, so that gravity
+/// pulls it down.
 fn held(shoulder: f64) -> Operator {
     let start = [0.0, shoulder, -0.3, 0.0, 0.2, 0.0];
     let config = SimConfig { start, support: Support::Stand, baud: None, ..SimConfig::default() };
@@ -25,7 +25,7 @@ fn asks_to_enable(operator: &Operator) -> bool {
     }
 }
 
-/// Clears the errors `after_ms` after the torque was switched off.
+/// Clears the errors `after_ms` milliseconds after the torque was switched off.
 fn fall_and_clear(shoulder: f64, after_ms: u64) {
     let mut operator = held(shoulder);
     operator.world.set_safety_input(false);

@@ -1,4 +1,4 @@
-//! The integration of the arm at 1 ms is as accurate as the design requires.
+//! The integration of the arm at 1 ms must be as accurate as the design requires.
 use jtc_sim::{Arm, FrictionModel, LuGre, SimArm, SimFriction};
 
 fn fall(q: [f64; 6], steps: u32, friction: Option<FrictionModel>) -> [f64; 6] {

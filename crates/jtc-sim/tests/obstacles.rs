@@ -27,7 +27,7 @@ fn inject(operator: &mut Operator, kind: FaultKind, ms: Option<u64>) {
 }
 
 /// Only joint 1 moves, from 0 to 1 rad and back, with a wall at 0.5 rad. The largest torque of the wall is the sum of
-/// the torque v·√(K·J) from the kinetic energy and the torque of the drive. The wall never pulls, and its torque
+/// two torques: v·√(K·J) from the kinetic energy, and the torque of the drive. The wall never pulls, and its torque
 /// becomes 0 when the wall is removed.
 #[test]
 fn a_joint_that_runs_into_a_wall_is_pushed_back() {
@@ -69,8 +69,8 @@ fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     }
 }
 
-/// The arm picks up a load and drops it. The holding torque changes by the weight of the load, and then returns to its
-/// earlier value.
+/// The arm picks up a load and drops it. The holding torque must change by the weight of the load, and then return to
+/// its earlier value.
 #[test]
 fn a_load_that_is_taken_up_is_held_and_dropped() {
     let mut operator = held(config());
@@ -107,8 +107,8 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     assert!(events.iter().any(|event| event.contains("payload 1.5 kg at (0, 0.02, 0.06) m")), "{events:?}");
 }
 
-/// The speed check of the controller (J-35) has a visible effect only with drives that trip at a higher speed than the
-/// default drives.
+/// The speed check of the controller (J-35) is visible only with drives that trip at a higher speed than the default
+/// drives.
 #[test]
 fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     let run = |over_speed: Option<f64>| {
@@ -131,7 +131,7 @@ fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     assert_eq!(run(Some(50.0)), (true, false));
 }
 
-/// A brake that stays closed holds its joint against any torque of its drive, and opens when the fault ends.
+/// A brake that stays closed must hold its joint against any torque of the drive, and must open when the fault ends.
 #[test]
 fn a_brake_that_stays_closed_holds_the_joint() {
     for support in [Support::Brakes, Support::Stand] {
@@ -175,7 +175,7 @@ fn an_arm_with_gears_that_yield_is_held_and_moved() {
     assert!(twist.abs() > 2e-4 && twist.abs() < 0.02, "joint 2 is loaded: {twist} rad");
 }
 
-/// A fault with a duration of 0 ms is active for one tick.
+/// A fault with a duration of 0 ms must be active for one tick.
 #[test]
 fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     let mut operator = held(config());
@@ -234,7 +234,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
             let telemetry = operator.world.telemetry();
             assert_eq!(telemetry.errors & error::EXTERNAL_JOINTS, 0, "{what}");
             if operator.state() == ControllerState::Error {
-                // A push that no joint can resist, so that the joint exceeds its speed limit.
+                // No joint can resist this push, so the joint exceeds its speed limit.
                 let fast = telemetry.joints.iter().any(|joint| joint.internal & joint_error::VELOCITY != 0);
                 assert!(fast, "{what}: {:?}", telemetry.joints.map(|j| (j.internal, j.velocity, j.torque)));
                 break;

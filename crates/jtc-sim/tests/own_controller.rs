@@ -1,10 +1,10 @@
-//! Comparison of the simulated controller with a second board that receives equal inputs, and tests of the plant with
-//! torques instead of a bus.
+//! Compares the simulated controller with a second board that receives equal inputs. Tests the plant with torques
+//! instead of a bus.
 use jtc_core::{Config, ControllerState, Parameters};
 use jtc_sim::{Board, Fault, FaultKind, FaultPlan, Operator, Pins, Plant, SimConfig, Support, Trigger};
 
-/// A second board with the inputs of the simulated board has bit-identical outputs, also with missed ticks and a reset
-/// by the watchdog.
+/// A second board with the inputs of the simulated board must have bit-identical outputs. The test includes missed
+/// ticks and a reset by the watchdog.
 #[test]
 fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
     let overrun =
@@ -46,8 +46,8 @@ fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
     assert_eq!(board.watchdog_resets, 1);
 }
 
-/// With gravity compensation the arm stays at its position, and with zero torque it falls. Torques above the limits of
-/// the drives are clipped.
+/// With gravity compensation the arm must stay at its position, and with zero torque it must fall. Torques above the
+/// limits of the drives are clipped.
 #[test]
 fn a_plant_without_its_bus_moves_under_the_torques_that_it_is_given() {
     let start = [0.0, 0.6, -1.0, 0.3, 0.4, 0.0];

@@ -10,7 +10,7 @@ use sim_checks::soak::Soak;
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
 
-/// Numbers of ticks in a log, by the result of their replay.
+/// Number of ticks in a log, for each result of the replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Counts {
     ticks: u64,
@@ -23,11 +23,10 @@ fn blocks(world: &World) -> Vec<Block> {
     world.recorder().blocks().copied().collect()
 }
 
-/// Replays the log, and compares the results of each tick with the values that the controller computed in the session.
+/// Replays the log, and compares each tick with the values that the controller computed in the session.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    // From the controller of the session, the replay uses only settings and points. All other data are in the
-    // snapshots.
+    // The replay uses only settings and points of the session's controller. All other data are in the snapshots.
     let then = world.controller();
     let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
     controller.put_points(0, then.points());
@@ -110,7 +109,7 @@ fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
 #[test]
 fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     let (_, undisturbed) = run(|_| Vec::new());
-    // Requests page after page, as fast as the answers arrive.
+    // The host requests page after page, as fast as the answers arrive.
     let (_, read) =
         run(
             |ms| {
@@ -121,16 +120,15 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
 }
 
 /// The recorder keeps at least two seconds before an error and the time after the error, even with more traffic than
-/// the controller can execute. The recorder keeps this time with any lost part of the first snapshot's
-/// interval.
+/// the controller can execute. The test reads the log at many times, so that different parts of the first snapshot's
+/// interval are lost.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // The traffic consists of frames with only a few instructions each, and of parameters, which require a
-        // snapshot.
+        // The host sends frames with only a few instructions each, and parameters, which require a snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
         }
@@ -150,7 +148,7 @@ fn ticks(blocks: &[Block]) -> usize {
     Log::new(blocks).filter(|record| matches!(record, Record::Tick { .. })).count()
 }
 
-/// With a changed point of the trajectory, the replay is equal up to that point and differs after it.
+/// With a changed point of the trajectory, the replay must be equal up to that point and differ after it.
 #[test]
 fn j56_the_first_tick_that_differs_is_named() {
     const POINT: usize = 120;
@@ -172,8 +170,7 @@ fn j56_the_first_tick_that_differs_is_named() {
     let differs = Replay::new(Log::new(&blocks), controller, hash)
         .find(|step| step.outcome == Outcome::Differs)
         .expect("a tick differs");
-    // A point has an effect that begins at the previous point, and that reaches the torque on the bus within a few
-    // ticks.
+    // The effect of a point begins at the previous point, and reaches the torque on the bus within a few ticks.
     let acts = seen[&(10 * (POINT as u32 - 1))];
     let tick = differs.telemetry.tick;
     assert!((acts..=acts + 8).contains(&tick), "{tick}, where it acts from {acts} on");

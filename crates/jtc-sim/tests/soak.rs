@@ -1,4 +1,4 @@
-//! A short soak run, and a test that it is repeatable.
+//! A short soak run, and a test that a soak run is repeatable.
 use sim_checks::soak::Soak;
 
 #[test]

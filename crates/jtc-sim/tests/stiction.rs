@@ -1,10 +1,10 @@
 //! Tests of an arm whose gears have stiction. At rest, the controller must not oscillate (hunt).
 //!
-//! With bristle friction, a joint stops as soon as stiction holds the joint, with a small deviation from the command.
-//! If the integral continues at this deviation, the torque rises until the joint breaks away and stops on the other
-//! side. The torque then oscillates permanently by twice the stiction, at a few tenths of a hertz or, because of the
-//! encoder steps, faster. The test averages the torque command over 50 ms, which keeps this oscillation and removes
-//! single encoder steps.
+//! With bristle friction, a joint stops as soon as stiction holds it, with a small deviation from the command. If the
+//! integral term continues to grow at this deviation, the torque rises until the joint breaks away and stops on the
+//! other side. The torque then oscillates permanently by twice the stiction torque. The frequency is a few tenths of
+//! a hertz or, because of the encoder steps, higher. The test averages the torque command over 50 ms, which keeps
+//! this oscillation and removes single encoder steps.
 use jtc_core::JOINTS;
 use jtc_sim::{FrictionModel, LuGre, Operator, SimConfig, host};
 
@@ -12,11 +12,11 @@ const FROM: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; JOINTS] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
 /// Averaging time, ms.
 const MEAN_MS: u16 = 50;
-/// Largest peak-to-peak torque at rest, N·m, which is two encoder steps times the largest Kp.
+/// Largest permitted peak-to-peak torque at rest, N·m: two encoder steps times the largest Kp.
 const AT_REST: f64 = 1.6;
 
-/// Returns the peak-to-peak torque command of each joint (means over 50 ms), N·m, over 20 s of HoldPos that begin 2 s
-/// after a motion.
+/// Returns the peak-to-peak torque command of each joint (means over 50 ms), N·m. The measurement covers 20 s of
+/// HoldPos, and begins 2 s after a motion.
 fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     let mut config = SimConfig { start: FROM, seed, baud: None, ..SimConfig::default() };
     config.arm.friction_model = model;
@@ -40,7 +40,8 @@ fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     range.map(|(low, high)| high - low)
 }
 
-/// If the integral continued at rest, the torque of joints 1 to 3 would oscillate by 7 to 8 N·m in this test.
+/// If the integral term continued to grow at rest, the torque of joints 1 to 3 would oscillate by 7 to 8 N·m in this
+/// test.
 #[test]
 fn j41_no_hunting_in_stiction() {
     for seed in [1, 2, 3] {

@@ -1,8 +1,8 @@
-//! A Stop or a Pause takes effect in the tick after its last byte, with any other bytes on the line (J-04).
+//! A Stop or a Pause must take effect in the tick after its last byte, with any other bytes on the line (J-04).
 //!
-//! Each test runs two simulations that differ only in the bytes on the line. The line of the first carries only the
-//! Stop, and the line of the second also carries other bytes. From the tick after the last byte of the Stop, the two
-//! simulations must produce bit-identical commands.
+//! Each test runs two simulations that differ only in the bytes on the serial line. In the first simulation, the host
+//! sends only the Stop. In the second simulation, the host also sends other bytes. From the tick after the last byte of
+//! the Stop, the two simulations must produce bit-identical commands.
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::{Operator, SimConfig, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, Response, fixed};
@@ -40,8 +40,8 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
     unreachable!()
 }
 
-/// Checks that the command whose last byte is byte `end` of the script slows the arm down exactly as on a line without
-/// other bytes.
+/// Checks that a command slows the arm down exactly as on a line without other bytes. Byte `end` of the script is the
+/// last byte of the command.
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
     assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");
@@ -90,7 +90,7 @@ fn j04_a_stop_behind_hundreds_of_frames() {
 
 #[test]
 fn j04_a_stop_behind_four_thousand_frames() {
-    // 24 000 bytes take two seconds at this rate. At the highest rate, the board cannot store so many bytes.
+    // At 115 200 bit/s, 24 000 bytes take two seconds. At the highest rate, the board cannot store so many bytes.
     for (baud, frames) in [(115_200, 4000), (15_000_000, 4000), (15_000_000, 200_000)] {
         let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
         let end = bytes.len() as u64;
@@ -103,7 +103,7 @@ fn j04_a_stop_behind_four_thousand_frames() {
     }
 }
 
-/// The shortest frames arrive faster than the controller executes them only above 960 kBd. Below that rate, only
+/// Above 960 kBd, the shortest frames arrive faster than the controller executes them. Below 960 kBd, only response
 /// records are lost.
 #[test]
 fn j04_short_frames_are_executed_as_fast_as_they_come() {
@@ -137,8 +137,8 @@ fn j04_a_stop_among_pump_frames() {
 fn j04_a_stop_in_noise() {
     for baud in [115_200, 9600] {
         for byte in [0x00, 0x55, 0xFF, 0x9B, 0x0B] {
-            // A byte arrives every 6 ms, before, within and after the Stop. The Stop follows one of these bytes without
-            // a gap.
+            // The host sends a byte every 6 ms, before, within and after the Stop. The Stop follows one of these bytes
+            // without a gap.
             let mut script: Script = (0..500).map(|n| (6 * n, vec![byte])).collect();
             script[250].1.extend(fixed::STOP);
             let end = 251 + 7;
@@ -152,8 +152,8 @@ fn j04_a_stop_in_noise() {
 #[test]
 fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
     let points = host::there_and_back(&[0.0; 6], &[0.1; 6], 1.0, 2, 10);
-    // These frames come from a client with extensions. If they came from a client without extensions, the segment would
-    // also stop the arm (J-30).
+    // A client with extensions sends the frames of this test. If a client without extensions sent them, the segment
+    // would also stop the arm (J-30).
     let long = [&fixed::GET_INFO[..], &host::trajectory(&points, 10, 400).concat()].concat();
     for front in [&[0x9B, 0x04, 0xEA, 0x56][..], &[0x9B], &long, &long[..long.len() - 3]] {
         let bytes = [front, &fixed::STOP].concat();
@@ -171,21 +171,21 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
         .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
         .expect("it stops");
     operator.listener.responses.clear();
-    // An Execute follows frames with gains, which need one tick each, and a Stop follows the Execute.
+    // After frames with gains, which need one tick each, the host sends an Execute and a Stop.
     let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();
     operator.world.host_write(&frames);
     for _ in 0..1500 {
         operator.step();
         assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Stop, "nothing moves");
     }
-    // The upload came from a host without extensions, so the controller rejects its Execute with a data status that
-    // existing hosts know (J-51).
+    // A host without extensions uploaded the trajectory. The controller therefore rejects its Execute with a data
+    // status that existing hosts know (J-51).
     assert_eq!(exec_records(&operator), [DataStatus::IncorrectValue, DataStatus::NoError]);
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
 }
 
-/// An existing proxy sends new waypoints while the arm moves, and repeats only these frames until the controller
-/// accepts them.
+/// An existing proxy sends new waypoints while the arm moves. The proxy repeats only the frames with the waypoints
+/// until the controller accepts these frames.
 #[test]
 fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     for baud in [Some(115_200), None] {
@@ -211,8 +211,8 @@ fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     }
 }
 
-/// If the user of an existing proxy requests a motion beyond a limit, the proxy would repeat a rejected segment
-/// forever, and would not forward any other command.
+/// A user of an existing proxy requests a motion beyond a limit. The proxy would repeat a rejected segment forever, and
+/// would not forward any other command.
 #[test]
 fn j36_an_existing_host_outlives_a_trajectory_that_breaks_a_limit() {
     for baud in [Some(115_200), None] {

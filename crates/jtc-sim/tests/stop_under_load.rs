@@ -5,7 +5,7 @@ use jtc_sim::{ModelError, Support};
 use jtc_wire::ExecCommand;
 use sim_checks::lowering::{LOADED, Lowering, angle_of, holding_torque, with_payload};
 
-/// The difference between the torque limit and the torque of the model is sufficient to stop in time.
+/// The margin between the torque limit and the torque of the model must be sufficient to stop in time.
 #[test]
 fn j33_a_loaded_arm_stands_within_its_time() {
     for (share, speed) in [(0.8, 0.9), (0.9, 0.3), (0.9, 0.2), (0.95, 0.2), (0.95, 0.1), (0.97, 0.1)] {
@@ -34,7 +34,8 @@ fn j33_a_loaded_arm_stands_within_its_time() {
     }
 }
 
-/// A payload of 3.3 kg in the arm model is lowered, and passes the position in which it needs 95 % of the torque limit.
+/// The arm lowers a payload of 3.3 kg that the arm model contains. On the path, the arm passes the position in which it
+/// needs 95 % of the torque limit.
 #[test]
 fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     let model = with_payload(3.3);
@@ -53,19 +54,19 @@ fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     }
 }
 
-/// If the torque is not sufficient, the controller brakes with the full limit. If a joint still moves after the time
-/// for stopping, the joint lowers its load at a decreasing speed.
+/// If the torque margin is not sufficient, the controller brakes with the full torque limit. If a joint still moves after the
+/// time for stopping, the joint lowers its load at a decreasing speed.
 #[test]
 fn j33_the_full_limit_brakes_where_the_time_cannot_be_kept() {
     for (share, speed) in [(0.97, 0.4), (0.99, 0.2), (0.99, 0.4), (1.02, 0.2), (1.02, 0.4)] {
         let outcome = Lowering::at_share(share, speed).run().expect("it is lowered");
         println!("{share} {speed}: {outcome:?}");
-        // The commanded values follow the motion that the arm can achieve. The speed of the arm increases only if the
-        // load becomes heavier than the arm can hold.
+        // The commanded positions follow the motion that the arm can achieve. The speed of the arm increases only if
+        // the load is too heavy for the arm to hold.
         let peak = if share < 0.99 { 1.03 * speed } else { 0.6 };
         assert!(outcome.error < 5e-3 && outcome.peak <= peak, "{outcome:?}");
-        // Friction, which this bound does not include, also brakes the arm. So the speed decreases and the distance is
-        // short.
+        // Friction also brakes the arm, but this limit does not include friction. The speed therefore decreases and the
+        // distance is short.
         assert!(outcome.way <= if share < 0.99 { 0.7 * speed } else { 1.0 }, "{outcome:?}");
         // The arm is in Operate for at most one second, and the controller holds it all the time.
         assert!(outcome.commanded_ms <= 1_002 && outcome.state == ControllerState::HoldPos, "{outcome:?}");

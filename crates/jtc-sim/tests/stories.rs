@@ -114,7 +114,7 @@ fn j25_taught_by_hand_the_arm_floats() {
     operator.run(1000);
     let t = operator.world.telemetry();
     assert_eq!((t.state, t.errors), (ControllerState::Teaching, 0));
-    // Wrong masses make the arm drift slowly, but it does not fall.
+    // Wrong masses in the model make the arm drift slowly, but it must not fall.
     let moved = operator.world.truth().q.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(moved < 0.2, "{moved}");
     operator.ask(&host::frame(FrameType::TeachingModeDisable, &[])).unwrap();
@@ -161,7 +161,7 @@ fn others_on_the_bus_see_every_frame_and_take_part() {
         }
     }
     assert_eq!(ids.into_iter().collect::<Vec<_>>(), [0x000, 0x200, 0x201, 0x202, 0x203, 0x204, 0x205, 0x206]);
-    // Another node on the bus sends a reset. The drive reboots, and the controller detects it.
+    // Another node on the bus sends a reset. The drive reboots, and the controller must detect the reboot.
     let reset = can_link::CanFrame::fd(can_link::Id::standard(0x1A2).unwrap(), &[]).unwrap();
     can_link::CanBus::send(&mut other, &reset).unwrap();
     for _ in 0..20 {
@@ -178,7 +178,7 @@ fn j07_a_friction_table_and_what_follows_it_at_once_are_taken_without_losing_a_t
         let mut operator = Operator::new(config);
         operator.bring_up().unwrap();
         operator.listener.responses.clear();
-        // A table similar to a measured table, in which the torques increase with speed.
+        // The friction table is similar to a measured table: the torques increase with speed.
         let one = |_| {
             let axis = (0..20).map(|i| -1.9 + 0.2 * i as f32).chain((0..20).map(|i| 5.0 + 4.0 * i as f32));
             let torque = (0..400).map(|i| 3.0 * (-1.9 + 0.2 * (i / 20) as f32));
@@ -210,8 +210,8 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     operator.bring_up().unwrap();
     operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
     operator.execute(10_000).unwrap();
-    // If another node sends a broadcast directly after a broadcast of the controller, an older drive remains one
-    // request late after that.
+    // If another node sends a broadcast directly after a broadcast of the controller, an older drive processes all
+    // later requests one request late.
     let ask = jtc_bus::Request::ChangeFsm { target: [jtc_bus::Target::NoChange; 7] }.emit();
     operator.world.put_bus_frame(ask);
     operator.run(20);
@@ -235,7 +235,7 @@ fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
     }
 }
 
-/// Every second tick is skipped, as if each tick needed too much time.
+/// The board skips every second tick, as if each tick needed too much time.
 #[test]
 fn j12_ticks_that_go_on_missing_are_an_internal_error() {
     for missing in [9, 10] {

@@ -1,5 +1,5 @@
-//! All tests of the crate are in one program, so that only one program is linked. Each file in this folder is a module
-//! of this program.
+//! All tests of the crate in one test program, which shortens linking. Each file in this directory is a module of the
+//! program.
 mod bring_up;
 mod by_hand;
 mod determinism;

@@ -1,4 +1,4 @@
-//! Tracking of an arm that differs slightly from the controller's model.
+//! Tests how accurately an arm follows its path if it differs slightly from the controller's model.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::{ExecCommand, RawPoint};
@@ -72,7 +72,8 @@ fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
     }
 }
 
-/// Returns the RMS of commanded minus true position, rad, at the time at which the torque of a tick has an effect.
+/// Returns the RMS of commanded minus true position, rad. The true position is the position at the time at which the
+/// torque of a tick has an effect.
 fn true_error(config: SimConfig) -> [f64; 6] {
     let mut operator = Operator::new(SimConfig { start: FROM, baud: None, ..config });
     operator.bring_up().unwrap();
@@ -94,8 +95,8 @@ fn true_error(config: SimConfig) -> [f64; 6] {
     }
 }
 
-/// The measurements of the simulated drives are two ticks old. With a different setting of the delay, the arm deviates
-/// from its path by the distance that it moves during the difference.
+/// The measurements of the simulated drives are two ticks old. With a wrong setting of the delay, the arm deviates
+/// from its path by the distance that it moves in the time error.
 #[test]
 fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     let error = |delay_ticks: u8| {
@@ -113,8 +114,8 @@ fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     }
 }
 
-/// With drives that deliver less torque, the tracking is as good as usual if the gain compensates for this, and worse
-/// if it does not.
+/// If drives deliver less torque, a torque gain must restore the usual tracking accuracy. Without this gain, the
+/// tracking must be worse.
 #[test]
 fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     let error = |delivers: f64, gain: f64| {
@@ -132,8 +133,7 @@ fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     assert!(worst(&without) > 1.5 * worst(&ideal), "{without:?} {ideal:?}");
 }
 
-/// Late answers are nearly as good as answers in time. With any setting of the delay, the deviation from the path is
-/// about equal.
+/// For each setting of the delay, the tracking with late answers must be nearly as accurate as with answers in time.
 #[test]
 fn j63_late_answers_are_as_good_as_those_in_time() {
     let error = |seed: u64, answer_jitter_ms: u8, delay_ticks: u8| {

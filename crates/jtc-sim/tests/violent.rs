@@ -1,9 +1,11 @@
-//! A simulated arm that is pushed violently stays in its range of positions, except that its end stops yield slightly.
+//! A simulated arm that is pushed violently must stay in its range of positions. Only its end stops may yield
+//! slightly.
 use jtc_core::{Friction, Parameters};
 use jtc_sim::{Arm, FrictionModel, SimArm, SimFriction};
 
 const TICK: f64 = 1e-3;
-/// Largest deflection of the end stops, rad. A joint of the default arm hits the end stops at up to 80 rad/s.
+/// Largest permitted deflection of the end stops, rad. A joint of the default arm hits the end stops at up to 80
+/// rad/s.
 const YIELD: f64 = 0.5;
 
 /// Returns an arm with links of `mass` times the default masses and rotors of `rotor` kg·m².

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 const TICK: f64 = 1e-3;
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// Returns the arm without friction and end stops.
+/// Returns the arm without friction and without end stops.
 fn bare(parts: SimArm) -> SimArm {
     SimArm {
         friction: std::array::from_fn(|_| SimFriction::Frictionless),
@@ -68,7 +68,7 @@ fn flange(arm: &SimArm, q: &[f64; JOINTS]) -> [f64; 3] {
 
 const POSE: [f64; JOINTS] = [0.3, 0.4, -0.7, 0.4, 0.6, -0.2];
 
-/// The torque divided by the depth is the stiffness, independent of the integration of the motion.
+/// The torque divided by the depth must be the stiffness, independent of the integration of the motion.
 #[test]
 fn a_pushed_joint_rests_in_its_wall_at_torque_over_stiffness() {
     for (name, parts) in arms() {
@@ -99,8 +99,8 @@ fn a_pushed_joint_rests_in_its_wall_at_torque_over_stiffness() {
     }
 }
 
-/// The arm hits walls of 20,000 N·m/rad on all joints at once, while it moves fast. The energy does not increase in any
-/// step, and the arm comes to rest and stays at rest.
+/// The arm hits walls of 20,000 N·m/rad on all joints at once, while it moves fast. The energy must never exceed the
+/// initial energy by more than 3 %, and no joint may move farther than 0.3 rad.
 #[test]
 fn stiff_walls_on_every_joint_are_stable_on_every_arm() {
     for (name, parts) in arms() {
@@ -135,7 +135,7 @@ fn stiff_walls_on_every_joint_are_stable_on_every_arm() {
                         assert!((arm.q[j] - POSE[j]).abs() < 0.3, "{name}: {:?} after {ms} ms", arm.q);
                     }
                 }
-                // Without damping, the energy remains constant when the arm bounces. The light arm loses and gains some
+                // Without damping, the arm bounces and its energy remains constant. The light arm loses and gains some
                 // energy at the surfaces of its walls.
                 assert!(highest < 1.03 * first, "{name}, {stiffness}, {damping}: {highest} J of {first} J");
             }
@@ -143,8 +143,8 @@ fn stiff_walls_on_every_joint_are_stable_on_every_arm() {
     }
 }
 
-/// A flange rests on a table. The joint torques of the wall correspond to its force. The test checks this by virtual
-/// work, with positions only.
+/// A flange rests on a table. The joint torques of the wall must correspond to the force of the wall. The test checks
+/// this by virtual work, with positions only.
 #[test]
 fn the_force_of_a_plane_acts_through_the_flange() {
     for (name, parts) in arms() {
@@ -156,8 +156,8 @@ fn the_force_of_a_plane_acts_through_the_flange() {
         let inside = |x: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| x[i] + depth * normal[i] / length) };
         arm.set_walls(&[Wall::Plane { position, normal, stiffness, damping: 0.0 }]);
         assert_eq!(arm.wall_torque(), [0.0; JOINTS], "{name}: at the surface");
-        // The arm is inside the wall because the test moves the wall. For this, the test uses an equal wall that was
-        // created outside the arm.
+        // To place the arm inside the wall, the test creates an equal wall outside the arm, and then moves the arm into
+        // this wall.
         let mut before = POSE;
         let away = |q: &[f64; JOINTS]| -> f64 {
             (0..3).map(|i| (flange(&parts, q)[i] - inside(position)[i]) * normal[i] / length).sum()
@@ -190,8 +190,8 @@ fn the_force_of_a_plane_acts_through_the_flange() {
     }
 }
 
-/// An arm that falls onto a table comes to rest on the table. The depth in the table is the contact force divided by
-/// the stiffness.
+/// An arm that falls onto a table must come to rest on the table. The depth in the table must be the contact force
+/// divided by the stiffness.
 #[test]
 fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     for (name, parts) in arms() {
@@ -216,7 +216,7 @@ fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     }
 }
 
-/// If a wall is created inside the arm, its surface begins at the arm, and the wall does not push the arm away.
+/// If a wall is created inside the arm, its surface must begin at the arm, and the wall must not push the arm away.
 #[test]
 fn a_wall_that_begins_inside_the_arm_throws_nothing() {
     let mut arm = Arm::new(SimArm { gravity: [0.0; 3], ..bare(SimArm::default()) }, [0.0; JOINTS], POSE);
@@ -236,13 +236,13 @@ fn a_wall_that_begins_inside_the_arm_throws_nothing() {
         furthest = furthest.max(arm.q[0]);
     }
     assert!(furthest > turned && furthest < turned + 0.02, "{turned} {furthest}");
-    // If an identical wall is set again, the state does not change.
+    // If the test sets an identical wall again, the state must not change.
     let before = arm.clone();
     arm.set_walls(&[wall]);
     assert_eq!((arm.wall_torque(), arm.q), (before.wall_torque(), before.q));
 }
 
-/// With a wall that the arm does not reach, with rigid gears and with a dropped load, the result is bit-identical.
+/// A wall that the arm does not reach, rigid gears and a dropped load must not change any bit of the result.
 #[test]
 fn what_is_not_there_changes_no_bit() {
     let mut plain = Arm::new(SimArm::default(), [1.0; JOINTS], POSE);
@@ -276,8 +276,8 @@ fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
 }
 
 proptest! {
-    /// When the arm picks up or drops a load, the gravity torque changes by the torque of the weight of the load.
-    /// The expected torque is computed by virtual work from the height of the centre of the load.
+    /// When the arm picks up or drops a load, the gravity torque must change by the torque of the load's weight. The
+    /// test computes the expected torque by virtual work from the height of the load's centre.
     #[test]
     fn a_dropped_load_changes_the_gravity_torque_by_its_weight(
         q in prop::array::uniform6(-1.4..1.4f64),
@@ -314,7 +314,8 @@ proptest! {
         prop_assert_eq!(gravity_torque(&arm, &parts, &payload), without);
     }
 
-    /// For any motion of the arm into or out of a wall, the wall does not pull. Its force is along its normal or 0.
+    /// For any motion of the arm into or out of a wall, the wall must not pull. The force must be along the normal or
+    /// 0.
     #[test]
     fn a_wall_never_pulls(
         q in prop::array::uniform6(-1.4..1.4f64),
@@ -325,7 +326,8 @@ proptest! {
     ) {
         let parts = bare(SimArm::default());
         let start = flange(&parts, &q);
-        // The test creates the wall at a clear distance from the arm, so that it is at its configured position.
+        // The test creates the wall at a clear distance from the arm, so that the surface is at its configured
+        // position.
         let mut arm = Arm::new(parts.clone(), [0.0; JOINTS], q);
         let wall = |z: f64| Wall::Plane {
             position: [start[0] + z, 0.0, 0.0], normal: [-1.0, 0.0, 0.0], stiffness, damping,

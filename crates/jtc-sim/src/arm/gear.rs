@@ -68,9 +68,9 @@ impl Sides {
 
 /// Values that are constant during a step.
 struct Drives<'a> {
-    /// Torques of the drives, N·m.
+    /// Torque of each drive, N·m.
     torque: &'a JointVec,
-    /// Torques on the links, N·m.
+    /// Torque on each link, N·m.
     outside: &'a JointVec,
     /// Inertias on the motor side and on the link side, kg·m². With a rigid gear, the whole inertia belongs to
     /// the link.
@@ -124,7 +124,7 @@ impl Arm {
         }
     }
 
-    /// Like `runge_kutta` for rigid gears, with the motors as separate bodies.
+    /// Like `runge_kutta` for rigid gears, but treats the motors as separate bodies.
     fn elastic_runge_kutta(&mut self, drives: &Drives<'_>, damped: f64, dt: f64) {
         let start = Sides { q: self.q, qd: self.qd, motor: self.motor, motor_speed: self.motor_speed };
         let (z0, half) = (self.bristles, 0.5 * dt);
@@ -154,7 +154,7 @@ impl Arm {
         self.follow_rigid();
     }
 
-    /// Sets motors with rigid gears to the positions of their links.
+    /// Sets the positions and speeds of motors with rigid gears to those of their links.
     pub(super) fn follow_rigid(&mut self) {
         for (j, gear) in self.parts.gears.iter().enumerate() {
             if !gear.is_elastic() {

@@ -1,19 +1,19 @@
-//! Walls that the arm can touch. A wall is a plane at the flange, or an angle of one joint.
+//! Walls that the arm can touch. A wall is a plane that the flange touches, or an angle that limits one joint.
 use jtc_bus::Joint;
 use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 
 use super::{Arm, SimArm};
 
-/// Distance below which the arm may touch a wall, m or rad. Such a wall is included when the number of sub-steps is
-/// chosen.
+/// Distance below which the arm may touch a wall, m or rad. The simulation includes such a wall when it chooses the
+/// number of sub-steps.
 const NEAR: f64 = 0.01;
 
-/// Side of an angle that a wall occupies.
+/// Side of an angle on which the wall is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Angles greater than the angle of the wall.
+    /// The wall is at angles greater than its limit angle.
     Above,
-    /// Angles less than the angle of the wall.
+    /// The wall is at angles less than its limit angle.
     Below,
 }
 
@@ -23,28 +23,28 @@ impl core::fmt::Display for Side {
     }
 }
 
-/// A flat or angular obstacle. A wall can only push. Its force is stiffness times depth plus damping times the inward
-/// speed, and never negative.
+/// A flat or angular obstacle. A wall can push but not pull. The force is stiffness times depth plus damping times
+/// the inward speed, and never negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wall {
-    /// A plane that touches the origin of the flange.
+    /// A plane that limits the position of the flange's origin.
     Plane {
-        /// Point of the surface in the base frame, m.
+        /// Point of the wall's surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall, as a vector in the base frame. The length of the vector must not be 0.
+        /// Direction out of the wall, as a vector in the base frame. The length of this normal vector must not be 0.
         normal: [f64; 3],
         /// Stiffness, N/m.
         stiffness: f64,
         /// Damping, N·s/m.
         damping: f64,
     },
-    /// An angle that stops a joint.
+    /// An angle at which a joint is stopped.
     Joint {
-        /// Joint.
+        /// Joint that the wall stops.
         joint: Joint,
         /// Angle at which the wall begins, rad.
         angle: f64,
-        /// Side of the angle that the wall occupies.
+        /// Side of the angle on which the wall is.
         side: Side,
         /// Stiffness, N·m/rad.
         stiffness: f64,
@@ -66,7 +66,7 @@ enum Surface {
     },
     Joint {
         index: usize,
-        /// Direction of the push, which is 1 towards greater angles and −1 towards smaller angles.
+        /// Direction of the push: 1 towards greater angles, −1 towards smaller angles.
         sign: f64,
         angle: f64,
     },
@@ -83,14 +83,14 @@ pub(super) struct Contact {
     recess: f64,
 }
 
-/// Depth of the arm in a wall, and the joint torques of a unit force from the wall.
+/// Depth of the arm in a wall, and the joint torques that a unit force of the wall causes.
 struct Touch {
     depth: f64,
     torques: JointVec,
 }
 
 impl Touch {
-    /// Returns the speed out of the wall, m/s or rad/s.
+    /// Returns the speed of the arm out of the wall, m/s or rad/s.
     fn speed(&self, qd: &JointVec) -> f64 {
         self.torques.iter().zip(qd).map(|(g, v)| g * v).sum()
     }
@@ -99,7 +99,7 @@ impl Touch {
 impl Contact {
     /// Creates the state of a wall. `dynamics` computes the flange of the arm at `q`. If the configured wall would
     /// overlap the arm, its surface begins at the arm instead. The surface moves to its configured position when the
-    /// arm moves away. Therefore a new wall cannot push the arm away suddenly.
+    /// arm moves away. A new wall therefore cannot push the arm away suddenly.
     pub(super) fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
         let (surface, stiffness, damping) = match wall {
             Wall::Plane { position, normal, stiffness, damping } => {
@@ -157,9 +157,9 @@ impl Contact {
         }
     }
 
-    /// Returns the contributions of the wall to the squared highest natural frequency (1/s²) and to the fastest decay
-    /// (1/s). The contributions are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the joint
-    /// accelerations caused by torques.
+    /// Returns two contributions of the wall: to the squared highest natural frequency (1/s²) and to the fastest
+    /// decay (1/s). The contributions are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the
+    /// joint accelerations caused by torques.
     pub(super) fn rates(
         &self,
         dynamics: &Dynamics,
@@ -200,7 +200,7 @@ impl Arm {
         sum
     }
 
-    /// Sets the walls. Walls that already exist keep their state. Walls that are not in the list are removed.
+    /// Sets the walls. Walls that already exist keep their state. Walls that are not in the list `walls` are removed.
     pub fn set_walls(&mut self, walls: &[Wall]) {
         let mut known = core::mem::take(&mut self.contacts);
         for &wall in walls {

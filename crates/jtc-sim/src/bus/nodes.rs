@@ -6,7 +6,8 @@ use crate::drive::Drive;
 use crate::gripper::Gripper;
 use crate::request::NodeRequest;
 
-/// Time from the end of a request until the first answer is ready, and from each answer to the next answer, µs.
+/// Time from the end of a request until the first answer is ready, µs. The second number is the time from each
+/// answer to the next answer.
 pub(super) const ANSWER_US: (u32, u32) = (38, 6);
 /// Length of the gripper's answer to Move, bytes.
 const GRIPPER_ANSWER: usize = 20;
@@ -32,8 +33,8 @@ impl Nodes {
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
     }
 
-    /// Returns a node's answer to a request that ended at `now_us`, and the time from that end until the answer is
-    /// ready, µs.
+    /// Returns a node's answer to a request that ended at `now_us`. Also returns the time from the end of the
+    /// request until the answer is ready, µs.
     pub fn answer(
         &mut self,
         node: usize,

@@ -17,7 +17,7 @@ impl Drive {
         }
     }
 
-    /// Processes a ChangeFsm request with any byte. The tick function determines the meaning of the byte.
+    /// Processes a ChangeFsm request with any state byte. The function `tick` interprets the byte.
     fn change(&mut self, state: NodeState) -> Answer {
         let before = self.states.state();
         if !self.fault.ignores_state {
@@ -37,7 +37,7 @@ impl Drive {
                 self.goal = if self.mode == 1 { torque.get(n).copied().unwrap_or(0.0) } else { 0.0 };
                 Some(Answer::Joint { node: self.node, report: self.report() })
             }
-            // `NodeRequest` has a separate variant for this request.
+            // `NodeRequest` has the separate variant `ChangeFsm` for this request.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { mode, config, .. } => {
                 let accepted = matches!(self.states.state(), NodeState::INIT | NodeState::READY);
@@ -76,8 +76,8 @@ impl Drive {
         JointReport {
             position: self.position,
             velocity: self.velocity,
-            // The drive reports the magnitude with the sign of the last command. The reported value is not a
-            // measurement.
+            // The drive reports the magnitude of its torque with the sign of the last command. The reported
+            // value is not a measurement.
             torque: if self.goal < 0.0 { -self.torque.abs() } else { self.torque.abs() },
             temperature: byte(self.temperature),
             state: self.states.state(),

@@ -1,12 +1,13 @@
 //! Properties that differ between drives, and the effects of faults on drives.
 
-/// Side of the gear on which the encoder is.
+/// Side of the gear on which the encoder is mounted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EncoderPlace {
-    /// Motor side of the gear. The position is converted to the joint side with the gear ratio.
+    /// The encoder is on the motor side of the gear. The drive converts the position to the joint side with the gear
+    /// ratio.
     #[default]
     Motor,
-    /// Link side of the gear.
+    /// The encoder is on the link side of the gear.
     Link,
 }
 
@@ -21,25 +22,25 @@ pub struct DriveConfig {
     pub enable_ms: u32,
     /// Duration of the pause of the motor control after a stop, ms.
     pub rest_ms: u32,
-    /// Speed that the raw value 32767 represents, rad/s. The value is 2.0, or 6.283185 for older drives.
+    /// Speed that the raw value 32767 represents, rad/s. The velocity scale is 2.0, or 6.283185 for older drives.
     pub velocity_full_scale: f64,
     /// Measured speed at which the drive trips, rad/s, in both directions. Real drives have a limit of 1.8 (older
-    /// drives 1.5 or 1.0), which is 1.2 times the default arm's velocity limit.
-    /// [`SimConfig::new`](crate::SimConfig::new) uses 1.2 times the limit of each joint.
+    /// drives 1.5 or 1.0). The limit of 1.8 is 1.2 times the default arm's velocity limit.
+    /// [`SimConfig::new`](crate::SimConfig::new) uses 1.2 times the velocity limit of each joint.
     pub over_speed: f64,
-    /// Side of the gear at which the position is measured. The drive always measures the speed at the motor. The side
-    /// has an effect only for elastic gears.
+    /// Side of the gear at which the drive measures the position. The drive always measures the speed at the motor.
+    /// The side makes a difference only with elastic gears.
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
     /// Torque at the joint divided by the requested torque. The drive reports the requested torque as the actual
-    /// torque. For real drives, the value is about 1/1.3.
+    /// torque. For real drives, this quotient is about 1/1.3.
     pub delivers: f64,
     /// `true` if the drive processes only one message per interrupt. After two requests without a pause between them,
-    /// such a drive stays one message late.
+    /// such a drive processes each later message one message late.
     pub one_message_per_interrupt: bool,
     /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise
-    /// it answers with the previous state.
+    /// the drive answers with its previous state.
     pub answers_transition: bool,
     /// `true` if answers to Move have 20 bytes, otherwise 16.
     pub long_answers: bool,

@@ -7,7 +7,7 @@ const ENCODER_COUNTS: f64 = 65_536.0;
 const HALF_TURN: f64 = jtc_wire::POSITION_SCALE;
 /// Counts of the motor's incremental encoder per radian of the joint, with the gear ratio of 121.
 const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
-/// Number of encoder differences (each over 1 ms) whose average is the speed.
+/// Number of encoder differences (each over 1 ms) that the drive averages to compute the speed.
 const SPEED_WINDOW: usize = 10;
 
 /// Both encoders of a drive.
@@ -19,8 +19,8 @@ pub(super) struct Encoders {
 }
 
 impl Encoders {
-    /// Returns the speed of a joint (rad/s) after one more millisecond, in which the joint moved to `q` (rad). The
-    /// speed is computed from the encoder of the motor, which is much finer than the encoder of the joint.
+    /// Returns the speed of a joint (rad/s) after one more millisecond, in which the joint moved to `q` (rad). The speed is computed
+    /// from the encoder of the motor, which is much finer than the encoder of the joint.
     pub(super) fn speed(&mut self, q: f64) -> f64 {
         let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
@@ -28,8 +28,8 @@ impl Encoders {
         (motor - oldest) as f64 / (MOTOR_COUNTS_PER_RAD * SPEED_WINDOW as f64 * 0.001)
     }
 
-    /// Returns the position of a joint at `q` (rad) as the absolute encoder measures it, rad. The result does not
-    /// contain the number of whole turns.
+    /// Returns the position of a joint at `q` (rad) as the absolute encoder measures it, rad. The absolute encoder does not count
+    /// whole turns.
     pub(super) fn position(&self, q: f64) -> f64 {
         let turns = q / core::f64::consts::TAU;
         let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
@@ -37,7 +37,7 @@ impl Encoders {
     }
 }
 
-/// Returns the largest whole number that is less than or equal to `x`. Replaces `f64::floor`, which is a slow function
+/// Returns the largest whole number that is less than or equal to `x`. The function replaces `f64::floor`, which is a slow function
 /// call if the compiler does not use the processor instruction for it.
 pub(super) fn floor(x: f64) -> i64 {
     let near = x as i64;

@@ -1,10 +1,11 @@
-//! State machine of a drive. A request stays pending until a transition clears it, and enabling takes time.
+//! State machine of a drive. A requested state stays pending until a transition clears the request. Enabling takes
+//! time.
 use jtc_bus::NodeState;
 
 use super::DriveConfig;
 
-/// Codes of transitions, which differ between generations of drives. The values are the codes of the simulated
-/// generation.
+/// Codes of transitions, which differ between generations of drives. The constants are the codes of the simulated
+/// generation of drives.
 const READY_TO_INIT: NodeState = NodeState::new(14);
 const REACTION_TO_FAULT: NodeState = NodeState::new(15);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
@@ -33,7 +34,7 @@ impl States {
         self.state
     }
 
-    /// Stores a request with any byte. [`accept`](Self::accept) determines the meaning of the byte.
+    /// Stores the requested state, which may be any byte. [`accept`](Self::accept) interprets the byte.
     pub(super) fn request(&mut self, state: NodeState) {
         self.pending = state;
     }
@@ -43,8 +44,8 @@ impl States {
         self.age = self.age.saturating_add(1);
     }
 
-    /// Returns `true` if a further error has no effect, because the drive already reacts to an error or has just
-    /// started.
+    /// Returns `true` while the drive already reacts to an error or has just started. A further error then has no
+    /// effect.
     pub(super) fn reacting(&self) -> bool {
         matches!(
             self.state,
@@ -66,12 +67,12 @@ impl States {
             (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
             // Some drives, including the simulated drive, treat an echoed fault byte as an enable command.
             (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
-            // The error byte stays 0.
+            // The error byte of the drive stays 0.
             (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
                 self.pending = NodeState::START;
                 NodeState::FAULT
             }
-            // All other requests stay pending until a transition clears the pending request.
+            // Any other requested state stays pending until a transition clears it.
             _ => return,
         };
         self.enter(next, config);
@@ -85,8 +86,8 @@ impl States {
         self.age = 0;
     }
 
-    /// Continues a transition. The end of the transition clears a pending request. Returns `true` if the errors are
-    /// acknowledged.
+    /// Continues a transition. The end of the transition clears the pending request. Returns `true` if the errors
+    /// are acknowledged.
     pub(super) fn proceed(&mut self, config: &DriveConfig) -> bool {
         self.rest = self.rest.saturating_sub(1);
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };
@@ -103,7 +104,7 @@ impl States {
                 self.aligned = true;
                 NodeState::ENABLED
             }
-            // A stop interrupts the transition.
+            // An error interrupts a transition and begins the fault reaction.
             NodeState::FAULT_REACTION if self.age > 0 => REACTION_TO_FAULT,
             REACTION_TO_FAULT if self.age > 0 => NodeState::FAULT,
             _ => return false,

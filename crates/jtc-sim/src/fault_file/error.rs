@@ -9,19 +9,19 @@ use crate::faults::FaultKind;
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FaultFileError {
-    /// The file is not valid TOML in the format of fault files. The text comes from the TOML reader and contains the
-    /// position in the file.
+    /// The fault file is not valid TOML, or does not have the format of fault files. The TOML reader creates the
+    /// text, which contains the position in the file.
     Syntax(String),
-    /// The file does not contain `format = 2`.
+    /// The fault file does not contain `format = 2`.
     Format {
         /// Format number of the file.
         found: Option<f64>,
     },
-    /// The file uses the key `node`, which was used before format 2.
+    /// The fault file uses the key `node`, which only formats before 2 contain.
     Node {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Value in the file.
+        /// Value of the key `node`.
         node: f64,
     },
     /// A fault contains both `joint` and `gripper`, or neither of the two keys.
@@ -35,17 +35,17 @@ pub enum FaultFileError {
     Hand {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Reason.
+        /// Reason why the trajectory file cannot be used.
         text: String,
     },
-    /// Unknown kind of fault.
+    /// The kind of the fault is unknown.
     UnknownKind {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Kind in the file.
+        /// Kind of the fault in the file.
         kind: String,
     },
-    /// A key that this kind needs is missing.
+    /// A key is missing that this kind of fault needs.
     Missing {
         /// Number of the fault in the file, from 1.
         fault: usize,
@@ -54,63 +54,63 @@ pub enum FaultFileError {
         /// Missing key.
         key: &'static str,
     },
-    /// The key has no meaning for this kind of fault.
+    /// The fault contains a key that has no meaning for its kind.
     Superfluous {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// Kind of the fault.
         kind: String,
-        /// The superfluous key.
+        /// Key that has no meaning for the kind.
         key: &'static str,
     },
-    /// The value is outside its range.
+    /// The value of a key is outside its range.
     Range {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// The key.
+        /// Key with the value.
         key: &'static str,
         /// Value in the file.
         value: f64,
-        /// Smallest and largest permitted value.
+        /// Smallest and largest permitted value of the key.
         allowed: (f64, f64),
     },
-    /// The value must be a whole number.
+    /// The value of the key must be a whole number.
     NotWhole {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// The key.
+        /// Key with the value.
         key: &'static str,
         /// Value in the file.
         value: f64,
     },
-    /// The value is not a list of three numbers.
+    /// The value of the key is not a list of three numbers.
     NotThree {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// The key.
+        /// Key with the value.
         key: &'static str,
-        /// Number of values in the file.
+        /// Number of numbers in the list.
         count: usize,
     },
     /// The normal of a wall has the length 0.
     NoDirection {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Value in the file.
+        /// Normal of the wall in the file.
         normal: [f64; 3],
     },
-    /// Unknown side of an angle.
+    /// The name of the side of an angle is unknown.
     UnknownSide {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Side in the file.
+        /// Name of the side in the file.
         side: String,
     },
-    /// Unknown state.
+    /// The name of a controller state in the file is unknown.
     UnknownState {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// State in the file.
+        /// Name of the state in the file.
         state: String,
     },
     /// The fault does not contain exactly one of the keys `at_s`, `in_state` and `at_point`.

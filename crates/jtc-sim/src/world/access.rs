@@ -25,7 +25,7 @@ pub struct Statistics {
     pub serial_to_host: u64,
     /// Number of valid host frames that the controller executed.
     pub good_frames: u64,
-    /// Number of invalid frames and of noise events.
+    /// Number of invalid frames and noise events on the serial line.
     pub bad_frames: u64,
     /// Number of bytes from the host that the board could not store in its buffer.
     pub lost_bytes: u64,
@@ -55,8 +55,8 @@ impl World {
         }
     }
 
-    /// Limits the silence of the host to `us` µs of the host's own time, because virtual time may pass faster. Therefore a gap (J-03)
-    /// that the host did not cause cannot interrupt a frame that another program sends in pieces. Bytes that wait on the line still
+    /// Limits the silence of the host to `us` µs of the host's own time, because virtual time may pass faster. With this limit,
+    /// virtual time alone causes no gap (J-03) in a frame that another program sends in pieces. Bytes that wait on the line still
     /// cause gaps. With `None`, the default, only virtual time counts.
     pub fn limit_host_silence(&mut self, us: Option<u64>) {
         self.silence_us = us;
@@ -85,7 +85,7 @@ impl World {
         self.board.clear_log();
     }
 
-    /// Returns the controller, for a replay of a recording.
+    /// Returns the controller. A replay of a recording needs this controller.
     pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
         self.board.controller()
     }
@@ -95,7 +95,7 @@ impl World {
         self.board.telemetry()
     }
 
-    /// Returns the image of the arm that the controller's board has stored, and its number (J-54).
+    /// Returns the image of the arm that the controller's board has stored, and the sequence number of the image (J-54).
     pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
         self.board.stored_arm()
     }
@@ -125,7 +125,7 @@ impl World {
         self.exchange.get_or_insert_default();
     }
 
-    /// Returns the inputs and outputs of the controller's board in the last millisecond. `None` if the board is not
+    /// Returns the inputs and outputs of the controller's board in the last millisecond. Returns `None` if the board is not
     /// [watched](Self::watch_board).
     pub fn exchange(&self) -> Option<&Exchange> {
         self.exchange.as_deref()
@@ -136,7 +136,7 @@ impl World {
         self.ticked
     }
 
-    /// Returns the state of the bus in the last millisecond.
+    /// Returns the state of the joint bus in the last millisecond.
     pub fn bus_state(&self) -> BusState {
         self.bus_state
     }
@@ -147,12 +147,12 @@ impl World {
     }
 
     /// Queues a frame of a node outside this simulation. The frame is an answer for the controller, or a request for the nodes.
-    /// Returns `false` if too many such frames are already waiting.
+    /// Returns `false` if too many such frames are already queued.
     pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
         self.bus.put(frame)
     }
 
-    /// Returns the state bytes of joints and gripper (255 if there is no gripper).
+    /// Returns the state bytes of the joints and the gripper (255 without a gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.node_states
     }
@@ -162,12 +162,12 @@ impl World {
         &self.board.worked
     }
 
-    /// Returns the level of the controller's safety output, in which `true` means no error.
+    /// Returns the level of the controller's safety output; `true` means no error.
     pub fn safety_output(&self) -> bool {
         self.safety_output
     }
 
-    /// Sets the level of the controller's safety input, in which `true` means no error.
+    /// Sets the level of the controller's safety input; `true` means no error.
     pub fn set_safety_input(&mut self, level: bool) {
         self.safety_input = level;
     }
@@ -177,12 +177,12 @@ impl World {
         self.plant.set_part_present(present);
     }
 
-    /// Adds a fault. `Trigger::At` counts from the start of the simulation.
+    /// Adds a fault. `Trigger::At` is the time since the start of the simulation.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);
     }
 
-    /// Adds the faults of a fault file. `Trigger::At` counts from the start of the simulation.
+    /// Adds the faults of a fault file. `Trigger::At` is the time since the start of the simulation.
     pub fn inject_all(&mut self, plan: FaultPlan) {
         let known = self.hands.len();
         self.hands.extend(plan.hands);
@@ -209,7 +209,7 @@ impl World {
         self.inject(Fault { kind, trigger, duration_ms: None });
     }
 
-    /// Returns the last millisecond, for the check of invariants.
+    /// Returns the data of the last millisecond, for the check of invariants.
     pub fn moment(&self) -> Moment<'_> {
         Moment {
             time_us: self.now_us(),

@@ -1,16 +1,17 @@
-//! Inputs and outputs of the controller's board in a millisecond. The data are for programs that run a different board,
-//! or a controller in a different program, in parallel with the simulated board.
+//! Inputs and outputs of the controller's board in one millisecond. Programs that run another board or another
+//! controller in parallel use these data.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 
 use crate::board::{Board, Pins};
 
-/// Inputs and outputs of the controller's board in a millisecond.
+/// Inputs and outputs of the controller's board in one millisecond.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exchange {
     /// Bytes from the host that arrived before the tick.
     pub host: Vec<u8>,
-    /// `true` if a tick was executed. Otherwise the board only received the bytes from the host and produced no output.
+    /// `true` if the board executed a tick. Otherwise the board only received the bytes from the host and produced no
+    /// output.
     pub ticked: bool,
     /// Joint bus frames that the tick received.
     pub bus: Vec<Frame>,
@@ -45,7 +46,7 @@ impl Default for Exchange {
 }
 
 impl Exchange {
-    /// Adds the inputs and outputs of the tick to the exchange.
+    /// Stores the inputs and outputs of the tick in the exchange.
     pub(super) fn note(&mut self, pins: &Pins<'_>, outputs: &Outputs, board: &Board) {
         self.ticked = true;
         self.bus = pins.bus.to_vec();
@@ -58,7 +59,7 @@ impl Exchange {
 }
 
 impl Board {
-    /// Returns the bytes that the last tick, which had these outputs, sends to the host. The bytes are a status, an
+    /// Returns the bytes that the board sends to the host after the tick with these outputs. The bytes are a status, an
     /// answer to an extension request, or no bytes.
     pub fn bytes_to_host(&self, outputs: &Outputs) -> Vec<u8> {
         let status: &[u8] = if outputs.status { self.status_frame() } else { &[] };

@@ -5,14 +5,14 @@ use jtc_core::{Config, Telemetry};
 use crate::board::Worked;
 use crate::plant::Truth;
 
-/// One millisecond of the simulation, with the actions of the controller and the true state of the arm.
+/// Data of one millisecond: the actions of the controller and the true state of the arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
     /// Time since the start of the simulation, µs.
     pub time_us: u64,
     /// `true` if the controller executed its tick.
     pub ticked: bool,
-    /// Telemetry of the tick.
+    /// Telemetry of the controller's tick.
     pub telemetry: &'a Telemetry,
     /// True state of the arm.
     pub truth: &'a Truth,

@@ -1,6 +1,5 @@
-//! Prints the throughput of the CRC function and of the stream parser as one JSON object. Run it with `cargo run --profile dist -p
-//! jtc-wire
-//! --example throughput`.
+//! Prints the throughput of the CRC function and of the stream parser as one JSON object. The command is
+//! `cargo run --profile dist -p jtc-wire --example throughput`.
 use std::hint::black_box;
 
 use crc::{CRC_16_XMODEM, Crc, Table};
@@ -10,8 +9,9 @@ use test_kit::clock::CpuTime;
 static ONE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_XMODEM);
 static SIXTEEN: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_XMODEM);
 
-/// Returns GB/s in the fastest of many short rounds of `bytes` bytes each, because other programs can only make a round slower.
-/// The rounds of the measured functions alternate, so that a slow period of the computer affects all functions.
+/// Returns the throughput in GB/s of the fastest of many short rounds of `bytes` bytes each. The fastest round counts, because
+/// other programs can only make a round slower. The rounds of the measured functions alternate, so that a slow period of the
+/// computer affects all functions.
 fn measure(bytes: usize, contenders: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     const ROUNDS: usize = 301;
     let mut best = vec![f64::INFINITY; contenders.len()];

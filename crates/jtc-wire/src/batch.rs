@@ -12,16 +12,16 @@ pub const EVENTS_MAX: usize = 16;
 pub struct ReceivedEvent<'a> {
     /// Number of the serial line of the event.
     pub line: usize,
-    /// Position of the first byte of the event in the byte stream of that line.
+    /// Position of the first byte of the event in the byte stream of its serial line.
     pub position: u64,
-    /// `true` for a frame on a plain line. On a plain line, no extension request arrived in the 2 s before the first byte of the
-    /// frame (J-51).
+    /// `true` for a frame on a plain line. A line is plain if no extension request arrived on it in the 2 s before the first byte
+    /// of the frame (J-51).
     pub plain: bool,
     /// The received event.
     pub event: LinkEvent<'a>,
 }
 
-/// Events in the order of execution. All fields are integers, so that a memory of zeros is an empty batch.
+/// Events in the order of execution. All fields are integers, so that zeroed memory is an empty batch.
 pub struct EventBatch {
     /// Number of stored events, and number of events that the controller has executed.
     len: u16,
@@ -86,7 +86,7 @@ impl EventBatch {
         true
     }
 
-    /// Returns the event with index `n` in the list of events that are not done.
+    /// Returns the pending event with index `n`.
     pub fn get(&self, n: usize) -> Option<ReceivedEvent<'_>> {
         let n = usize::from(self.done).checked_add(n)?;
         let entry = self.entries.get(..usize::from(self.len))?.get(n)?;
@@ -113,7 +113,7 @@ impl EventBatch {
         })
     }
 
-    /// Marks the oldest `count` pending events as done. When all events are done, the batch is empty again.
+    /// Marks the oldest `count` pending events as done. When all events are done, the batch is emptied.
     pub fn done(&mut self, count: usize) {
         let left = usize::from(self.len - self.done);
         self.done += count.min(left) as u16;
@@ -122,7 +122,7 @@ impl EventBatch {
         }
     }
 
-    /// Returns `true` if no pending event is left.
+    /// Returns `true` if no event is pending.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

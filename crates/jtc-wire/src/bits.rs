@@ -1,22 +1,24 @@
-//! Bits of the words in JtcStatus that describe the controller. Each word is a table with bit, name, text and meaning.
+//! Bits of the words in JtcStatus that describe the controller. A table for each word contains the number, name, text
+//! and meaning of each bit.
 use jtc_bus::bit_words;
 
 bit_words! {
     /// Bits of the controller's error words, current and occurred.
     error: u16 {
-        /// Safety input low.
+        /// The safety input is low.
         EMERGENCY_INPUT = 0, "emergency input";
         /// An internal error keeps the safety output at 0.
         EMERGENCY_OUTPUT = 1, "emergency output";
-        /// Any internal error.
+        /// The controller reports an internal error of any kind.
         INTERNAL = 2, "internal error";
-        /// Any external error.
+        /// The controller reports an external error of any kind.
         EXTERNAL = 3, "external error";
         /// A joint has an internal error.
         INTERNAL_JOINTS = 4, "internal joints error";
-        /// CAN timeout or bus-off.
+        /// A frame was not acknowledged in time, a node did not answer in time, or the controller is bus-off.
         INTERNAL_CAN = 5, "internal CAN error";
-        /// Error of the host link. Not used by this controller, which does not report a silent host as an error.
+        /// Error of the host link. The controller of openjtc does not use the bit, because it does not report a
+        /// silent host as an error.
         INTERNAL_COM = 6, "internal COM error";
         /// A node reports an error or does not behave as expected.
         EXTERNAL_JOINTS = 7, "external joints error";
@@ -40,21 +42,21 @@ bit_words! {
 
     /// Bits of the parameters that the controller has not received.
     missing_parameter: u8 {
-        /// Friction polynomial or friction table.
+        /// The friction polynomial or the friction table is missing.
         FRICTION = 0, "friction";
-        /// PID gains.
+        /// The PID gains are missing.
         PID = 1, "PID";
-        /// Arm model.
+        /// The arm model is missing.
         MODEL = 2, "arm model";
     }
 }
 
 /// Bits of the CAN flags, current and occurred.
 pub mod can_flag {
-    /// Frames of the controller are not acknowledged, or its CAN controller is bus-off.
+    /// No node acknowledges the frames of the controller, or its CAN controller is bus-off.
     pub const TRANSMIT_TIMEOUT: u32 = 1 << 0;
 
-    /// Bit 8+n, which means that node n (joints 0..5, gripper 6) does not answer.
+    /// Returns bit 8+n, which means that node n (joints 0..5, gripper 6) does not answer.
     pub const fn no_answer(node: usize) -> u32 {
         0x100_u32.wrapping_shl(node as u32)
     }

@@ -2,8 +2,8 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-/// Declares a list of codes. The list consists of an enum, the list of its variants, the conversion from a byte, and the names. The
-/// name of a variant without a text is its identifier.
+/// Declares a list of codes. The macro creates an enum, the list of its variants, the conversion from a byte, and the names. If a
+/// variant has no text, its identifier is its name.
 macro_rules! codes {
     (@text $name:ident $text:literal) => { $text };
     (@text $name:ident) => { stringify!($name) };
@@ -19,7 +19,7 @@ macro_rules! codes {
             /// All codes, in the order of their numbers.
             pub const ALL: [Self; [$($code),+].len()] = [$(Self::$name),+];
 
-            /// Returns the code with the number `byte`.
+            /// Returns the code with the number `byte`, or `None` if no code has this number.
             pub const fn from_byte(byte: u8) -> Option<Self> {
                 match byte {
                     $($code => Some(Self::$name),)+

@@ -1,4 +1,4 @@
-//! Commands of the host, which are the meanings of the host frames.
+//! Commands of the host. A command is the decoded form of a host frame.
 use crate::code::codes;
 use crate::extension::{Name, Values};
 use crate::floats::Floats;
@@ -19,8 +19,7 @@ codes! {
 /// Bits of the nodes 0..6.
 pub const ALL_NODES: u8 = 0x7F;
 
-/// Meaning of a command, which borrows the bytes of the frame. The lengths are valid. The numbers in `Floats` are not
-/// checked yet.
+/// A command of the host, which borrows the bytes of its frame. The lengths are valid. The numbers in `Floats` are not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command<'a> {
     /// Command to clear current errors. In the frame, bit 0 of the first mask selects the controller, and bits 0..6 of
@@ -28,10 +27,10 @@ pub enum Command<'a> {
     ClearCurrentErrors {
         /// `true` to clear the errors of the controller itself.
         jtc: bool,
-        /// Mask of nodes.
+        /// Mask of the nodes, bits 0..6.
         nodes: u8,
     },
-    /// Command to clear current and occurred errors.
+    /// Command to clear the current and occurred errors.
     ClearOccurredErrors,
     /// Segment of a trajectory.
     Trajectory(Segment<'a>),
@@ -49,20 +48,20 @@ pub enum Command<'a> {
     ArmModelUseDefault,
     /// Command for the execution of the trajectory.
     TrajSetExecStatus(ExecCommand),
-    /// Switch teaching on.
+    /// Command to switch teaching on.
     TeachingModeEnable,
-    /// Switch teaching off.
+    /// Command to switch teaching off.
     TeachingModeDisable,
     /// Friction polynomial with 4 or 6 coefficients for each of 6 joints, highest index first.
     FrictionPolynomial(Floats<'a>),
     /// Command to use the default friction polynomial (also a frame of type 0x0E with 6 bytes).
     FrictionPolynomialUseDefault,
-    /// Reset nodes.
+    /// Command to reset nodes.
     ResetCanDevices {
         /// Mask of the nodes, bits 0..6.
         nodes: u8,
     },
-    /// Switch the pump.
+    /// Command to switch the pump.
     GripperControl {
         /// `true` to switch the pump on.
         pump: bool,
@@ -91,7 +90,7 @@ pub enum Command<'a> {
     Jog(Floats<'a>),
     /// Request for a page of the flight recorder's log (J-56).
     GetLog {
-        /// Number of a block.
+        /// Number of the block.
         block: u32,
         /// First requested byte of the block.
         offset: u16,
@@ -190,8 +189,8 @@ impl<'a> Command<'a> {
             }
             FrameType::ClearLog => Self::ClearLog,
             FrameType::GetPoints => Self::GetPoints { first: from()? },
-            // Only a device sends these frames, which are JtcStatus and the answers. Without this match arm, the compiler would
-            // insert a trap for the unused numbers between the types.
+            // Only a device sends JtcStatus and the answers. Without this match arm, the compiler would insert a trap for the unused
+            // numbers between the types.
             _ => return Err(DataStatus::NotAllowed),
         })
     }

@@ -1,4 +1,4 @@
-//! CRC-16/XMODEM of whole slices and of parts, and the arithmetic that checks a frame inside a longer stream.
+//! CRC-16/XMODEM of whole slices and of parts of a stream, and the arithmetic that checks a frame inside a longer stream.
 use crc::{CRC_16_XMODEM, Crc, Table};
 
 // On a microcontroller, the CRC function uses one table of 512 bytes. On a PC, it uses sixteen such tables, which is
@@ -19,8 +19,8 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     CRC.checksum(bytes)
 }
 
-/// Returns the CRC register after `bytes`, if its value before these bytes was `register`. With this function, the
-/// caller can compute `crc16` in several steps.
+/// Returns the CRC register after `bytes`, if the value before these bytes was `register`. With this function, the caller can compute
+/// `crc16` in several steps.
 ///
 /// ```
 /// use jtc_wire::{crc16, crc16_update};
@@ -35,8 +35,8 @@ pub fn crc16_update(register: u16, bytes: &[u8]) -> u16 {
 /// CRC polynomial without its highest term.
 const POLYNOMIAL: u16 = 0x1021;
 
-/// Returns the CRC register after one zero byte. This function is also the bit-by-bit definition from which the
-/// constants are computed.
+/// Returns the CRC register after one zero byte. `zero_byte` is the bit-by-bit definition of the CRC. The module computes its tables
+/// with `zero_byte`.
 const fn zero_byte(mut register: u16) -> u16 {
     let mut bit = 0;
     while bit < 8 {
@@ -65,7 +65,7 @@ const fn multiply(a: u16, b: u16) -> u16 {
         bit -= 1;
         let carry = product & 0x8000 != 0;
         product <<= 1;
-        // The function uses masks instead of branches, so that its execution time does not depend on the data.
+        // The multiplication uses masks instead of branches, so that its execution time does not depend on the data.
         product ^= POLYNOMIAL & 0u16.wrapping_sub(carry as u16);
         product ^= a & 0u16.wrapping_sub(b >> bit & 1);
     }
@@ -88,14 +88,14 @@ const fn powers(step: usize) -> [u16; 256] {
     table
 }
 
-/// Powers x^(8·i) and x^(8·256·i) modulo the polynomial.
+/// Powers x^(8·i) and x^(8·256·i) modulo the CRC polynomial.
 static LOW: [u16; 256] = powers(1);
 static HIGH: [u16; 256] = powers(256);
 
 /// Returns the CRC register after `count` zero bytes, in constant time. `count` is below 65,536.
 ///
-/// The CRC is linear. If `a` and `b` are the registers at two positions of a stream, `count` bytes apart, the CRC of the bytes between them
-/// is `b ^ advance(a, count)`. So two registers are sufficient to check any frame in a stream.
+/// The CRC is linear. Let `a` and `b` be the registers at two positions of a stream, `count` bytes apart. The CRC of the bytes between
+/// these positions is `b ^ advance(a, count)`. Two registers are therefore sufficient to check any frame in a stream.
 pub(crate) fn advance(register: u16, count: usize) -> u16 {
     let power = multiply(LOW[count & 0xFF], HIGH[count >> 8 & 0xFF]);
     multiply(register, power)

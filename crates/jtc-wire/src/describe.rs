@@ -10,7 +10,7 @@ use crate::segment::Segment;
 use crate::status::Status;
 use crate::words::{self, Bits};
 
-/// Text of any bytes. The text describes the frame, of either direction, or the reason why the bytes are not a frame.
+/// Text of any bytes. The text describes the frame, which may be of either direction, or the reason why the bytes are not a frame.
 ///
 /// ```
 /// use jtc_wire::Described;
@@ -69,7 +69,7 @@ impl Display for FrameRef<'_> {
         match Command::parse(*self) {
             Ok(command) => {
                 command.fmt(f)?;
-                // Two frame types have this meaning, but only one of these is the correct type.
+                // Two frame types have the meaning of this command, but only one of the two types is correct.
                 if self.frame_type != command.frame_type() {
                     write!(f, " (sent as an empty {})", self.frame_type)?;
                 }
@@ -203,7 +203,7 @@ impl Display for Status {
     }
 }
 
-/// Writer of the names of the set bits, for words in which at least one bit is set.
+/// Writer for the names of the set bits of words. The writer omits words without set bits.
 struct Lists<'a, 'b> {
     f: &'a mut Formatter<'b>,
 }
@@ -243,18 +243,17 @@ impl Display for crate::GripperStatus {
     }
 }
 
-/// Part of a capture.
+/// Part of a recorded byte stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece<'a> {
-    /// Valid frame of either direction.
+    /// Valid frame from the host or from the device.
     Frame(FrameRef<'a>),
-    /// Bytes between valid frames, which are invalid frames, noise, or a frame that is incomplete at the end of the
-    /// capture.
+    /// Bytes between valid frames. The bytes are invalid frames, noise, or a frame that is incomplete at the end of the capture.
     Other(&'a [u8]),
 }
 
-/// Returns the frames of a whole capture and the bytes between the frames, in order. The times are not known, so gaps do not end a
-/// frame.
+/// Returns the frames of a whole capture and the bytes between the frames, in order. The capture contains no times, so a gap does
+/// not end a frame.
 ///
 /// ```
 /// use jtc_wire::{Piece, fixed, pieces};

@@ -1,4 +1,4 @@
-//! Encoders that write the host's frames into the caller's buffer. Numbers are checked and scaled; they never wrap and are never clipped.
+//! Encoders that write the host's frames into the caller's buffer. The encoders check and scale numbers; they never wrap or clip a number.
 use crate::command::Command;
 use crate::crc16;
 use crate::encode_error::{Channel, EncodeError, OutOfScale};
@@ -13,8 +13,8 @@ use crate::layout::{SET_VALUES_MAX, VALUE_LEN};
 use crate::segment::{RAW_FULL_SCALE, RawPoint, Segment, field};
 
 impl RawPoint {
-    /// Converts values in rad, rad/s and rad/s² to the nearest point that the wire format can represent. Returns an error for a number
-    /// that is outside the scale or NaN.
+    /// Converts values in rad, rad/s and rad/s² to the nearest point that the wire format can represent. Returns an error if a number is
+    /// outside the scale or NaN.
     pub fn from_si(
         position: &[f64; JOINTS],
         velocity: &[f64; JOINTS],
@@ -29,7 +29,7 @@ impl RawPoint {
                     return Err(OutOfScale { joint, channel, value, limit });
                 }
                 let exact = value * RAW_FULL_SCALE / limit;
-                // The cast truncates towards zero, so the addition of one half rounds to the nearest integer.
+                // The cast truncates towards zero, so the code adds one half to round to the nearest integer.
                 *to = (exact + 0.5f64.copysign(exact)) as i16;
             }
             Ok(raw)
@@ -60,7 +60,7 @@ fn frame(
     Ok(n)
 }
 
-/// Writes a Trajectory frame and returns its length. After an error, the content of the buffer is invalid.
+/// Writes a Trajectory frame and returns the length of the frame. After an error, the content of the buffer is invalid.
 pub fn trajectory(
     out: &mut [u8],
     (number, segment, segments): (u16, u16, u16),
@@ -88,8 +88,8 @@ pub fn trajectory(
     })
 }
 
-/// Writes a frame of floats in the order of the wire format (FrictionTable, PidParam, ArmModel, FrictionPolynomial or Jog) and returns its
-/// length.
+/// Writes a frame of floats in the order of the wire format, and returns its length. The frame is FrictionTable, PidParam, ArmModel,
+/// FrictionPolynomial or Jog.
 pub fn floats(
     out: &mut [u8],
     frame_type: FrameType,
@@ -121,8 +121,8 @@ pub fn pid_param(out: &mut [u8], gains: &[[f64; 5]; JOINTS]) -> Result<usize, En
     floats(out, FrameType::PidParam, gains.as_flattened().iter().copied())
 }
 
-/// Writes an ArmModel frame. The frame contains the joint origins (x, y, z in m, roll, pitch, yaw in rad). After these it contains the
-/// links (an origin, Ixx Ixy Ixz Iyy Iyz Izz in kg·m², mass in kg).
+/// Writes an ArmModel frame. The frame contains the joint origins (x, y, z in m, roll, pitch, yaw in rad), followed by the links (an
+/// origin, Ixx Ixy Ixz Iyy Iyz Izz in kg·m², mass in kg).
 pub fn arm_model(
     out: &mut [u8],
     joints: &[[f64; 6]; 7],
@@ -132,8 +132,8 @@ pub fn arm_model(
     floats(out, FrameType::ArmModel, values.copied())
 }
 
-/// Writes a FrictionPolynomial frame. `coefficients` contains 4 or 6 coefficients per joint, beginning with c0. In the wire format,
-/// the coefficient with the highest index is first.
+/// Writes a FrictionPolynomial frame. `coefficients` contains 4 or 6 coefficients per joint, beginning with c0. In the frame, the
+/// coefficient with the highest index is first.
 pub fn friction_polynomial<const N: usize>(
     out: &mut [u8],
     coefficients: &[[f64; N]; JOINTS],
@@ -143,12 +143,12 @@ pub fn friction_polynomial<const N: usize>(
     floats(out, FrameType::FrictionPolynomial, values.copied())
 }
 
-/// Friction of one joint by velocity and temperature.
+/// Friction torque of one joint as a function of velocity and temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionTable<'a> {
-    /// Velocities, rad/s, strictly increasing.
+    /// Velocities of the rows, rad/s, strictly increasing.
     pub velocity: &'a [f32; 20],
-    /// Temperatures, °C, strictly increasing.
+    /// Temperatures of the columns, °C, strictly increasing.
     pub temperature: &'a [f32; 20],
     /// Torques, N·m, with one row per velocity.
     pub torque: &'a [[f32; 20]; 20],
@@ -171,7 +171,7 @@ fn raw_floats(out: &mut [u8], frame_type: FrameType, floats: Floats<'_>) -> Resu
 }
 
 impl Command<'_> {
-    /// Writes the frame of the command and returns its length. The floats of the command are copied unchanged.
+    /// Writes the frame of the command and returns the length of the frame. The floats of the command are copied unchanged.
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let mut fixed = |bytes: &[u8]| {
             let given = out.len();
@@ -211,7 +211,7 @@ impl Command<'_> {
     }
 }
 
-/// Writes a SetSettings frame and returns its length.
+/// Writes a SetSettings frame and returns the length of the frame.
 pub fn set_settings(
     out: &mut [u8],
     values: impl IntoIterator<Item = SettingValue>,

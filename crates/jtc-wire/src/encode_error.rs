@@ -42,16 +42,16 @@ impl Channel {
     }
 }
 
-/// A number that a trajectory point cannot carry.
+/// A number that is outside the scale of a trajectory point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfScale {
     /// Joint, 0..5.
     pub joint: usize,
     /// Quantity of the number.
     pub channel: Channel,
-    /// The number: outside the scale, infinite, or NaN.
+    /// Value that is outside the scale, infinite, or NaN.
     pub value: f64,
-    /// Largest magnitude that the wire format can represent.
+    /// Largest magnitude that the wire format can represent for the quantity.
     pub limit: f64,
 }
 
@@ -79,18 +79,18 @@ pub enum EncodeError {
         /// Length of the buffer, bytes.
         given: usize,
     },
-    /// There are more points than a frame can have.
+    /// The caller passed more points than a Trajectory frame can contain.
     TooManyPoints {
-        /// Number of points. There may be more.
+        /// Number of points that were counted. The caller may have passed more.
         points: usize,
         /// Maximum number of points in a frame.
         limit: usize,
     },
-    /// A frame of this type has another number of floats.
+    /// The number of floats is not permitted for the type of the frame.
     WrongCount {
         /// Type of the frame.
         frame_type: FrameType,
-        /// Number of floats. There may be more.
+        /// Number of floats that were counted. The caller may have passed more.
         count: usize,
     },
     /// A float is infinite, NaN, or too large for an f32.
@@ -99,7 +99,7 @@ pub enum EncodeError {
         frame_type: FrameType,
         /// Index of the float from 0, in the order of the wire format.
         index: usize,
-        /// Its value.
+        /// Value of the float.
         value: f64,
     },
 }
@@ -129,13 +129,14 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Name of a float in a frame, from the type of the frame and the index of the float, from 0 in the order of the wire format. It is
+/// Name of a float in a frame: the frame type, and the index of the float, from 0 in the order of the wire format. A float name is
 /// displayed as `PidParam joint 3 Ki`, with joints counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FloatName(pub FrameType, pub usize);
 
 impl FloatName {
-    /// Names of the numbers of a link, in the order of the wire format. The first six are also the names of the numbers of an origin.
+    /// Names of the numbers of a link, in the order of the wire format. The first six names are also the names of the numbers of an
+    /// origin.
     pub const LINK: [&'static str; 13] =
         ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
 }

@@ -1,4 +1,4 @@
-//! Extensions of the protocol (J-50), for identity, settings and the arm image. Requests are types 0x40 to 0x4F. A device can answer a
+//! Extensions of the protocol (J-50) for identity, settings and the arm image. Requests have the types 0x40 to 0x4F. A device can answer a
 //! request with a frame of type 0x50 to 0x5F, in addition to the response record. The device sends such an answer only after a request,
 //! and only on the serial line of the request.
 use core::fmt;
@@ -55,8 +55,8 @@ impl Name {
         Self(bytes)
     }
 
-    /// Parses a name from the wire format. Returns `None` if the name is not valid text, or if a byte after the end of the
-    /// text is not zero.
+    /// Parses a name from the wire format. Returns `None` if the bytes are not valid text, or if a byte after the end of the text is not
+    /// zero.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let bytes: [u8; NAME_LEN] = bytes.try_into().ok()?;
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
@@ -66,13 +66,13 @@ impl Name {
         Self::new(core::str::from_utf8(bytes.get(..end)?).ok()?)
     }
 
-    /// Returns the text.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
         self.0.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or_default()
     }
 
-    /// Returns the bytes in the wire format.
+    /// Returns the bytes of the name in the wire format.
     pub const fn as_bytes(&self) -> &[u8; NAME_LEN] {
         &self.0
     }
@@ -96,7 +96,7 @@ pub struct SettingValue {
 }
 
 impl SettingValue {
-    /// Returns the bytes in the wire format, in the order setting, joint, value.
+    /// Returns the setting value in the wire format, in the order setting, joint, value.
     pub fn emit(&self) -> [u8; VALUE_LEN] {
         let [a, b, c, d, e, f, g, h] = self.value.to_be_bytes();
         [self.setting, self.joint, a, b, c, d, e, f, g, h]
@@ -124,7 +124,7 @@ impl<'a> Values<'a> {
         self.0.as_chunks::<VALUE_LEN>().0.iter().map(SettingValue::parse)
     }
 
-    /// Returns the number of values.
+    /// Returns the number of values in the list.
     pub fn len(&self) -> usize {
         self.0.len() / VALUE_LEN
     }
@@ -158,31 +158,31 @@ pub enum Answer<'a> {
     Info(Info),
     /// Answer to GetSettings.
     Settings {
-        /// Number of the settings before the first value of this frame.
+        /// Number of values that precede the first value of this frame.
         first: u16,
-        /// Total number of values.
+        /// Total number of values in the device.
         total: u16,
-        /// The values.
+        /// Values in this frame.
         values: Values<'a>,
     },
     /// Answer to GetArm, with bytes of the arm image.
     Arm {
-        /// Position in the image of the first byte of this frame.
+        /// Position of the first byte of this frame in the arm image.
         offset: u16,
         /// Length of the arm image in bytes.
         total: u16,
-        /// The bytes.
+        /// Bytes of the arm image in this frame.
         bytes: &'a [u8],
     },
     /// Answer to GetLog, with bytes of the flight recorder's log.
     Log(LogPage<'a>),
     /// Answer to GetPoints, with points of the trajectory in memory.
     Points {
-        /// Number of points before the first point of this frame.
+        /// Number of points that precede the first point of this frame.
         first: u16,
         /// Total number of points in the trajectory.
         total: u16,
-        /// The points.
+        /// Points in this frame.
         points: Points<'a>,
     },
 }
@@ -241,7 +241,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// Writes the frame of the answer and returns its length.
+    /// Writes the frame of the answer and returns the length of the frame.
     ///
     /// # Errors
     /// Returns [`EncodeError::BufferTooShort`] if `out` is too short, or if the content does not fit into a frame of [`ANSWER_MAX`] bytes.
@@ -264,7 +264,7 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// Writes a frame whose body has two parts, and returns its length. The board runs this function, so the function must not contain a
+/// Writes a frame whose body has two parts, and returns the length of the frame. The board runs this function, so it must not contain a
 /// slice operation that could panic.
 fn sealed(out: &mut [u8], frame_type: FrameType, first: &[u8], second: &[u8]) -> Result<usize, EncodeError> {
     let (n, given) = (FRAME_MIN + first.len() + second.len(), out.len().min(ANSWER_MAX));

@@ -26,8 +26,8 @@ pub const fn empty(frame_type: FrameType) -> [u8; 6] {
     sealed(frame_type, &[])
 }
 
-/// Returns a ClearCurrentErrors frame, which clears the errors of the nodes in `nodes` (bits 0..6) and, if `jtc` is
-/// set, those of the controller.
+/// Returns a ClearCurrentErrors frame. The frame clears the errors of the nodes in `nodes` (bits 0..6) and, if
+/// `jtc` is set, the errors of the controller.
 pub const fn clear_current_errors(jtc: bool, nodes: u8) -> [u8; 10] {
     sealed(FrameType::ClearCurrentErrors, &[jtc as u8, nodes])
 }
@@ -73,35 +73,35 @@ pub const fn get_points(first: u16) -> [u8; 8] {
     sealed(FrameType::GetPoints, &first.to_be_bytes())
 }
 
-/// ClearOccurredErrors.
+/// ClearOccurredErrors frame.
 pub const CLEAR_OCCURRED_ERRORS: [u8; 6] = empty(FrameType::ClearOccurredErrors);
-/// FrictionTableUseDefault.
+/// FrictionTableUseDefault frame.
 pub const FRICTION_TABLE_USE_DEFAULT: [u8; 6] = empty(FrameType::FrictionTableUseDefault);
-/// PidParamUseDefault.
+/// PidParamUseDefault frame.
 pub const PID_PARAM_USE_DEFAULT: [u8; 6] = empty(FrameType::PidParamUseDefault);
-/// ArmModelUseDefault.
+/// ArmModelUseDefault frame.
 pub const ARM_MODEL_USE_DEFAULT: [u8; 6] = empty(FrameType::ArmModelUseDefault);
-/// TeachingModeEnable.
+/// TeachingModeEnable frame.
 pub const TEACHING_MODE_ENABLE: [u8; 6] = empty(FrameType::TeachingModeEnable);
-/// TeachingModeDisable.
+/// TeachingModeDisable frame.
 pub const TEACHING_MODE_DISABLE: [u8; 6] = empty(FrameType::TeachingModeDisable);
-/// FrictionPolynomialUseDefault.
+/// FrictionPolynomialUseDefault frame.
 pub const FRICTION_POLYNOMIAL_USE_DEFAULT: [u8; 6] = empty(FrameType::FrictionPolynomialUseDefault);
-/// TrajSetExecStatus: stop.
+/// TrajSetExecStatus frame with the command Stop.
 pub const STOP: [u8; 7] = exec(ExecCommand::Stop);
-/// TrajSetExecStatus: pause.
+/// TrajSetExecStatus frame with the command Pause.
 pub const PAUSE: [u8; 7] = exec(ExecCommand::Pause);
-/// TrajSetExecStatus: execute.
+/// TrajSetExecStatus frame with the command Execute.
 pub const EXECUTE: [u8; 7] = exec(ExecCommand::Execute);
-/// GetInfo.
+/// GetInfo frame.
 pub const GET_INFO: [u8; 6] = empty(FrameType::GetInfo);
-/// StoreArm.
+/// StoreArm frame.
 pub const STORE_ARM: [u8; 6] = empty(FrameType::StoreArm);
-/// Disable.
+/// Disable frame.
 pub const DISABLE: [u8; 6] = empty(FrameType::Disable);
-/// ClearLog.
+/// ClearLog frame.
 pub const CLEAR_LOG: [u8; 6] = empty(FrameType::ClearLog);
-/// GripperControl: pump on.
+/// GripperControl frame that switches the pump on.
 pub const PUMP_ON: [u8; 10] = gripper_control(true);
-/// GripperControl: pump off.
+/// GripperControl frame that switches the pump off.
 pub const PUMP_OFF: [u8; 10] = gripper_control(false);

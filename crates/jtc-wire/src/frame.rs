@@ -1,4 +1,4 @@
-//! Structure of a frame (header, type, length, body and CRC), and the permitted lengths of each type.
+//! Structure of a frame (header, type, length, body and CRC), and the permitted lengths of each frame type.
 use core::ops::Range;
 
 use crate::code::codes;
@@ -18,15 +18,15 @@ pub const JOINTS: usize = 6;
 pub mod field {
     use super::Range;
 
-    /// Header byte.
+    /// Position of the header byte.
     pub const HEADER: usize = 0;
-    /// Type byte.
+    /// Position of the type byte.
     pub const TYPE: usize = 1;
-    /// Length of the complete frame, as a u16.
+    /// Position of the length of the complete frame, a u16.
     pub const LENGTH: Range<usize> = 2..4;
     /// Position of the first byte of the body.
     pub const BODY: usize = 4;
-    /// Length of the CRC at the end.
+    /// Length of the CRC at the end of the frame.
     pub const CRC_LEN: usize = 2;
     /// Returns the positions of the body of a frame of `n` bytes.
     pub const fn body(n: usize) -> Range<usize> {
@@ -56,7 +56,7 @@ codes! {
         FrictionPolynomialUseDefault = 0x0F;
         ResetCanDevices = 0x10;
         GripperControl = 0x11;
-        // Extensions (J-50): requests use the types from 0x40 on, their answers the types from 0x50 on.
+        // Extensions (J-50): requests use the types from 0x40 on, and their answers use the types from 0x50 on.
         GetInfo = 0x40;
         GetSettings = 0x41;
         SetSettings = 0x42;
@@ -79,9 +79,9 @@ codes! {
 /// Permitted lengths of the frames of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lengths {
-    /// List of permitted lengths.
+    /// Frames may have only the lengths in the list.
     OneOf(&'static [u16]),
-    /// Lengths from `first` to `last` in steps of `step` bytes.
+    /// The lengths from `first` to `last` in steps of `step` bytes are permitted.
     Steps {
         /// Shortest length.
         first: u16,
@@ -92,11 +92,11 @@ pub enum Lengths {
     },
 }
 
-/// Length of a Trajectory frame without points.
+/// Length of a Trajectory frame without points, bytes.
 pub const TRAJECTORY_OVERHEAD: usize = 14;
 /// Length of a point in a Trajectory frame, in bytes.
 pub const POINT_LEN: usize = 36;
-/// Maximum number of points that fit into a frame. (The controller accepts 1,500 points.)
+/// Maximum number of points that fit into a Trajectory frame. (The controller accepts 1,500 points.)
 pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
 
 impl FrameType {
@@ -158,7 +158,7 @@ impl FrameType {
         }
     }
 
-    /// Returns the permitted numbers of floats in a body of this type; empty if the body is not a list of floats.
+    /// Returns the permitted numbers of floats in a body of this type. The slice is empty if the body is not a list of floats.
     pub(crate) const fn float_counts(self) -> &'static [usize] {
         match self {
             FrameType::FrictionTable => &[2640],
@@ -170,7 +170,7 @@ impl FrameType {
         }
     }
 
-    /// Returns true if the host sends frames of this type. The device sends frames of the other types.
+    /// Returns true if the host sends frames of this type. The device sends frames of all other types.
     pub const fn from_host(self) -> bool {
         !matches!(self, FrameType::JtcStatus) && !self.is_answer()
     }
@@ -199,7 +199,7 @@ const fn steps(first: usize, step: usize, last: usize) -> Lengths {
     Lengths::Steps { first: first as u16, step: step as u16, last: last as u16 }
 }
 
-/// Complete frame with a correct CRC and a length that is permitted for its type. The body is not checked yet.
+/// Complete frame with a correct CRC and a length that is permitted for its type. The content of the body is not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameRef<'a> {
     /// Type of the frame.
@@ -223,7 +223,7 @@ impl<'a> FrameRef<'a> {
         good.then_some(Self { frame_type, bytes })
     }
 
-    /// Returns the body: the bytes between the length field and the CRC.
+    /// Returns the body of the frame: the bytes between the length field and the CRC.
     pub fn body(&self) -> &'a [u8] {
         let end = self.bytes.len().saturating_sub(field::CRC_LEN);
         self.bytes.get(field::BODY..end).unwrap_or(&[])

@@ -34,10 +34,10 @@ fn body_len(kind: FrameType, pick: u8) -> usize {
 }
 
 /// Returns the frame for an input of [`frame_bodies`]. The input consists of the type, a byte that selects the length, and the body. The
-/// body is repeated or cut to that length.
+/// body is repeated or cut to the selected length.
 pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     let [kind, pick, rest @ ..] = data else { return None };
-    // Types up to 0x11 are selected by their number, as in the inputs that were stored earlier. Other numbers select extension types.
+    // A number up to 0x11 selects the frame type with this number, as in older stored inputs. Other numbers select extension types.
     let kind = match usize::from(*kind % 0x20) {
         kind @ 0..0x12 => FrameType::from_byte(kind as u8)?,
         more => *FrameType::ALL.get(more - 1)?,
@@ -46,7 +46,7 @@ pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     Some(sealed(kind as u8, &body))
 }
 
-/// Parses, describes and encodes the frame of [`body_frame`], then parses the result again.
+/// Parses, describes and encodes the frame of [`body_frame`], then parses the encoded frame again.
 pub fn frame_bodies(data: &[u8]) {
     let Some(bytes) = body_frame(data) else { return };
     let frame = FrameRef::new_checked(&bytes).expect("a good frame");

@@ -42,7 +42,7 @@ pub use encode::{
     trajectory,
 };
 pub use encode_error::{Channel, EncodeError, FloatName, OutOfScale};
-/// The states of drives and gripper in a status are those of the joint bus.
+/// The states of the drives and the gripper in a status are the states that the joint bus defines.
 pub use jtc_bus::{Joint, NodeState};
 
 pub use extension::{
@@ -66,7 +66,7 @@ pub use status::{
 pub use stream::{KNOWN_US, LinkEvent, Receiver};
 pub use urgent::{UrgentCommand, UrgentCommands, UrgentWatch};
 
-/// Byte ranges of the parts of each frame, each defined once.
+/// Byte ranges of the parts of each frame. Each range is defined once.
 pub mod field {
     pub use crate::command::field as command;
     pub use crate::extension::image_field as image;

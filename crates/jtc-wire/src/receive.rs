@@ -4,7 +4,7 @@ use crate::frame::{FrameRef, FrameType, HEADER, field};
 use crate::layout::ANSWER_MAX;
 use crate::status::Status;
 
-/// Bytes and statuses received so far.
+/// Counters of the bytes and statuses received so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct StatusCounters {
     /// Number of valid statuses.
@@ -58,7 +58,7 @@ impl Default for StatusReceiver {
 enum ScanResult {
     /// The first held byte is not the start of a frame of the device.
     Nothing,
-    /// Number of bytes that are needed to decide.
+    /// The scan needs this number of bytes to decide.
     Needs(usize),
 }
 
@@ -73,8 +73,8 @@ impl StatusReceiver {
         }
     }
 
-    /// Removes bytes from the start of `bytes` until a status is complete. Returns `None` if `bytes` is empty before a status is complete.
-    /// Skips answers to extension requests.
+    /// Removes bytes from the start of `bytes` until a status is complete. Returns `None` if `bytes` becomes empty before a status is
+    /// complete. Skips answers to extension requests.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Status> {
         loop {
             if let FromDevice::Status(status) = self.next_frame(bytes)? {
@@ -83,7 +83,8 @@ impl StatusReceiver {
         }
     }
 
-    /// Removes bytes from the start of `bytes` until a frame is complete. Returns `None` if `bytes` is empty before a frame is complete.
+    /// Removes bytes from the start of `bytes` until a frame is complete. Returns `None` if `bytes` becomes empty before a frame is
+    /// complete.
     pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Option<FromDevice<'_>> {
         self.drop_front(self.used);
         self.used = 0;
@@ -122,18 +123,18 @@ impl StatusReceiver {
         self.counters
     }
 
-    /// Returns the number of held bytes, which may become a frame.
+    /// Returns the number of held bytes, which may be the beginning of a frame.
     pub fn held(&self) -> usize {
         self.len - self.used
     }
 
-    /// Discards the held bytes. Call this after the line was closed and opened again.
+    /// Discards the held bytes. The caller must call this function after it has closed the line and opened it again.
     pub fn clear(&mut self) {
         self.counters.skipped_bytes += self.held() as u64;
         (self.len, self.used) = (0, 0);
     }
 
-    /// Skips the first byte and all bytes up to the next header.
+    /// Skips the first held byte and all bytes up to the next header.
     fn skip(&mut self) {
         let rest = &self.held[1..self.len];
         let more = rest.iter().position(|byte| *byte == HEADER).unwrap_or(rest.len());
@@ -221,7 +222,7 @@ mod tests {
         use crate::response::{DataStatus, Response};
         let emitted = Status { point: 77, ..Status::default() }.emit();
         let record = Response::good(FrameType::GetInfo, DataStatus::NotAllowed, 6);
-        // Also tests the layout without a gripper and the layout with a short point index.
+        // The test includes the layout without a gripper and the layout with a short point index.
         for (cut, length) in [(0..0, 175), (163..173, 165), (17..19, 173)] {
             let mut bytes: Vec<u8> =
                 emitted.iter().enumerate().filter(|(i, _)| !cut.contains(i)).map(|(_, b)| *b).collect();

@@ -42,16 +42,16 @@ codes! {
 pub struct Response {
     /// Received type byte; 0 if unknown.
     pub frame_type: u8,
-    /// Result of the reception of the frame.
+    /// Result of receiving the frame.
     pub status: FrameStatus,
-    /// Result for the data of the frame; Idle unless `status` is NoError.
+    /// Result for the data of the frame; Idle if `status` is not NoError.
     pub data: DataStatus,
     /// Number of received bytes; 0 if unknown.
     pub length: u16,
 }
 
 impl Response {
-    /// Empty record: the status does not contain a response.
+    /// Empty record, which means that the status contains no response.
     pub const NONE: Self = Self::bad(0, FrameStatus::Idle, 0);
 
     /// Creates the record for an invalid frame or a run of bytes.

@@ -27,19 +27,19 @@ pub const ACCELERATION_SCALE: f64 = 12.566370;
 /// Raw value at full scale.
 pub const RAW_FULL_SCALE: f64 = 32767.0;
 
-/// Positions of the parts of a Trajectory body, counted from its first byte.
+/// Positions of the parts of a Trajectory body, counted from the first byte of the body.
 pub mod field {
     use core::ops::Range;
 
-    /// Trajectory number, u16.
+    /// Position of the trajectory number, a u16.
     pub const TRAJECTORY: Range<usize> = 0..2;
-    /// Segment number, counted from 0, as a u16.
+    /// Position of the segment number, which counts from 0, a u16.
     pub const SEGMENT: Range<usize> = 2..4;
-    /// Number of segments, as a u16.
+    /// Position of the number of segments, a u16.
     pub const SEGMENTS: Range<usize> = 4..6;
-    /// Time between points in ms, as a u16.
+    /// Position of the time between points, ms, a u16.
     pub const STEP_TIME: Range<usize> = 6..8;
-    /// First point.
+    /// Position of the first point.
     pub const POINTS: usize = 8;
 }
 
@@ -86,7 +86,7 @@ impl RawPoint {
 pub struct Segment<'a> {
     /// Trajectory number.
     pub trajectory: u16,
-    /// Number of this segment, from 0.
+    /// Number of this segment, counted from 0.
     pub segment: u16,
     /// Number of segments of the trajectory.
     pub segments: u16,
@@ -96,7 +96,8 @@ pub struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    /// Parses a body. Returns `None` if the body is too short for its header. Ignores an incomplete point at the end.
+    /// Parses a Trajectory body. Returns `None` if the body is too short for its header. Ignores an incomplete point
+    /// at the end.
     pub fn parse(body: &'a [u8]) -> Option<Self> {
         let (head, points) = body.split_first_chunk::<{ field::POINTS }>()?;
         let u16_at = |i: usize| u16::from_be_bytes([head[i], head[i + 1]]);
@@ -109,19 +110,19 @@ impl<'a> Segment<'a> {
         })
     }
 
-    /// Returns all points in order.
+    /// Returns all points of the segment in order.
     pub fn points(&self) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
         self.points_from(0)
     }
 
-    /// Returns the points from number `first` on; empty if `first` is after the last point.
+    /// Returns the points of the segment from number `first` on; empty if `first` is after the last point.
     pub fn points_from(&self, first: usize) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
         self.points.as_chunks::<POINT_LEN>().0.get(first..).unwrap_or(&[]).iter().map(RawPoint::parse)
     }
 }
 
 impl Segment<'_> {
-    /// Returns the number of points.
+    /// Returns the number of points in the segment.
     pub fn len(&self) -> usize {
         self.points.len() / POINT_LEN
     }
@@ -129,7 +130,7 @@ impl Segment<'_> {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Returns point `i`, or `None` if there are not enough points.
+    /// Returns point `i` of the segment, or `None` if the segment has fewer points.
     pub fn point(&self, i: usize) -> Option<RawPoint> {
         self.points.as_chunks::<POINT_LEN>().0.get(i).map(RawPoint::parse)
     }

@@ -1,7 +1,7 @@
-//! States of the controller and of its trajectory: one table with the code, name and meaning of each state.
+//! States of the controller and of its trajectory. A table contains the code, name and meaning of each state.
 use crate::code::{Known, codes};
 
-/// Declares the list of codes for a state in a status. A received code can be unknown.
+/// Declares the list of codes for a state in JtcStatus. A received code may be unknown.
 macro_rules! states {
     ($(#[$doc:meta])* $list:ident, $unknown:literal $rows:tt) => {
         codes! {
@@ -28,18 +28,19 @@ macro_rules! states {
 states! {
     /// State of the controller.
     ControllerState, "unknown state" {
-        /// Set-up is not complete.
+        /// The set-up of the controller is not complete.
         #[default]
         Start = 0;
         /// The controller brings the nodes to ReadyToOperate and waits for parameters. The torque is zero (J-20).
         Init = 1;
-        /// Holds a position.
+        /// The controller holds the arm at a position.
         HoldPos = 2;
-        /// Follows the trajectory.
+        /// The controller moves the arm along the trajectory.
         Operate = 3;
-        /// Compensates gravity and the load found, and damps the joints, so that the operator can guide the arm by hand.
+        /// The controller compensates gravity and the estimated load, and damps the joints, so that the operator can
+        /// guide the arm by hand.
         Teaching = 4;
-        /// The torque is zero until the cause has ended and the host has cleared the error.
+        /// The torque is zero until the cause of the error has ended and the host has cleared the error.
         Error = 5;
     }
 }
@@ -54,18 +55,18 @@ impl ControllerState {
 states! {
     /// State of the trajectory; "trajectory execution state" (TES) in manuals.
     TrajectoryState, "unknown" {
-        /// No trajectory.
+        /// The controller has no trajectory.
         #[default]
         Null = 0;
-        /// The trajectory is complete, and the arm is at its start.
+        /// The trajectory is complete, and the arm is at the start of the trajectory.
         Stop = 1;
-        /// Paused on the path.
+        /// The arm is paused on the path.
         Pause = 2;
-        /// The arm executes the trajectory (until standstill).
+        /// The arm executes the trajectory, or decelerates on it until standstill.
         Execute = 3;
         /// The trajectory was executed to its last point.
         Finish = 4;
-        /// The trajectory is being received. Only older controllers report this state.
+        /// The controller receives the trajectory. Only older controllers report this state.
         TransNullToStop = 5;
     }
 }

@@ -7,23 +7,23 @@ use crate::frame::{FrameType, HEADER, JOINTS, field as frame_field};
 use crate::response::{DataStatus, FrameStatus, Response};
 use crate::state::{ControllerState, TrajectoryState};
 
-/// Length of JtcStatus.
+/// Length of JtcStatus, bytes.
 pub const STATUS_LEN: usize = 175;
-/// Length of the frame in the layout with a u16 point index (J-08).
+/// Length of JtcStatus in the layout with a u16 point index, bytes (J-08).
 pub const STATUS_LEN_SHORT_INDEX: usize = 173;
-/// Length of the frame in the layout without a gripper (J-08).
+/// Length of JtcStatus in the layout without a gripper, bytes (J-08).
 pub const STATUS_LEN_NO_GRIPPER: usize = 165;
 
-/// Positions of the parts of the 175-byte frame.
+/// Positions of the parts of the 175-byte JtcStatus frame.
 ///
 /// The 165-byte layout ends after the joints. In the 173-byte layout the point index has two bytes, so all later parts are two bytes
 /// nearer to the start.
 pub mod field {
     use core::ops::Range;
 
-    /// Response record: type of the frame that is answered.
+    /// Response record: type of the frame to which the record belongs.
     pub const RESPONSE_TYPE: usize = 4;
-    /// Record: status code.
+    /// Response record: status code.
     pub const RESPONSE_STATUS: usize = 5;
     /// Response record: data status code.
     pub const RESPONSE_DATA: usize = 6;
@@ -35,9 +35,9 @@ pub mod field {
     pub const ERRORS: Range<usize> = 10..12;
     /// Occurred errors, u16.
     pub const OCCURRED: Range<usize> = 12..14;
-    /// Parameters that the controller has not received yet.
+    /// Bits of the parameters that the controller has not received yet.
     pub const JTC_INIT: usize = 14;
-    /// Nodes that are not ready yet.
+    /// Bits of the nodes that are not ready yet.
     pub const NODE_INIT: usize = 15;
     /// Trajectory execution state.
     pub const TES: usize = 16;
@@ -51,40 +51,40 @@ pub mod field {
     pub const CAN_CURRENT: Range<usize> = 23..27;
     /// Occurred CAN flags, as a u32.
     pub const CAN_OCCURRED: Range<usize> = 27..31;
-    /// Joint 0. Joints, [`JOINT_LEN`] bytes for each joint.
+    /// First byte of joint 0. Each joint has [`JOINT_LEN`] bytes.
     pub const JOINTS: usize = 31;
-    /// Length of the part of a joint.
+    /// Length of the part for one joint, bytes.
     pub const JOINT_LEN: usize = 22;
     /// Gripper: state, pump, pressure 1, pressure 2, errors, warnings, four zeros.
     pub const GRIPPER: Range<usize> = 163..173;
-    /// CRC.
+    /// CRC of the frame.
     pub const CRC: Range<usize> = 173..175;
 
-    /// Positions of the parts of a joint, counted from its first byte.
+    /// Positions of the parts of a joint, counted from the first byte of the joint.
     pub mod joint {
         use super::Range;
 
-        /// State.
+        /// State of the drive.
         pub const FSM: usize = 0;
-        /// Current motor-control faults.
+        /// Current motor-control faults of the drive.
         pub const MC_CURRENT: usize = 1;
-        /// Occurred motor-control faults.
+        /// Occurred motor-control faults of the drive.
         pub const MC_OCCURRED: usize = 2;
-        /// Errors.
+        /// Errors of the drive.
         pub const ERRORS: usize = 3;
-        /// Warnings.
+        /// Warnings of the drive.
         pub const WARNINGS: usize = 4;
-        /// Joint errors found by the controller, as a u16.
+        /// Joint errors found by the controller, a u16.
         pub const INTERNAL: Range<usize> = 5..7;
-        /// Occurred joint errors found by the controller, as a u16.
+        /// Occurred joint errors found by the controller, a u16.
         pub const INTERNAL_OCCURRED: Range<usize> = 7..9;
-        /// Position, rad, f32.
+        /// Measured position of the joint, rad, f32.
         pub const POSITION: Range<usize> = 9..13;
-        /// Velocity, rad/s, f32.
+        /// Measured velocity of the joint, rad/s, f32.
         pub const VELOCITY: Range<usize> = 13..17;
-        /// Torque, N·m, f32.
+        /// Torque that the drive reports, N·m, f32.
         pub const TORQUE: Range<usize> = 17..21;
-        /// Temperature, °C.
+        /// Bearing temperature, °C.
         pub const TEMPERATURE: usize = 21;
     }
 }
@@ -116,7 +116,7 @@ pub struct Status {
     pub can_current: u32,
     /// Occurred CAN flags: bits of [`crate::can_flag`].
     pub can_occurred: u32,
-    /// Joints 0..5.
+    /// Statuses of the joints 0..5.
     pub joints: [JointStatus; JOINTS],
     /// State of the gripper; `None` in the 165-byte layout.
     pub gripper: Option<GripperStatus>,
@@ -129,21 +129,21 @@ pub struct JointStatus {
     pub state: NodeState,
     /// Current motor-control faults: bits of [`jtc_bus::motor_control`].
     pub mc_current: u8,
-    /// Occurred motor-control faults.
+    /// Occurred motor-control faults: bits of [`jtc_bus::motor_control`].
     pub mc_occurred: u8,
     /// Errors of the drive: bits of [`jtc_bus::error`].
     pub errors: u8,
     /// Warnings of the drive: bits of [`jtc_bus::warning`].
     pub warnings: u8,
-    /// Errors found by the controller: bits of [`crate::joint_error`].
+    /// Joint errors found by the controller: bits of [`crate::joint_error`].
     pub internal: u16,
     /// Occurred joint errors found by the controller: bits of [`crate::joint_error`].
     pub internal_occurred: u16,
-    /// Position, rad.
+    /// Measured position of the joint, rad.
     pub position: f32,
-    /// Velocity, rad/s.
+    /// Measured velocity of the joint, rad/s.
     pub velocity: f32,
-    /// Torque, N·m.
+    /// Torque that the drive reports, N·m.
     pub torque: f32,
     /// Bearing temperature, °C.
     pub temperature: u8,
@@ -152,7 +152,7 @@ pub struct JointStatus {
 /// State and errors of the gripper in JtcStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct GripperStatus {
-    /// State.
+    /// State of the gripper.
     pub state: NodeState,
     /// State of the pump: 0 off, 1 on.
     pub pump: u8,
@@ -166,7 +166,7 @@ pub struct GripperStatus {
     pub warnings: u8,
 }
 
-/// Returns `N` bytes of `bytes` from position `at` on, or zeros after the end. Callers never read after the end.
+/// Returns `N` bytes of `bytes` from position `at` on; bytes after the end are zero. Callers never read after the end.
 fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
 }
@@ -206,14 +206,14 @@ impl JointStatus {
 }
 
 impl Status {
-    /// Returns the 175-byte frame, including its CRC. Without a gripper, the bytes of the gripper are zero.
+    /// Returns the 175-byte frame, including the CRC. Without a gripper, the bytes of the gripper are zero.
     pub fn emit(&self) -> [u8; STATUS_LEN] {
         let mut frame = [0; STATUS_LEN];
         self.emit_to(&mut frame);
         frame
     }
 
-    /// Like [`emit`](Self::emit), but writes the frame to `b`.
+    /// Like [`emit`](Self::emit), but writes the frame into the array `b`.
     pub fn emit_to(&self, b: &mut [u8; STATUS_LEN]) {
         use field::*;
         b[frame_field::HEADER] = HEADER;
@@ -253,14 +253,14 @@ impl Status {
 
     /// Parses a complete frame of 165, 173 or 175 bytes. Returns `None` if the type, length or CRC is wrong.
     ///
-    /// If this version does not know a code in the response record, the record gets the status Idle, so that the record confirms nothing.
+    /// If this version does not know a code in the response record, the record gets the status Idle, so that it confirms nothing.
     pub fn parse(bytes: &[u8]) -> Option<Status> {
         let frame = crate::FrameRef::new_checked(bytes)?;
         if frame.frame_type != FrameType::JtcStatus {
             return None;
         }
         let short_index = bytes.len() == STATUS_LEN_SHORT_INDEX;
-        // Position of a byte after the point index.
+        // Returns the position of a byte that follows the point index.
         let late = |at: usize| if short_index { at - 2 } else { at };
         let byte = |at: usize| get::<1>(bytes, at)[0];
         let response = match (
@@ -323,7 +323,7 @@ impl Status {
         true
     }
 
-    /// Returns true in Start and Init: in these states the controller does not hold the arm yet.
+    /// Returns true in Start and Init. In these states the controller does not hold the arm yet.
     pub fn is_coming_up(&self) -> bool {
         self.state.is_in(&[ControllerState::Start, ControllerState::Init])
     }
@@ -344,7 +344,7 @@ impl Status {
         self.trajectory == TrajectoryState::Execute
     }
 
-    /// Returns the measured positions of the joints in the frame, rad. For an unknown position, 0 is returned.
+    /// Returns the measured positions of the joints in the frame, rad. For an unknown position, the function returns 0.
     pub fn positions(&self) -> [f64; JOINTS] {
         self.joints.map(|joint| f64::from(joint.position))
     }

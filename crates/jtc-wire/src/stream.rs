@@ -1,16 +1,16 @@
 //! The stream parser of the device: finds frames in bytes that arrive in pieces of any length, and reports all other bytes (J-03, J-04).
 //!
 //! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. A run ends
-//! at the next good frame or at a gap. The parser reports one event for a run as soon as the fault of its first byte is known, and skips
-//! its other bytes without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap, the parser scans again
-//! from the second byte of the incomplete frame, so that a false header does not hide the frames after it.
+//! at the next good frame or at a gap. The parser reports one event for a run as soon as it knows the fault of the first byte, and skips
+//! the other bytes of the run without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap, the parser
+//! scans again from the second byte of the incomplete frame, so that a false header does not hide the frames that follow it.
 //!
-//! Terms: a *candidate* is a position with a header, a known type and a length that the type can have. A *gap* is a silence of at least the
-//! inter-byte timeout after received bytes.
+//! Terms: a *candidate* is a position with a header, a known type and a length that is valid for this type. A *gap* is a silence of at
+//! least the inter-byte timeout after received bytes.
 //!
-//! Cost: each byte is copied once and added to the CRC once, when it arrives. The CRC register is stored at every 64th byte, so that a
-//! candidate of any length can be checked with two registers and some arithmetic. In hostile input full of false headers, the work for each
-//! header is constant, and [`Receiver::poll`] scans a bounded number of headers per call.
+//! Cost: the parser copies each byte once and adds it to the CRC once, when it arrives. The CRC register is stored at every 64th byte, so
+//! that the parser can check a candidate of any length with two registers and some arithmetic. In hostile input full of false headers, the
+//! work for each header is constant, and [`Receiver::poll`] scans a bounded number of headers per call.
 use crate::batch::ReceivedEvent;
 use crate::crc::advance;
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
@@ -41,18 +41,18 @@ impl LinkEvent<'_> {
     }
 }
 
-/// Time after an extension request, in µs, in which the controller assumes that the client of the line knows the extensions (J-51). After
-/// this time the line is *plain*.
+/// Time after an extension request in which the controller assumes that the client of the line knows the extensions, µs (J-51). After this
+/// time, the line is *plain*.
 pub const KNOWN_US: u64 = 2_000_000;
 
 /// Maximum number of stored gaps among the held bytes.
 const GAPS: usize = 64;
-/// Maximum work of one call of `poll`. The work for a skipped byte is 1; the work for a candidate whose CRC is checked is `CANDIDATE`.
+/// Maximum work of one call of `poll`. A skipped byte costs 1, and a candidate whose CRC is checked costs `CANDIDATE`.
 const BUDGET: usize = 2048;
 const CANDIDATE: usize = 128;
 
-/// Stream parser of rule J-03 with a buffer of at least [`FRAME_MAX`] bytes. If the buffer is shorter, frames that do not fit are refused
-/// like frames with a wrong length.
+/// Stream parser of rule J-03 with a buffer of at least [`FRAME_MAX`] bytes. If the buffer is shorter, the parser refuses frames that do
+/// not fit, like frames with a wrong length.
 ///
 /// ```
 /// use jtc_wire::{LinkEvent, Receiver};
@@ -73,15 +73,15 @@ pub struct Receiver<B> {
     /// Range `start..end` of the held bytes in the buffer.
     start: usize,
     end: usize,
-    /// Time of the last byte, µs.
+    /// Time at which the last byte arrived, µs.
     last_us: u64,
-    /// True if the caller still has bytes that `push` has not accepted. During this time, silence is not a gap on the line.
+    /// True if the caller still has bytes that `push` has not accepted. While it is true, silence is not a gap on the line.
     refused: bool,
     /// True if there was a gap before the refused bytes.
     gap_before_refused: bool,
     /// True if the bytes from `start` on belong to a run whose event was already reported.
     in_run: bool,
-    /// True if the last `poll` ended because it reached its work limit.
+    /// True if the last call of `poll` ended because it reached its work limit.
     busy: bool,
     event: Option<Found>,
     gaps: Gaps,
@@ -90,7 +90,7 @@ pub struct Receiver<B> {
     began: (u64, u64),
     /// Time at which the last extension request was completed, in µs.
     asked_us: Option<u64>,
-    /// True if the frame of the event arrived on a plain line.
+    /// True if the event is a frame that arrived on a plain line.
     plain: bool,
 }
 
@@ -112,13 +112,13 @@ enum Sort {
 /// Scan result at the first held byte.
 enum ScanResult {
     Frame(FrameType, usize),
-    /// No decision is possible until more bytes or a gap arrive.
+    /// The parser cannot decide until more bytes or a gap arrive.
     Wait,
     Run(Sort, Response),
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
-    /// Creates a parser. `inter_byte_timeout_us` is the silence that ends a frame, in µs (5000).
+    /// Creates a parser. `inter_byte_timeout_us` is the silence that ends a frame, µs (5000).
     pub fn new(buffer: B, inter_byte_timeout_us: u32) -> Self {
         Self {
             buffer,
@@ -145,11 +145,11 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.buffer.as_ref().len().min(FRAME_MAX)
     }
 
-    /// Accepts bytes that were received until `now_us`, and returns the number of accepted bytes. If the buffer is full, fewer bytes are
-    /// accepted. Offer the remaining bytes again after `release` or more calls of `poll`. A delay of the remaining bytes does not count as
-    /// a gap.
+    /// Accepts bytes that were received until `now_us`, and returns the number of accepted bytes. If the buffer is full, the parser accepts
+    /// fewer bytes. The caller must pass the remaining bytes again after `release` or more calls of `poll`. A delay of the remaining bytes
+    /// does not count as a gap.
     ///
-    /// Call `push` at least once every 2 ms while bytes arrive. If the time between two calls is at least the inter-byte timeout, it
+    /// Call `push` at least once every 2 ms while bytes arrive. If the time between two calls is at least the inter-byte timeout, this time
     /// counts as a gap.
     pub fn push(&mut self, now_us: u64, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
@@ -175,7 +175,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.registers.absorb(self.end, taken);
         self.end += taken.len();
         self.refused = taken.len() < bytes.len();
-        // If no byte was accepted, the gap before these bytes is already stored.
+        // If there was a gap before these bytes, the list of gaps now contains it.
         self.gap_before_refused = false;
         self.last_us = now_us;
         taken.len()
@@ -186,7 +186,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     /// continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
-            // If the list of gaps is full, then either its last gap is at the last byte, or the loop below shortens the list.
+            // If the list of gaps is full, its last gap is at the last byte, or the loop below shortens the list.
             self.gaps.mark(self.end);
         }
         self.busy = false;
@@ -228,7 +228,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         true
     }
 
-    /// Returns the event that was found, until the event is released.
+    /// Returns the event that was found, until the caller releases the event.
     pub fn event(&self) -> Option<LinkEvent<'_>> {
         Some(match self.event? {
             Found::Frame(frame_type, n) => {
@@ -241,7 +241,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     }
 
     /// Returns the stream position of the first byte of the event, counted from the first byte that was pushed. With this position the
-    /// event can be ordered relative to the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
+    /// controller can order the event relative to the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
     pub fn event_position(&self) -> Option<u64> {
         Some(match self.event? {
             Found::Frame(..) => self.base + self.start as u64,
@@ -255,7 +255,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         Some(ReceivedEvent { line, position, plain: self.plain, event })
     }
 
-    /// Determines for a complete frame whether its line was plain when the frame began. After an extension request, the line is not plain.
+    /// Determines whether the line of a complete frame was plain when the frame began. After an extension request, the line is not plain.
     fn judge(&mut self, kind: FrameType, now_us: u64) {
         let (position, seen_us) = self.began;
         let began_us = if position == self.base + self.start as u64 { seen_us } else { now_us };
@@ -266,9 +266,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Discards all held bytes and the event, because bytes were lost before the next byte, whose stream position is `position`. The loss
-    /// is reported as one run that was not completely received (J-04). The next bytes do not continue a frame. The next bytes belong to
-    /// that run until the next frame begins.
+    /// Discards all held bytes and the event, because bytes were lost before the next byte, whose stream position is `position`. The parser
+    /// reports the loss as one run that was not completely received (J-04). The next bytes do not continue a frame. The next bytes belong
+    /// to the run of the loss until the next frame begins.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);
@@ -278,14 +278,14 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         (self.gaps, self.registers) = (Gaps::new(), Registers::new());
     }
 
-    /// Releases the event.
+    /// Releases the event, so that `poll` can find the next event.
     pub fn release(&mut self) {
         if let Some(Found::Frame(_, n)) = self.event.take() {
             self.start += n;
         }
     }
 
-    /// Returns true if there are held bytes that may become a frame.
+    /// Returns true if the parser holds bytes that may become a frame.
     pub fn mid_frame(&self) -> bool {
         let frame = match self.event {
             Some(Found::Frame(_, n)) => n,
@@ -294,8 +294,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.end > self.start + frame
     }
 
-    /// Returns true if the last `poll` ended because it reached its work limit. The next call of `poll` can then
-    /// continue without new bytes.
+    /// Returns true if the last call of `poll` ended because it reached its work limit. The next call of `poll` can then continue without
+    /// new bytes.
     pub fn busy(&self) -> bool {
         self.busy
     }
@@ -318,7 +318,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
         let Some(&byte) = seen.get(field::TYPE) else {
             return match closed {
-                // Incomplete header, without a type.
+                // The header is incomplete and has no type byte.
                 Some(_) => run(Sort::Noise, 0, FrameStatus::DiscontinuousFrame, seen.len()),
                 None => ScanResult::Wait,
             };
@@ -348,8 +348,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Skips the first held byte and at most `most` more bytes, until the next header or gap. Returns the number of
-    /// skipped bytes after the first one.
+    /// Skips the first held byte and at most `most` more bytes, until the next header or gap. Returns the number of skipped bytes after the
+    /// first byte.
     fn pass_over(&mut self, most: usize) -> usize {
         self.start += 1;
         let limit = self.gaps.first().unwrap_or(self.end).min(self.start + most);

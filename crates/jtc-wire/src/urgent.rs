@@ -1,14 +1,14 @@
 //! Detection of Stop and Pause, which take effect before all other frames. The watch finds these commands in the bytes of a line as
 //! soon as they arrive, independently of the frame parser (J-04).
 //!
-//! Other frames may wait for earlier frames, for bytes that a false header announces, or for space in a full buffer. A Stop must
-//! not wait. The watch therefore recognises the seven bytes of a Stop or a Pause at any position, and the command takes effect in the next
-//! tick. The frame of the command still passes through the [`Receiver`](crate::Receiver) and gets its response record in the normal order.
-//! From the position of the frame in the stream, the controller detects that the command has already taken effect. An Execute that was
-//! received before the command must no longer be executed.
+//! Other frames may wait for earlier frames, for bytes that a false header announces, or for space in a full buffer. A Stop must not wait.
+//! The watch therefore recognises the seven bytes of a Stop or a Pause at any position, and the command takes effect in the next tick. The
+//! frame of the command still passes through the [`Receiver`](crate::Receiver) and gets its response record in the normal order. From the
+//! position of the frame in the stream, the controller detects that the command has already taken effect. The controller must not execute
+//! an Execute that it received before the command.
 //!
-//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. This error is on the safe side, because the arm
-//! stops. In a body of random bytes, the probability of this error is 2⁻⁵⁶ per position.
+//! A disadvantage is that these seven bytes in the body of another frame also stop the arm. The error is on the safe side, because the arm
+//! only stops. In a body of random bytes, the probability of this error is 2⁻⁵⁶ per position.
 use crate::command::ExecCommand;
 use crate::fixed;
 
@@ -40,7 +40,7 @@ impl UrgentCommand {
     }
 }
 
-/// Urgent commands that arrived on a line in one tick: the number of each, and the last command.
+/// Urgent commands that arrived on a line in one tick: the number of Stops and Pauses, and the last command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UrgentCommands {
     stops: u8,
@@ -57,7 +57,7 @@ impl UrgentCommands {
         self.add(command, 1);
     }
 
-    /// Appends the command `count` times.
+    /// Appends a command `count` times.
     pub fn add(&mut self, command: UrgentCommand, count: u8) {
         if count == 0 {
             return;
@@ -72,7 +72,7 @@ impl UrgentCommands {
         self.stops == 0 && self.pauses == 0
     }
 
-    /// Returns each received command and its count. The last received command is at the end.
+    /// Returns each received command with its count. The command that was received last is the last item.
     pub fn iter(&self) -> impl Iterator<Item = (UrgentCommand, u8)> {
         let (stops, pauses) = ((UrgentCommand::Stop, self.stops), (UrgentCommand::Pause, self.pauses));
         let order = if self.pause_is_last { [stops, pauses] } else { [pauses, stops] };
@@ -101,19 +101,19 @@ struct Tail {
     received: u64,
     /// Time of the last byte, µs.
     last_us: u64,
-    /// Commands since the last [`UrgentWatch::take`].
+    /// Commands that arrived since the last call of [`UrgentWatch::take`].
     commands: UrgentCommands,
-    /// Stream position at which the last of these commands ended.
+    /// Stream position at which the last urgent command of the line ended.
     hit: u64,
-    /// Number of bytes that had been received on this line when the last urgent command of any line arrived. A frame that began before
-    /// this position counts as older than the urgent command.
+    /// Number of bytes that this line had received when the last urgent command of any line arrived. A frame that began before this
+    /// position counts as older than the urgent command.
     overtaken: u64,
 }
 
 /// Watches for Stop and Pause in the bytes of all lines to a controller.
 ///
-/// In each tick, call [`scan`](Self::scan) with the bytes that have arrived on each line, and then call [`take`](Self::take). An Execute
-/// at a position that is [`overtaken`](Self::overtaken) must not be executed.
+/// In each tick, call [`scan`](Self::scan) with the bytes that have arrived on each line, and then call [`take`](Self::take). The
+/// controller must not execute an Execute at a position that is [`overtaken`](Self::overtaken).
 ///
 /// ```
 /// use jtc_wire::{UrgentCommand, UrgentWatch, fixed};
@@ -133,15 +133,15 @@ pub struct UrgentWatch<const LINES: usize> {
 
 impl<const LINES: usize> UrgentWatch<LINES> {
     /// Creates a watch. `inter_byte_timeout_us` is the silence, in µs, after which later bytes do not belong to the same frame. The
-    /// precision of this silence depends on the interval between calls of `scan`. If this timeout exceeds the timeout of the receiver by
-    /// at least one tick, the watch finds every Stop that the receiver finds.
+    /// interval between calls of `scan` limits the precision of this silence. If the timeout of the watch exceeds the timeout of the
+    /// receiver by at least one tick, the watch finds every Stop that the receiver finds.
     pub const fn new(inter_byte_timeout_us: u32) -> Self {
         let tail =
             Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };
         Self { inter_byte_timeout_us: inter_byte_timeout_us as u64, lines: [tail; LINES] }
     }
 
-    /// Scans the bytes that have arrived on a line until `now_us`; pass every byte once, in order. The scan takes a few
+    /// Scans the bytes that have arrived on a line until `now_us`. The caller must pass every byte once, in order. The scan takes a few
     /// instructions per byte.
     pub fn scan(&mut self, line: usize, now_us: u64, bytes: &[u8]) {
         let Some(tail) = self.lines.get_mut(line) else { return };
@@ -165,14 +165,14 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         }
     }
 
-    /// Returns the commands that arrived on each line since the last call.
+    /// Returns the commands that arrived on each line since the last call of `take`.
     pub fn take(&mut self) -> [UrgentCommands; LINES] {
         let commands = self.lines.map(|tail| tail.commands);
         let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
         for tail in &mut self.lines {
             let own = !core::mem::take(&mut tail.commands).is_empty();
-            // The order in which the lines received bytes within a tick is unknown. All bytes received so far therefore count as older,
-            // except the bytes after the command if only one line received a command.
+            // The order in which the lines received bytes within a tick is unknown. All bytes received so far therefore count as older than
+            // the urgent command. If only one line received a command, the bytes after the command do not count as older.
             match lines_with {
                 0 => {}
                 1 if own => tail.overtaken = tail.hit,
@@ -231,7 +231,7 @@ mod tests {
         }
     }
 
-    /// A call without bytes does not count as reception. The gap is measured from the last received byte (J-03).
+    /// A call without bytes does not count as reception. The watch must measure the gap from the last received byte (J-03).
     #[test]
     fn j05_an_empty_scan_does_not_join_across_a_gap() {
         let mut watch = UrgentWatch::<2>::new(6000);

@@ -1,4 +1,4 @@
-//! Texts of states, error bits and codes, which are identical in all outputs.
+//! Texts of states, error bits and codes. All outputs use the same texts.
 pub use jtc_bus::Bits;
 
 use crate::bits::{error, joint_error, missing_parameter};
@@ -7,7 +7,7 @@ use crate::bits::{error, joint_error, missing_parameter};
 pub const JTC_ERRORS: [&str; 8] = error::NAMES;
 /// Texts of the bits for parameters that the controller has not received.
 pub const JTC_INIT: [&str; 3] = missing_parameter::NAMES;
-/// Texts of the bits for the nodes of the joint bus. On the wire, nodes are counted from 0; joints are counted from 1.
+/// Texts of the bits for the nodes of the joint bus. The bits count nodes from 0; the texts count joints from 1.
 pub const NODES: [&str; 7] = [
     "node 0 (joint 1)",
     "node 1 (joint 2)",

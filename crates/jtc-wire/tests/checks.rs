@@ -29,7 +29,8 @@ fn j05_a_frame_needs_its_header_type_length_and_crc_at_once() {
     }
 }
 
-/// A body that did not pass a receiver is a command only if its number of floats is permitted for its type.
+/// A list of floats that did not pass a receiver is a command only if its number of floats is permitted for
+/// its type.
 #[test]
 fn j07_floats_of_another_count_are_no_command() {
     let bytes = vec![0; 10_580];
@@ -61,7 +62,7 @@ fn j07_a_body_that_is_cut_off_is_no_command() {
     ] {
         for n in 0..needed {
             let expected = match (kind, n) {
-                // Some hosts send frames of this length.
+                // Some hosts send ClearCurrentErrors frames of this length.
                 (FrameType::ClearCurrentErrors, 0) => {
                     Ok(Command::ClearCurrentErrors { jtc: true, nodes: ALL_NODES })
                 }
@@ -117,7 +118,7 @@ fn a_rest_of_a_float_is_none() {
     }
 }
 
-/// An empty segment is an incorrect value (J-06), so the code must be able to detect it.
+/// An empty segment is an incorrect value (J-06), so the code must detect an empty segment.
 #[test]
 fn j06_points_of_a_segment() {
     let point = |i: i16| RawPoint { position: [i; 6], ..RawPoint::default() };

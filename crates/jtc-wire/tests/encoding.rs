@@ -29,7 +29,7 @@ fn only_frames_of_floats_are_made_of_floats() {
 }
 
 /// An encoder writes a frame while it reads the numbers, so the length in the first error can be less than the final length. A buffer
-/// of the requested length can hold more of the frame, and the requested length never exceeds the length of the complete frame.
+/// of the length in the error can hold more of the frame. The length in the error must never exceed the length of the complete frame.
 #[test]
 fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     type Encoder = fn(&mut [u8]) -> Result<usize, EncodeError>;
@@ -47,7 +47,7 @@ fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     }
 }
 
-/// The names are in the order of the wire format (see the table of frames).
+/// The names must be in the order of the wire format (see the table of frames).
 #[test]
 fn j06_every_number_has_its_name() {
     let names = |kind, count| (0..count).map(move |i| FloatName(kind, i).to_string());

@@ -34,7 +34,7 @@ fn j02_printed_crcs() {
     assert_eq!(crc_of(&fixed::PUMP_OFF), 0xDF2E);
 }
 
-/// E-04: the CRC that is printed for this frame belongs to another frame.
+/// E-04: the manual prints the CRC of another frame for this frame.
 #[test]
 fn e04_friction_polynomial_use_default() {
     assert_eq!(fixed::FRICTION_POLYNOMIAL_USE_DEFAULT, [0x9B, 0x0F, 0x00, 0x06, 0x94, 0x77]);
@@ -180,7 +180,8 @@ fn scale_ends() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// A value is rounded to the nearest raw value, or refused. A value never wraps around and is never clipped.
+    /// The encoder rounds a value to the nearest raw value, or refuses it. A value must never wrap around or be
+    /// clipped.
     #[test]
     fn scaling_never_wraps_or_clips(value in any::<f64>(), near in -4.0..4.0, joint in 0..6usize) {
         for value in [value, near] {
@@ -250,7 +251,7 @@ fn status() -> Status {
     }
 }
 
-/// E-01, E-02, E-05: the length, the point index of four bytes, and joint 1 at byte 53.
+/// E-01, E-02, E-05: the length of the status, the point index of four bytes, and joint 1 at byte 53.
 #[test]
 fn e01_e02_e05_status_layout() {
     let bytes = status().emit();
@@ -268,7 +269,7 @@ fn e01_e02_e05_status_layout() {
     assert_eq!(Status::parse(&bytes), Some(status()));
 }
 
-/// Returns the same status in the two other layouts.
+/// Returns one status in the three layouts.
 fn layouts() -> [Vec<u8>; 3] {
     let full = status().emit();
     let sealed = |mut bytes: Vec<u8>| {
@@ -294,7 +295,7 @@ fn j08_layouts_of_other_builds() {
     }
 }
 
-/// J-04: a record with an unknown code confirms nothing.
+/// J-04: a record with an unknown code must confirm nothing.
 #[test]
 fn j04_unknown_codes_confirm_nothing() {
     for (at, byte) in [(5, 6), (6, 9)] {

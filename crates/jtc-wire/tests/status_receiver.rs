@@ -1,4 +1,4 @@
-//! Tests of the status parser of the host: its counters, and bytes for which the parser does not wait.
+//! Tests of the status parser of the host: the counters of the parser, and bytes for which it must not wait.
 use jtc_wire::{STATUS_LEN, Status, StatusReceiver};
 
 /// Passes all bytes to the parser at once and returns the number of statuses found.
@@ -32,7 +32,8 @@ fn j08_a_wrong_crc_is_counted_once() {
     assert_eq!(counters.skipped_bytes, 2 * STATUS_LEN as u64);
 }
 
-/// The test closes a line and opens it again. The half of a status that arrived before does not belong to the bytes after it.
+/// The test closes a line and opens it again. The half of a status that arrived before must not be joined to the bytes after
+/// it.
 #[test]
 fn j08_what_is_held_can_be_forgotten() {
     let mut receiver = StatusReceiver::new();

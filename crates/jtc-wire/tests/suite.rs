@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that only one program must be linked. Each file in this folder is a module of that program.
+//! All tests of the crate in one test program, which shortens linking. Each file in this directory is a module of the program.
 mod checks;
 mod encoding;
 mod frames;

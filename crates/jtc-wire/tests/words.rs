@@ -52,7 +52,7 @@ fn bits_in_words() {
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
 }
 
-/// The masks and the texts of a word come from the same table, which equals the table of the protocol.
+/// The masks and the texts of a word come from the same table. The table of the code must equal the table of the protocol.
 #[test]
 fn masks_have_the_texts_of_their_bits() {
     let errors = error::EMERGENCY_INPUT | error::EXTERNAL | error::EXTERNAL_JOINTS;
@@ -169,7 +169,7 @@ fn j06_coefficients_are_called_by_their_index() {
     check::<6>();
 }
 
-/// A frame never contains such a command, but code can construct it.
+/// A frame never contains this command, but code can construct it.
 #[test]
 fn j07_a_polynomial_of_too_few_numbers_can_be_said() {
     let command = Command::FrictionPolynomial(Floats::new(&[0; 20]));
@@ -228,7 +228,8 @@ fn a_node_says_all_that_is_wrong_with_it() {
     );
 }
 
-/// Concatenated in order, the pieces give the whole capture; each valid frame is one piece, and so are the bytes between two frames.
+/// Concatenated in order, the pieces must give the whole capture. Each valid frame must be one piece, and so must the bytes between
+/// two frames.
 #[test]
 fn a_capture_in_pieces() {
     let status = Status::default().emit();
@@ -259,7 +260,7 @@ fn a_capture_in_pieces() {
     assert_eq!(pieces(&[]).next(), None);
 }
 
-/// J-31: the states in which the arm is held, and the state in which it moves. The bytes are those of the manual.
+/// J-31: the states in which the controller holds the arm, and the state in which the arm moves. The bytes are those of the manual.
 #[test]
 fn a_status_knows_whether_the_controller_comes_up_or_executes() {
     let of = |state: u8, trajectory: u8| Status {

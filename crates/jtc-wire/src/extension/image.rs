@@ -1,4 +1,4 @@
-//! The arm image (J-54): all parameters of an arm in one block of bytes, for storing, reading back and hashing.
+//! The arm image (J-54): all parameters of an arm in one block of bytes. Programs store this block, read it back and compute its hash.
 use super::{NAME_LEN, Name, Values};
 use crate::floats::Floats;
 use crate::layout::VALUE_LEN;
@@ -22,43 +22,44 @@ pub mod field {
     /// Position of the arm model, in the format of the body of an ArmModel frame.
     pub const MODEL: Range<usize> = 128..660;
     /// Position of the friction: the body of a FrictionPolynomial frame with six coefficients per joint, or the body of a FrictionTable
-    /// frame. After the friction come the settings, each in the format of a SetSettings frame, and then the name.
+    /// frame. The settings follow the friction, each in the format of a SetSettings frame. The name of the arm is at the end of the
+    /// image.
     pub const FRICTION: usize = 660;
-    /// Length of the friction polynomials, in bytes.
+    /// Length of the friction polynomials, bytes.
     pub const POLYNOMIAL_LEN: usize = 144;
-    /// Length of the friction tables, in bytes.
+    /// Length of the friction tables, bytes.
     pub const TABLE_LEN: usize = 10_560;
 }
 
-/// Length of the longest image. Each slot in the flash of the board has space for an image of this length.
+/// Length of the longest arm image, bytes. Each slot in the flash of the board has space for an image of this length.
 pub const IMAGE_MAX: usize = 12 * 1024;
 
-/// Friction in an image.
+/// Friction parameters in an arm image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionImage<'a> {
-    /// Polynomials: 6 × 6 coefficients, highest index first.
+    /// Friction polynomials: 6 × 6 coefficients, highest index first.
     Polynomial(Floats<'a>),
-    /// Tables: for each of the 6 joints 20 velocities, 20 temperatures and 400 torques.
+    /// Friction tables: for each of the 6 joints 20 velocities, 20 temperatures and 400 torques.
     Table(Floats<'a>),
 }
 
-/// The parts of an image. The lengths are valid; the values are not checked yet.
+/// The parts of an arm image. The lengths are valid; the values are not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArmImage<'a> {
     /// Gains, in the format of PidParam.
     pub pid: Floats<'a>,
     /// Kinematics and masses, in the format of ArmModel.
     pub model: Floats<'a>,
-    /// Friction.
+    /// Friction polynomials or friction tables.
     pub friction: FrictionImage<'a>,
-    /// Settings.
+    /// Values of the settings.
     pub settings: Values<'a>,
     /// Name of the arm.
     pub name: Name,
 }
 
 impl<'a> ArmImage<'a> {
-    /// Parses an image. Returns `None` if the bytes are not an image of this version, or if their length is wrong.
+    /// Parses an arm image. Returns `None` if the bytes are not an image of this version, or if their length is wrong.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (magic, _) = bytes.split_first_chunk::<4>()?;
         if *magic != field::MAGIC || *bytes.get(field::VERSION_AT)? != field::VERSION {
@@ -88,9 +89,9 @@ impl<'a> ArmImage<'a> {
     }
 }
 
-/// Hash of all parameters in an arm image that affect the motion of the arm (J-52). The name is not included. The hash is FNV-1a with 64
-/// bits (RFC 9923). The bytes may be added in pieces of any length. The hash distinguishes two arms whose parameters differ by accident,
-/// but does not protect against forgery.
+/// Hash of all parameters in an arm image that affect the motion of the arm (J-52). The hash does not include the name. The hash is
+/// FNV-1a with 64 bits (RFC 9923). The caller may add the bytes in pieces of any length. The hash distinguishes two arms whose
+/// parameters differ by accident, but does not protect against forgery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hash(u64);
 
@@ -114,7 +115,7 @@ impl Hash {
         self.0
     }
 
-    /// Returns the hash of a complete image, without its name.
+    /// Returns the hash of a complete arm image, without its name.
     pub fn of_image(bytes: &[u8]) -> u64 {
         Self::new().update(bytes.get(..bytes.len().saturating_sub(NAME_LEN)).unwrap_or(&[])).value()
     }

@@ -33,19 +33,19 @@ mod field {
     pub(super) const STORE: usize = 33;
     pub(super) const SEQUENCE: Range<usize> = 34..38;
     pub(super) const LOG: usize = 38;
-    // Byte 39 of the body is zero.
+    // Byte 39 of the body is always zero.
     pub(super) const NAME: Range<usize> = 40..72;
     pub(super) const FIRMWARE: Range<usize> = 72..88;
     pub(super) const REVISION: Range<usize> = 88..104;
     pub(super) const BOARD: Range<usize> = 104..136;
-    // Added later (J-67).
+    // A later version added this part (J-67).
     pub(super) const PROGRAM_BYTES: Range<usize> = 136..140;
     pub(super) const PROGRAM_CRC: Range<usize> = 140..144;
-    // Added later (J-69).
+    // A later version added this part (J-69).
     pub(super) const REACTIONS: Range<usize> = 144..168;
 }
 
-/// Capabilities of a device that version 1 of the extensions does not require, one bit for each.
+/// Bits for the capabilities of a device that version 1 of the extensions does not require.
 pub mod capability {
     /// Settings, names, and requests that read back the arm (J-53, J-54).
     pub const SETTINGS: u32 = 1;
@@ -96,7 +96,7 @@ codes! {
 /// Program in flash that the device runs, as the device read the program at its start (J-67).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Program {
-    /// Length of the program, from the first byte of the flash on.
+    /// Length of the program from the first byte of the flash, bytes.
     pub bytes: u32,
     /// CRC-32 of the program (ISO-HDLC, as in zlib and Ethernet).
     pub crc32: u32,
@@ -111,7 +111,7 @@ impl fmt::Display for Program {
 /// Answer to GetInfo (J-52).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
-    /// Version of the extensions.
+    /// Version of the extensions that the device implements.
     pub version: u8,
     /// Missing parameters: bits of [`crate::missing_parameter`].
     pub missing: u8,
@@ -119,7 +119,7 @@ pub struct Info {
     pub nodes_missing: u8,
     /// Cause of the last start.
     pub boot_cause: BootCause,
-    /// Number of starts, as far as the device knows.
+    /// Number of starts that the device has counted.
     pub boots: u32,
     /// Time since the last start, ms.
     pub uptime_ms: u64,
@@ -145,9 +145,9 @@ pub struct Info {
     pub revision: [u8; SHORT_TEXT],
     /// Name of the board.
     pub board: Name,
-    /// Program in flash; `None` if the device does not report it.
+    /// Program in flash; `None` if the device does not report its program.
     pub program: Option<Program>,
-    /// Reactions of the controller; `None` if the device does not report them (J-69).
+    /// Reactions of the controller; `None` if the device does not report its reactions (J-69).
     pub reactions: Option<Reactions>,
 }
 
@@ -177,7 +177,7 @@ impl Default for Info {
     }
 }
 
-/// Returns the part of a text that fits into `SHORT_TEXT` bytes, padded with zeros.
+/// Returns the first `SHORT_TEXT` bytes of a text, padded with zeros.
 pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
     let mut bytes = [0; SHORT_TEXT];
     for (to, from) in bytes.iter_mut().zip(text.bytes()) {
@@ -193,7 +193,7 @@ fn text(bytes: &[u8; SHORT_TEXT]) -> &str {
 }
 
 impl Info {
-    /// Sets the firmware version and the git revision, and cuts both texts to the available length.
+    /// Sets the firmware version and the git revision. Cuts both texts to the available length.
     pub fn with_firmware(mut self, version: &str, revision: &str) -> Self {
         (self.firmware, self.revision) = (short_text(version), short_text(revision));
         self
@@ -244,12 +244,13 @@ impl Info {
         b
     }
 
-    /// Parses the body of an Info frame. Bytes that a later version of the extensions adds are ignored. If this version does not know
-    /// a cause or a state, the default of the type is used. Returns `None` if the body is too short or a name is not valid.
+    /// Parses the body of an Info frame. Ignores bytes that a later version of the extensions adds. If this version of the crate
+    /// does not know a cause or a state, the default of the type is used. Returns `None` if the body is too short or a name is not
+    /// valid.
     pub fn parse(body: &[u8]) -> Option<Self> {
         use field::*;
         let (b, _) = body.split_first_chunk::<INFO_LEN>()?;
-        // This word is zero if the body comes from an earlier version and ends before the word (J-67).
+        // If the body comes from an earlier version and ends before this word, the word is zero (J-67).
         let word = |at: core::ops::Range<usize>| {
             body.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
         };

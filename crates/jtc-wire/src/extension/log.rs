@@ -5,9 +5,9 @@ use crate::code::codes;
 use crate::frame::FRAME_MIN;
 use crate::layout::{ANSWER_MAX, LOG_HEAD_LEN};
 
-/// Highest number of bytes of the log in a Log frame, in whole words.
+/// Largest number of log bytes in a Log frame, in whole words.
 pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
-/// Block number that does not occur in any log. The answer to a GetLog with this number contains the extent of the log, without bytes.
+/// Block number that no log contains. The answer to a GetLog with this number contains the extent of the log, without bytes.
 pub const LOG_NO_BLOCK: u32 = u32::MAX;
 
 codes! {
@@ -34,11 +34,11 @@ pub struct LogPage<'a> {
     pub offset: u16,
     /// Block number that follows the number of the newest block.
     pub end: u32,
-    /// Number of trajectory points in the memory of the device.
+    /// Number of points of the trajectory in the memory of the device.
     pub points: u16,
-    /// Hash of these trajectory points.
+    /// Hash of the points of this trajectory.
     pub points_hash: u32,
-    /// Log bytes; empty after the end of the log.
+    /// Bytes of the log in this frame; empty after the end of the log.
     pub bytes: &'a [u8],
 }
 

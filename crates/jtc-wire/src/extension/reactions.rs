@@ -8,10 +8,10 @@ codes! {
     /// Kind of the cause of a held stop or of an aborted motion.
     #[derive(Default)]
     StopKind {
-        /// A torque was at its limit for too long (J-43).
+        /// The torque of a joint was at its limit for too long (J-43).
         #[default]
         Overload = 1, "overload";
-        /// A push on a joint was detected by the torque against the push (J-66).
+        /// The controller detected a push on a joint by the torque against the push (J-66).
         Push = 2, "push";
         /// The position error of a joint was too large (J-43).
         PositionError = 3, "position error";
@@ -29,13 +29,13 @@ codes! {
         EncoderJump = 9, "encoder jump";
         /// The position and the speed that a drive reports do not match: they differ by a factor (J-35).
         SpeedScale = 10, "speed scale";
-        /// When the drives were enabled late, the arm was too far from the path, or the torque limits left too little torque for the
-        /// approach (J-34).
+        /// After the wait for the drives, the arm was too far from the path, or the torque limits left too little torque for the approach
+        /// (J-34).
         Approach = 11, "approach";
-        /// New gains were received while the joints had torque, and a joint could not be held with these gains. The
-        /// controller uses the earlier gains again (J-71).
+        /// The controller received new gains while the joints had torque, and could not hold a joint with these gains. The controller uses
+        /// the earlier gains again (J-71).
         Gains = 12, "gains";
-        /// A push on a joint was detected by the joint speed before it was detected by the torque (J-66).
+        /// The controller detected a push on a joint by the joint speed before it detected the push by the torque (J-66).
         Shove = 13, "shove";
     }
 }
@@ -47,15 +47,15 @@ pub struct StopCause {
     pub kind: StopKind,
     /// Number of the first affected joint, from 1; 0 if the cause does not belong to a joint.
     pub joint: u8,
-    /// Measured or commanded value that caused the stop, in the unit of its kind: N·m, rad, rad/s or rad/s². For [`StopKind::SpeedScale`] the
-    /// value is a factor.
+    /// Measured or commanded value that caused the stop. The unit of the value depends on the kind of the stop: N·m, rad, rad/s or rad/s².
+    /// For [`StopKind::SpeedScale`] the value is a factor.
     pub value: f32,
     /// Limit of the value; 0 if the value has no limit.
     pub limit: f32,
 }
 
 impl StopKind {
-    /// Returns the unit of the value and the limit; empty if they have no unit.
+    /// Returns the unit of the value and the limit; empty if the value has no unit.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Overload | Self::Push | Self::Unstable => "N·m",
@@ -66,8 +66,8 @@ impl StopKind {
         }
     }
 
-    /// Returns the kind that corresponds to the first joint error that is a limit of the path. Other code distinguishes
-    /// position errors and torques.
+    /// Returns the kind for the first joint error that is a limit of the path. The caller determines the kind for position errors and
+    /// torque errors.
     pub const fn of_limit(joint_error: u16) -> Self {
         if joint_error & joint_error::POSITION != 0 {
             Self::Position
@@ -131,8 +131,8 @@ impl fmt::Display for StopCause {
 /// Reactions of the controller that are in progress, and the cause of its last held stop (J-69).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reactions {
-    /// Cause of the last held stop, and the time since the start of that stop, in ms. `None` if no held stop has occurred since the start
-    /// or the last ClearOccurredErrors.
+    /// Cause of the last held stop, and the time since the start of that stop, ms. `None` if no held stop has occurred since the start of
+    /// the controller or the last ClearOccurredErrors.
     pub stop: Option<(StopCause, u32)>,
     /// Joints that yield to a push or lower their loads, one bit for each joint.
     pub yields: u8,
@@ -140,15 +140,15 @@ pub struct Reactions {
     pub jumped: u8,
     /// Rate of path time, in seconds of path time per second.
     pub rate: f32,
-    /// Time for which the controller has held the path back in this run, in ms (J-75).
+    /// Time for which the controller has slowed the path down in this run, ms (J-75).
     pub held_back_ms: u32,
 }
 
-/// Length of [`Reactions`].
+/// Length of [`Reactions`] in the wire format, bytes.
 pub(super) const REACTIONS_LEN: usize = 24;
 
 impl Reactions {
-    /// Returns the bytes in the wire format.
+    /// Returns the bytes of the reactions in the wire format.
     pub(super) fn emit(&self) -> [u8; REACTIONS_LEN] {
         let (cause, ms) = self.stop.unwrap_or_default();
         let kind = if self.stop.is_some() { cause.kind as u8 } else { 0 };
@@ -162,7 +162,7 @@ impl Reactions {
         b
     }
 
-    /// Parses the reactions from the wire format. If the kind is unknown to this version, `stop` is `None`.
+    /// Parses the reactions from the wire format. If this version does not know the kind of the stop, `stop` is `None`.
     pub(super) fn parse(b: &[u8; REACTIONS_LEN]) -> Self {
         let word = |at: usize| {
             let bytes = b.get(at..).and_then(|bytes| bytes.first_chunk());

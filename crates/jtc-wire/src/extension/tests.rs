@@ -33,7 +33,7 @@ fn j52_an_info_comes_back_as_it_was_sent() {
     let frame = FrameRef::new_checked(&out[..n]).unwrap();
     assert_eq!(Answer::parse(frame), Some(Answer::Info(info())));
     assert_eq!((info().firmware(), info().revision()), ("0.1.0", "4334c10b6b9b1d2d"));
-    // Bytes that a later version of the extensions adds are ignored. A body that is too short is not valid.
+    // The parser ignores bytes that a later version of the extensions adds. A body that is too short is not valid.
     let body = [&info().emit()[..], &[1, 2, 3]].concat();
     assert_eq!(Info::parse(&body), Some(info()));
     assert_eq!(Info::parse(&body[..INFO_LEN - 1]), None);
@@ -82,7 +82,7 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
     assert_eq!(Info::parse(&later).unwrap().reactions, Some(Reactions { stop: None, ..reactions }));
 }
 
-/// The text of every cause contains the joint or the event, and the value and the limit with their unit.
+/// The text of every cause must contain the joint or the event, and the value and the limit with their unit.
 #[test]
 fn j69_every_cause_has_its_words() {
     for kind in StopKind::ALL {
@@ -137,7 +137,7 @@ fn j53_values_travel_whole() {
     assert_eq!(short, Err(EncodeError::BufferTooShort { needed: 16, given: 15 }));
 }
 
-/// The bytes are those of the examples on the protocol documentation page.
+/// The expected bytes are those of the examples on the protocol page.
 #[test]
 fn j50_requests_are_these_bytes() {
     assert_eq!(fixed::GET_INFO[..4], [0x9B, 0x40, 0, 6]);
@@ -152,7 +152,7 @@ fn j50_requests_are_these_bytes() {
     assert_eq!(value.emit(), [3, 6, 0xBF, 0xF8, 0, 0, 0, 0, 0, 0]);
 }
 
-/// The bytes are those of the examples on the protocol documentation page.
+/// The expected bytes are those of the examples on the protocol page.
 #[test]
 fn j56_a_page_of_the_log_is_these_bytes() {
     let page = LogPage {
@@ -172,7 +172,7 @@ fn j56_a_page_of_the_log_is_these_bytes() {
     ];
     assert_eq!(out[..n - 2], bytes);
     assert_eq!(Answer::parse(FrameRef::new_checked(&out[..n]).unwrap()), Some(Answer::Log(page)));
-    // Even the longest page is within the limit of J-56.
+    // The longest page must also be within the limit of J-56.
     let full = LogPage { bytes: &[7; LOG_PAGE], ..page };
     assert!(Answer::Log(full).emit(&mut out).unwrap() <= 256);
 }
@@ -185,7 +185,7 @@ fn j52_the_hash_is_fnv_1a() {
     assert_eq!(Hash::new().update(b"foo").update(b"bar").value(), 0x8594_4171_F739_67E8);
 }
 
-/// Returns an image with `settings` values.
+/// Returns an arm image with `settings` values.
 fn image_bytes(table: bool, settings: u16) -> Vec<u8> {
     let mut bytes = b"JTCA".to_vec();
     bytes.extend([1, table.into()]);
@@ -209,7 +209,7 @@ fn j54_an_image_is_read_whole_or_not_at_all() {
         assert_eq!(read.settings.len(), usize::from(settings));
         assert!(bytes.len() <= IMAGE_MAX);
         assert_eq!(ArmImage::parse(&bytes[..bytes.len() - 1]), None);
-        // The name does not change the hash.
+        // The name of the arm must not change the hash of the image.
         let hash = Hash::of_image(&bytes);
         let at = bytes.len() - 32;
         bytes[at] = b'x';
@@ -233,7 +233,8 @@ proptest! {
         if let Some(frame) = FrameRef::new_checked(&bytes) {
             if let Some(answer) = Answer::parse(frame) {
                 let mut out = [0; ANSWER_MAX];
-                // Encoding a parsed answer gives the original bytes, except for bytes that a later version may have added to an Info.
+                // Encoding a parsed answer must give the original bytes, except for bytes that a later version may have added to an
+                // Info.
                 if let Ok(n) = answer.emit(&mut out) && !matches!(answer, Answer::Info(_)) {
                     prop_assert_eq!(&out[..n], &bytes[..]);
                 }

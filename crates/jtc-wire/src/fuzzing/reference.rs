@@ -1,4 +1,5 @@
-//! Second stream parser, as a reference for the first. This parser is slow and needs the complete stream, so its correctness is easy to verify.
+//! Second stream parser, used as a reference for the stream parser of the device. The reference parser is slow and needs the complete
+//! stream, so its correctness is easy to verify.
 use std::vec::Vec;
 
 use crate::{FrameRef, FrameStatus, Response};
@@ -29,7 +30,7 @@ pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, E
     all
 }
 
-/// Returns the positions in the stream at which a Stop or a Pause ends, including those inside other frames.
+/// Returns the positions in the stream at which a Stop or a Pause ends, including a Stop or a Pause inside other frames.
 pub(super) fn urgent_ends(regions: &[Vec<u8>]) -> Vec<u64> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -62,7 +63,7 @@ fn of_region(region: &[u8], capacity: usize) -> Vec<(usize, Event)> {
     found
 }
 
-/// Returns the length of the valid frame at the start of the bytes.
+/// Returns the length of the valid frame at the start of the bytes, or `None` if the bytes do not start with one.
 fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     let n = usize::from(u16::from_be_bytes([*bytes.get(2)?, *bytes.get(3)?]));
     let frame = FrameRef::new_checked(bytes.get(..n)?)?;

@@ -1,5 +1,5 @@
-//! Byte streams that are generated from the input: frames, damaged frames, false headers, noise and gaps. The bytes arrive in pieces of
-//! any length, and the reader is slow.
+//! Byte streams that are generated from the fuzz input: frames, damaged frames, false headers, noise and gaps. The bytes arrive in pieces
+//! of any length, and the reader is slow.
 use std::vec;
 use std::vec::Vec;
 
@@ -21,7 +21,7 @@ enum Step {
     Lazy(bool),
 }
 
-/// Reads the bytes in order, and returns zeros after the end.
+/// Reads the bytes of the input in order, and returns zeros after the end.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -53,7 +53,7 @@ impl<'a> Reader<'a> {
     }
     fn step(&mut self) -> Step {
         Step::Bytes(match self.byte() % 16 {
-            // A value of 0 gives exactly a gap, because 200 µs have already passed.
+            // A value of 0 gives a silence that is exactly as long as a gap, because 200 µs have already passed.
             0 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 200 + u64::from(self.byte()) * 100),
             1 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 201),
             2 => return Step::Hold(self.byte() % 40),
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
             }
             12 => [HEADER].repeat(self.byte().into()),
             13 => {
-                // Frames in the body of a Trajectory frame, which may be damaged.
+                // Returns frames in the body of a Trajectory frame, which may be damaged.
                 let mut body: Vec<u8> = (0..4).flat_map(|_| self.frame()).collect();
                 body.resize(8 + body.len().next_multiple_of(36), self.byte());
                 let mut frame = sealed(FrameType::Trajectory as u8, &body);
@@ -98,7 +98,7 @@ impl<'a> Reader<'a> {
             14 => [self.byte()].repeat(usize::from(self.byte()) * 20),
             _ => match self.byte() {
                 kind @ 0..16 => {
-                    // A Stop or a Pause that is repeated a few times. The last repetition is cut off.
+                    // Returns a Stop or a Pause that is repeated a few times. The last repetition is cut off.
                     let frame = if kind % 2 == 0 { fixed::STOP } else { fixed::PAUSE };
                     let mut frames = frame.repeat(usize::from(kind / 2) + 1);
                     frames.truncate(frames.len() - usize::from(self.byte() % 8));
@@ -123,7 +123,7 @@ struct Driver {
     lazy: bool,
     found: Vec<(u64, Event)>,
     watch: UrgentWatch<1>,
-    /// Time of the watch, which receives the bytes as soon as they arrive, even if the reader is slow.
+    /// Current time for the watch, µs. The watch receives the bytes as soon as they arrive, even if the reader is slow.
     arrived_us: u64,
     /// Stream positions at which a Stop or a Pause ended.
     urgent: Vec<u64>,
@@ -170,8 +170,8 @@ impl Driver {
         }
     }
 
-    /// Passes the same pieces to the watch as to the reader. The watch must find the same commands as the reference
-    /// finds in the complete stream.
+    /// Passes the same pieces to the watch as to the reader. The watch must find the same commands as the reference parser finds in the
+    /// complete stream.
     fn watch(&mut self, bytes: &[u8]) {
         self.arrived_us +=
             if self.now - self.last >= INTER_BYTE_TIMEOUT_US { INTER_BYTE_TIMEOUT_US } else { 0 };
@@ -183,7 +183,7 @@ impl Driver {
             let ends: Vec<u64> = (before + 1..=before + piece.len() as u64)
                 .filter(|end| self.watch.overtaken(0, end - 1))
                 .collect();
-            // Only the last command determines the overtaken position; the earlier commands are only counted.
+            // Only the last command determines the position `overtaken`; the earlier commands are only counted.
             self.urgent.extend(ends.last().filter(|_| count > 0));
             self.urgent_count += count;
         }
@@ -198,7 +198,7 @@ impl Driver {
             bytes = &bytes[taken..];
             self.bytes += taken;
             if taken < piece.len() {
-                // If the reader was delayed by more than a gap, the frame must still not be split.
+                // A frame must stay complete even if the reader was delayed by more than a gap.
                 self.now += 2 * INTER_BYTE_TIMEOUT_US;
                 let before = self.found.len();
                 self.drain();

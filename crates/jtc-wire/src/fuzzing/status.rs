@@ -5,8 +5,8 @@ use std::vec::Vec;
 use super::sealed;
 use crate::{Answer, FrameRef, FrameType, Status, StatusReceiver};
 
-/// Returns the statuses of a complete stream, each at the first position at which a status begins, and the number of
-/// bytes between the statuses.
+/// Returns the statuses of a complete stream, and the number of bytes that do not belong to a status. Each status is found at the first
+/// position at which a status begins.
 fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     let (mut found, mut skipped, mut at) = (Vec::new(), 0, 0);
     while at < stream.len() {
@@ -60,7 +60,7 @@ pub fn status_stream(data: &[u8]) {
             _ => stream.extend(bytes),
         }
     }
-    // After these bytes, the receiver can decide whether a candidate at the end of the stream is valid.
+    // With these bytes at the end, the receiver can decide whether the last candidate of the stream is valid.
     stream.extend([0; 256]);
 
     let mut receiver = StatusReceiver::new();
@@ -77,7 +77,7 @@ pub fn status_stream(data: &[u8]) {
         assert!(piece.is_empty());
     }
     let (expected, skipped) = reference(&stream);
-    // Compares the bytes, because a NaN is not equal to itself.
+    // The code compares bytes, because a NaN is not equal to itself.
     let bytes = |all: &[Status]| all.iter().map(|s| (s.emit(), s.gripper.is_some())).collect::<Vec<_>>();
     assert_eq!(bytes(&found), bytes(&expected));
     assert_eq!(receiver.counters().frames, expected.len() as u64);

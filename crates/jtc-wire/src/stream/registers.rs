@@ -1,4 +1,4 @@
-//! CRC registers that are stored along the receive buffer, so that the CRC of a candidate of any length needs only two of them.
+//! CRC registers that are stored along the receive buffer. The CRC of a candidate of any length needs only two of these registers.
 use crate::crc::crc16_update;
 use crate::frame::FRAME_MAX;
 
@@ -46,7 +46,7 @@ impl Registers {
         }
     }
 
-    /// Removes the first `by` bytes.
+    /// Removes the first `by` bytes of the buffer from the stored registers.
     pub(super) fn shift(&mut self, by: usize, buffer: &[u8]) {
         self.base = self.at(by, buffer);
         if by >= self.phase {
@@ -66,7 +66,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Bytes arrive in pieces, and bytes are sometimes removed from the front.
+    /// Generates pieces of bytes. Sometimes bytes are removed from the front of the buffer.
     fn steps() -> impl Strategy<Value = Vec<(Vec<u8>, Option<prop::sample::Index>)>> {
         let piece = prop::collection::vec(any::<u8>(), 0..200);
         prop::collection::vec((piece, any::<Option<prop::sample::Index>>()), 1..12)
@@ -75,8 +75,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// At every position, the register equals the register of the complete stream. Fewer than `GRID` bytes must suffice to compute the
-        /// register, so the test overwrites the older bytes.
+        /// At every position, the register must equal the register of the complete stream. Fewer than `GRID` bytes must suffice to compute
+        /// the register, so the test overwrites the older bytes.
         #[test]
         fn any_register_from_a_few_bytes(steps in steps()) {
             let (mut registers, mut gone, mut held) = (Registers::new(), Vec::new(), Vec::new());

@@ -1,9 +1,10 @@
-//! Tests of the stream parser of the device at its limits: no bytes, a full buffer, and the work of a call.
+//! Tests of the stream parser of the device at its limits: calls without bytes, a full buffer, and the work
+//! of one call.
 use jtc_wire::{FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, fixed};
 
 use super::{INTER_BYTE_TIMEOUT_US, ON, receiver};
 
-/// A call without bytes does not reset the timeout of an incomplete frame.
+/// A call without bytes must not reset the timeout of an incomplete frame.
 #[test]
 fn j03_no_bytes_end_no_silence() {
     let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
@@ -44,7 +45,8 @@ fn a_frame_as_long_as_the_buffer_fits() {
     }
 }
 
-/// Each byte is copied once, when it arrives, unless the buffer has no space after the held bytes.
+/// The parser must copy each byte once, when it arrives, unless the buffer has no space after the held
+/// bytes.
 #[test]
 fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
     let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
@@ -66,7 +68,7 @@ fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
     assert_ne!(place(&receiver), before);
 }
 
-/// A call of `poll` skips at most 2,048 bytes, so the call does not delay a tick (J-07).
+/// A call of `poll` must skip at most 2,048 bytes, so that it does not delay a tick (J-07).
 #[test]
 fn j07_noise_is_passed_over_in_bounded_steps() {
     let mut receiver = receiver();

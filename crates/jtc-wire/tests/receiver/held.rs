@@ -1,4 +1,4 @@
-//! Tests of events that are not released yet, and of bytes that arrive meanwhile.
+//! Tests of events that are not released yet, and of bytes that arrive before the release.
 use jtc_wire::{Command, FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, Response};
 
 use super::{INTER_BYTE_TIMEOUT_US, ON, receiver, segment};
@@ -7,8 +7,8 @@ use super::{INTER_BYTE_TIMEOUT_US, ON, receiver, segment};
 fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
     let mut receiver = receiver();
     let mut now = 0;
-    // The test sends more frames, each after a gap, than the number of gaps that the receiver can store. Some bytes are
-    // refused at first, but no frame is lost.
+    // The test sends more frames, each after a gap, than the number of gaps that the receiver can store. The receiver refuses some bytes
+    // at first, but must not lose a frame.
     let (mut sent, mut received) = (0, 0);
     while received < 500 {
         if sent < 500 && receiver.push(now, &ON) == ON.len() {
@@ -25,8 +25,8 @@ fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
     assert!(!receiver.poll(now + 10_000));
 }
 
-/// The test sends halves of frames, each after a gap. The parser must never join two halves, even if a half was offered twice because the
-/// list of gaps was full.
+/// The test sends halves of frames, each after a gap. The parser must never join two halves, even if the test passes a half twice because
+/// the list of gaps was full.
 #[test]
 fn j05_gaps_are_never_forgotten() {
     for first in 0..2 {
@@ -69,7 +69,7 @@ fn j04_silence_behind_a_held_event_is_one_gap() {
     assert_eq!(receiver.push(1_000_000, &ON), 6);
 }
 
-/// The reader is delayed by more than a gap. The remaining bytes of a piece are offered late, but the frame is still complete.
+/// The reader is delayed by more than a gap. The reader passes the remaining bytes of a piece late, but the frame must still be complete.
 #[test]
 fn j03_a_slow_reader_is_no_gap() {
     let mut receiver = receiver();
@@ -90,8 +90,8 @@ fn j03_a_slow_reader_is_no_gap() {
     assert_eq!(received.bytes, frame);
 }
 
-/// The test sends 15,000 false headers, and each header announces tens of thousands of bytes. The parser needs a bounded
-/// number of bounded steps.
+/// The test sends 15,000 false headers, and each header announces tens of thousands of bytes. The parser must need a bounded number of
+/// bounded steps.
 #[test]
 fn j07_hostile_bytes_cost_little() {
     let mut receiver = receiver();
@@ -116,7 +116,7 @@ fn j07_hostile_bytes_cost_little() {
     assert!(receiver.poll(6000));
 }
 
-/// If the buffer is too short, the parser refuses long frames and continues.
+/// If the buffer is too short, the parser must refuse long frames and continue.
 #[test]
 fn a_short_buffer() {
     let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
@@ -141,8 +141,8 @@ fn a_short_buffer() {
     panic!("the frame was not found");
 }
 
-/// The last bytes of a frame arrive after lost bytes. The loss gets one record (J-04), the last bytes are not parsed as a frame, and
-/// the next frame is found at its true position.
+/// The last bytes of a frame arrive after lost bytes. The loss must get one record (J-04), the parser must not treat the last bytes as a
+/// frame, and it must find the next frame at its true position.
 #[test]
 fn j04_lost_bytes_have_one_record_and_are_not_joined_across() {
     let mut receiver = receiver();

@@ -27,7 +27,7 @@ impl Line {
         Line { receiver: receiver(), now: 1_000_000 }
     }
 
-    /// Sends all bytes in one call and returns their events.
+    /// Sends all bytes in one call and returns the events that they cause.
     fn send(&mut self, bytes: &[u8]) -> Vec<Received> {
         self.now += 100;
         assert_eq!(self.receiver.push(self.now, bytes), bytes.len());
@@ -87,7 +87,7 @@ fn j03_several_frames_in_one_piece() {
 #[test]
 fn j02_the_longest_frame() {
     let mut line = Line::new();
-    // A frame before the longest frame leaves too little space at the end of the buffer.
+    // After the first frame, the end of the buffer has too little space for the longest frame.
     assert_eq!(line.send(&ON), [GOOD_ON]);
     let frame = segment(1666);
     assert_eq!(line.send(&frame), [Good(FrameType::Trajectory, 59_990)]);
@@ -119,8 +119,8 @@ fn j05_frame_type() {
     }
 }
 
-/// The test also covers D16 of the old device: a frame whose length is not permitted for its type is never executed,
-/// even if the CRC is correct.
+/// The test also covers fault D16 of the old device: a frame whose length is not permitted for its type must never be
+/// executed, even if the CRC is correct.
 #[test]
 fn j05_length_of_another_type() {
     let mut line = Line::new();
@@ -158,13 +158,13 @@ fn j05_gap() {
     assert_eq!(line.silence(4999), []);
     assert_eq!(line.silence(1), [Bad(4, DiscontinuousFrame, 20)]);
     assert_eq!(line.send(&ON), [GOOD_ON]);
-    // The silence is measured from the last byte, not from the first byte or the last frame.
+    // The parser measures the silence from the last byte, not from the first byte or the last frame.
     for piece in frame.chunks(100) {
         line.silence(4800);
         line.send(piece);
     }
     assert_eq!(line.send(&ON), [GOOD_ON], "the frame was received in the loop");
-    // At this point, the type is still unknown.
+    // After this byte, the type of the frame is still unknown.
     assert_eq!(line.send(&ON[..1]), []);
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
@@ -182,7 +182,7 @@ fn j05_gap_seen_with_the_next_bytes() {
     }
 }
 
-/// D15 of the old device: a glitch of two bytes, and length fields of 0 and 1.
+/// The test covers fault D15 of the old device: a glitch of two bytes, and length fields of 0 and 1.
 #[test]
 fn j07_glitches() {
     let mut line = Line::new();
@@ -195,7 +195,7 @@ fn j07_glitches() {
 #[test]
 fn j03_a_false_header_costs_no_frame() {
     let mut line = Line::new();
-    // The header announces 59,990 bytes. The following bytes are treated as its body until a gap.
+    // The header announces 59,990 bytes. The parser treats the following bytes as the body of this frame until a gap.
     assert_eq!(line.send(&[HEADER, 0x04, 0xEA, 0x56]), []);
     assert_eq!(line.send(&ON), []);
     assert_eq!(line.send(&fixed::STOP), []);
@@ -213,7 +213,7 @@ fn j03_a_false_header_that_fills_up_costs_no_frame() {
     assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
-/// A frame that lost a byte is followed, without a gap, by the complete frame.
+/// After a frame that lost a byte, the complete frame follows without a gap.
 #[test]
 fn j03_a_lost_byte_costs_only_its_frame() {
     let frame = segment(10);
@@ -251,8 +251,7 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
 }
 
-/// A line becomes plain 2 s after an extension request. The time of its first byte counts as the time of
-/// a frame of any length.
+/// A line becomes plain 2 s after an extension request. For a frame of any length, the time of its first byte decides.
 #[test]
 fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
     // Returns a flag for each complete frame: true if the line was plain.
@@ -274,7 +273,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
     for (after_us, is_plain) in
         [(0, false), (1_000, false), (KNOWN_US, false), (KNOWN_US + 1, true), (60_000_000, true)]
     {
-        // The request itself proves that its client knows the extensions.
+        // The extension request itself shows that its client knows the extensions.
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         assert_eq!(plain(&mut line, &fixed::STOP), [is_plain], "{after_us} \u{b5}s");
@@ -307,7 +306,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
         line.now += 10_000;
         assert_eq!(plain(&mut line, &fixed::STOP), [!shows], "{bytes:x?}");
     }
-    // Like the check above, but after noise and after other frames in the same piece.
+    // Repeats the check above, but after noise and after other frames in the same piece.
     let mut line = Line::new();
     let bytes =
         [&[7, 7, 0x9B][..], &fixed::STOP, &fixed::GET_INFO, &fixed::STOP, &segment(500), &ON].concat();

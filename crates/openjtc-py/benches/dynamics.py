@@ -2,9 +2,10 @@
 
     python benches/dynamics.py [--states 100000] [--rounds 3] [--json FILE]
 
-Pinocchio (`pip install pin`) is called in a loop over the states, because its bindings have no batch call for most of these functions. Its
-`parallel` extension is used for the others, if the wheel has it. The best of several rounds is printed, because other programs can only
-slow a round down. Build the package with optimisation first (`maturin develop --profile dist`).
+Pinocchio (`pip install pin`) is called in a loop over the states, because its bindings have no batch call for most of these functions. For
+the other functions, the benchmark uses the `parallel` extension of Pinocchio if the wheel contains it. The benchmark prints the best of
+several rounds, because other programs can only slow a round down. Build the package with optimisation first
+(`maturin develop --profile dist`).
 """
 
 import argparse

@@ -14,7 +14,7 @@ def main(target: str = "sim:") -> None:
         print(f"{robot.arm.name}: {robot.status.waiting_for}")
         print(robot.move([0, 30, -60, 0, 30, 0], degrees=True, speed=50))
 
-        # `approach` moves the arm to the first point if it is elsewhere.
+        # `approach` moves the arm to the first point if the arm is at another position.
         run = robot.run(openjtc.example("motion"), approach=True)
         print(run)
         print("report:", run.report("first_motion.html", overwrite=True))

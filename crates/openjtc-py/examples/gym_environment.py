@@ -3,7 +3,7 @@
     pip install './openjtc-0.2.0-….whl[gym]'    # the wheel of a release, by its full name; if it is installed, only `pip install gymnasium`
     python gym_environment.py
 
-checks the environment and runs a scripted policy in it. The actions are shares of the largest torques of the drives.
+The program checks the environment and runs a scripted policy in it. The actions are shares of the largest torques of the drives.
 """
 
 import gymnasium as gym
@@ -16,8 +16,8 @@ from openjtc.sim import Plant
 
 
 class Reach(gym.Env):
-    """The observation has positions, velocities and goal. The reward is minus the distance to the goal, and minus 100
-    if a drive trips."""
+    """The observation contains positions, velocities and the goal. The reward is minus the distance to the goal. If a drive trips, the
+    reward is 100 lower."""
 
     def __init__(self, seconds=5.0):
         self.plant = Plant(Arm.avena())

@@ -2,8 +2,9 @@
 
     python own_controller.py
 
-Both controllers move the same arm, whose masses and friction differ slightly from its file. openjtc's controller runs over the serial
-line. Your own controller is a PD law with gravity compensation that uses the same drives. The program prints the errors of both.
+Both controllers move the same arm, whose masses and friction differ slightly from the arm file. openjtc's controller is used over the
+serial line. Your own controller is a PD law with gravity compensation that uses the same drives. The program prints the errors of both
+controllers.
 """
 
 import numpy as np

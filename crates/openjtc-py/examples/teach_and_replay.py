@@ -17,7 +17,7 @@ def main(target: str = "sim:") -> None:
         robot.move(START)
         with robot.teach() as teaching:
             if target == "sim:":
-                # A simulated hand leads the arm along a path.
+                # A simulated hand guides the arm along a path.
                 shown = robot.plan([START, START + [0.5, 0.2, -0.2, 0, 0.3, 0], START + [0.2, 0, 0, 0.4, 0, 0]])
                 robot.lead(shown)
             print("lead the arm by hand: 8 s")

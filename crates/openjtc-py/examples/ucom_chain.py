@@ -19,12 +19,14 @@ def main(bus: str) -> None:
         for board in boards:
             print(f"  {board.number:2}  0x{board.flash_number:04X}  {board.state:9}  {board.description}")
 
-        # Starts applications without movement. Only started applications send the names of their signals.
+        # Starts the applications of the boards without movement. Only started applications send the names of their
+        # signals.
         chain.start([1, 2])
         for signal in chain.boards[1].signals.inputs:
             print(f"  input {signal.text}, {signal.minimum:g} to {signal.maximum:g}")
 
-        # Control loops run under supervision until the end of the context. Here a step of a value is 0.01 degrees.
+        # The chain supervises the control loops until the end of the context. In the simulated head, a step of a
+        # value is 0.01 degrees.
         report = chain.run([1, 2], active=True, inputs={"1.set_position": 0, "2.set_position": 0})
         print(f"boards {report.boards} run; {report.load_percent:.0f} % of the bus")
 

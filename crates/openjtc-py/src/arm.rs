@@ -27,7 +27,7 @@ impl Arm {
 
 #[pymethods]
 impl Arm {
-    /// Loads a TOML or URDF file. The content of the file determines which of the two formats is read.
+    /// Loads a TOML or URDF file. The content of the file determines the format.
     #[staticmethod]
     fn load(path: PathBuf) -> Result<Self, Failure> {
         Ok(Self::of(HostArm::load(&path)?))
@@ -39,7 +39,7 @@ impl Arm {
         Ok(Self::of(HostArm::parse(text)?))
     }
 
-    /// Imports a robot description. For missing data, the import proposes values and marks them.
+    /// Imports a robot description. If data is missing, the import proposes values and marks these values.
     #[staticmethod]
     #[pyo3(signature = (path, joints=None, tip=None))]
     fn import_urdf(path: PathBuf, joints: Option<Vec<String>>, tip: Option<String>) -> Result<Self, Failure> {
@@ -97,7 +97,7 @@ impl Arm {
         Ok(limits)
     }
 
-    /// Gains (6, 3): Kp (N·m/rad), Ki (N·m/(rad·s)), Kd (N·m·s/rad); `None` if the file has no gains.
+    /// Gains (6, 3): Kp (N·m/rad), Ki (N·m/(rad·s)), Kd (N·m·s/rad); `None` if the arm file has no gains.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         let gains = self.inner.pid?;
@@ -105,13 +105,13 @@ impl Arm {
     }
 
     /// Friction polynomials (6, 6), one row per joint: c0 (N·m), c1 (N·m·s/rad), c2 (N·m·s²/rad²), c3 (N·m·s³/rad³), c4 (1/K), c5 (°C);
-    /// `None` if the file has no friction.
+    /// `None` if the arm file has no friction.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         self.inner.polynomial.as_ref().map(|all| array::wide(py, all))
     }
 
-    /// Inertia of the rotor of each drive, referred to the joint (6,), kg·m².
+    /// Inertia of the rotor of each drive, converted to the joint side of the gear (6,), kg·m².
     #[getter]
     fn rotor_inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.inner.config().joints.each_ref().map(|j| j.rotor_inertia))
@@ -129,13 +129,13 @@ impl Arm {
         PyArray1::from_slice(py, &self.inner.config().gravity)
     }
 
-    /// Notes on data of the file that was ignored, completed or proposed.
+    /// Notes on data that the loader ignored, completed or proposed.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.inner.warnings.iter().map(ToString::to_string).collect()
     }
 
-    /// Returns the findings of `jtc arm check`: the severity, finding, reason and next step of each.
+    /// Returns the findings of `jtc arm check`. Each finding has a severity, a description, a reason and a next step.
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let list = PyList::empty(py);
         for found in self.inner.check().findings {
@@ -147,12 +147,12 @@ impl Arm {
         Ok(list)
     }
 
-    /// Returns the arm as the text of an arm file, TOML.
+    /// Returns the arm as the text of an arm file in TOML.
     fn to_toml(&self) -> String {
         self.inner.to_toml()
     }
 
-    /// Returns the arm as the text of a robot description, URDF.
+    /// Returns the arm as the text of a robot description in URDF.
     fn to_urdf(&self) -> String {
         self.inner.to_urdf()
     }
@@ -170,7 +170,7 @@ impl Arm {
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Arm>()
 }

@@ -18,7 +18,7 @@ pub(crate) fn floats<'py>(
     let made = || -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let numpy = value.py().import("numpy")?;
         let array = numpy.call_method1("ascontiguousarray", (value, "float64"))?;
-        // `ascontiguousarray` would give a scalar a dimension, but no argument here is a scalar.
+        // `ascontiguousarray` would give a scalar a dimension, but no argument of this function is a scalar.
         Ok(array.cast_into::<PyArrayDyn<f64>>()?)
     };
     made().map(|array| array.readonly()).map_err(|error| {
@@ -27,7 +27,7 @@ pub(crate) fn floats<'py>(
     })
 }
 
-/// Reads six finite numbers, base to wrist. `what` is the name of the numbers in the error.
+/// Reads six finite numbers, base to wrist. Errors contain `what` as the name of the numbers.
 pub(crate) fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINTS], Failure> {
     let array = floats(value, what)?;
     let numbers = array.as_slice().ok().and_then(|all| <[f64; JOINTS]>::try_from(all).ok());
@@ -39,7 +39,8 @@ pub(crate) fn joints(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; JOINT
     Ok(numbers)
 }
 
-/// Reads rows of six finite numbers. The flag is `true` if the value was a single row without a second dimension.
+/// Reads rows of six finite numbers. The returned flag is `true` if the array was a single row without a second
+/// dimension.
 pub(crate) fn rows(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<[f64; JOINTS]>, bool), Failure> {
     let array = floats(value, what)?;
     let shape = array.shape().to_vec();

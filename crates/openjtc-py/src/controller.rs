@@ -15,7 +15,7 @@ use crate::telemetry::Telemetry;
 /// Frame of the joint bus as Python passes it.
 pub(crate) type PyFrame<'py> = (u16, Bound<'py, PyBytes>);
 
-/// Outputs of a tick: frame for the bus, bytes for the host, safety output, and `true` if the watchdog reset the controller.
+/// Outputs of a tick: frame for the joint bus, bytes for the host, safety output, and `true` if the watchdog reset the controller.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool);
 
 /// Converts a joint bus frame from Python.
@@ -33,8 +33,8 @@ pub(crate) fn to_python<'py>(py: Python<'py>, frame: &Frame) -> PyFrame<'py> {
 pub(crate) fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>), Failure> {
     let Some(arm) = arm else { return Ok((Config::avena(), None)) };
     let image = arm.image().map_err(|error| Failure::usage(error.to_string()))?;
-    // With an image, the controller reads all data from the image, as on a board. Without an image, the controller has only the limits
-    // and waits for parameters.
+    // With an image, the controller reads all data from the image, as on a board. Without an image, the controller has only the
+    // limits, and waits for parameters.
     Ok(if image.is_some() { (Config::avena(), image) } else { (arm.config(), None) })
 }
 
@@ -43,7 +43,7 @@ pub(crate) fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>),
 pub(crate) struct Controller {
     board: Board,
     now_us: u64,
-    /// Level of the safety output pin. If a tick is missing, the level does not change.
+    /// Level of the safety output pin. The level does not change in a missing tick.
     safety_output: bool,
 }
 
@@ -58,7 +58,7 @@ impl Controller {
         Ok(Self { board, now_us: 0, safety_output: false })
     }
 
-    /// Runs one tick, 1 ms.
+    /// Runs one tick, which is 1 ms.
     #[allow(clippy::too_many_arguments, reason = "the inputs of a tick; Python has them in one object")]
     fn tick<'py>(
         &mut self,
@@ -97,14 +97,14 @@ impl Controller {
         Telemetry(*self.board.telemetry())
     }
 
-    /// Time since the start, s.
+    /// Time since the start of the controller, s.
     #[getter]
     fn time(&self) -> f64 {
         self.now_us as f64 * 1e-6
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Controller>()
 }

@@ -17,7 +17,7 @@ use crate::error::Failure;
 /// Payload as Python passes it: mass, centre of mass, inertia.
 pub(crate) type PayloadNumbers = (f64, [f64; 3], [f64; 6]);
 
-/// Makes a payload; returns an error if the values are not physically consistent.
+/// Makes a payload. Returns an error if the values are not physically consistent.
 pub(crate) fn payload(numbers: Option<PayloadNumbers>) -> Result<Payload, Failure> {
     let Some((mass, com, inertia)) = numbers else { return Ok(Payload::NONE) };
     let payload = Payload { mass, com, inertia };
@@ -84,7 +84,7 @@ impl Dynamics {
         Ok(array::as_given(py, &accelerations, states.one))
     }
 
-    /// Computes joint torques at rest.
+    /// Computes the joint torques that hold the arm at rest.
     fn gravity<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> Result<Bound<'py, PyAny>, Failure> {
         let states = States::read([("q", q)])?;
         let torques = states.map(py, |[q]| self.dynamics.gravity_torque(q));
@@ -216,14 +216,14 @@ impl Dynamics {
         Ok(array::as_given(py, &torques, states.one))
     }
 
-    /// Inertia of the rotors, kg·m².
+    /// Inertia of each rotor, kg·m².
     #[getter]
     fn rotor_inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.rotor)
     }
 }
 
-/// Arguments for many states: each argument has one row for every state, or a single row for all states.
+/// Arguments for many states. Each argument has one row for every state, or a single row for all states.
 struct States<const K: usize> {
     columns: [Vec<JointVec>; K],
     count: usize,
@@ -244,7 +244,7 @@ impl<const K: usize> States<K> {
         Ok(Self { columns, count, one: shapes.iter().all(|(_, _, one)| *one) })
     }
 
-    /// Computes a value for each state; other Python threads can run meanwhile.
+    /// Computes a value for each state. Other Python threads can run during the computation.
     fn map<T: Send>(&self, py: Python<'_>, of: impl Fn([&JointVec; K]) -> T + Sync) -> Vec<T> {
         py.detach(|| {
             (0..self.count).map(|k| of(self.columns.each_ref().map(|column| pick(column, k)))).collect()
@@ -252,7 +252,7 @@ impl<const K: usize> States<K> {
     }
 }
 
-/// Returns row `k`, or the single row for all states.
+/// Returns row `k`, or the only row if it applies to all states.
 fn pick<T>(rows: &[T], k: usize) -> &T {
     if let [row] = rows { row } else { &rows[k] }
 }
@@ -270,7 +270,7 @@ fn common<const K: usize>(shapes: [(&'static str, usize, bool); K]) -> Result<us
     }
 }
 
-/// Makes an array of `count` values of the shape `inner`. If `one` is set, the array does not have the first dimension.
+/// Makes an array of `count` values of the shape `inner`. If `one` is set, the array has no dimension for the states.
 fn shaped<'py>(
     py: Python<'py>,
     flat: &[f64],
@@ -292,7 +292,8 @@ fn homogeneous(pose: &Pose) -> [[f64; 4]; 4] {
     [x, y, z, [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Reads poses from 4×4 matrices. The flag is `true` if the value was a single matrix without a third dimension.
+/// Reads poses from 4×4 matrices. The returned flag is `true` if the array was a single matrix without a third
+/// dimension.
 fn poses(value: &Bound<'_, PyAny>) -> Result<(Vec<Pose>, bool), Failure> {
     let array = array::floats(value, "pose")?;
     let shape = array.shape().to_vec();
@@ -320,7 +321,7 @@ fn pose_failure(error: PoseError) -> Failure {
     PlanError::Plan(error.into()).into()
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Dynamics>()
 }

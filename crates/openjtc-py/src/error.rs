@@ -1,4 +1,4 @@
-//! Library errors as Python exceptions, with all their details.
+//! Converts library errors to Python exceptions with all their details.
 
 use std::ops::{Deref, DerefMut};
 
@@ -42,12 +42,12 @@ impl Failure {
         Self(self.0.next(next))
     }
 
-    /// Sets the facts.
+    /// Sets the facts of the failure, such as joint, value and limit.
     pub fn with(self, facts: Facts) -> Self {
         Self(self.0.with(facts))
     }
 
-    /// Replaces the message.
+    /// Replaces the message of the failure.
     pub fn message(mut self, message: impl ToString) -> Self {
         self.message = message.to_string();
         self
@@ -74,7 +74,8 @@ impl<E: Diagnose> From<E> for Failure {
     }
 }
 
-/// Returns a next step in which commands are replaced by Python calls. Commands of `ucom` are not replaced.
+/// Returns a next step in which commands of `jtc` are replaced by Python calls. Commands of `ucom` are not
+/// replaced.
 pub(crate) fn in_python(next: &Next) -> String {
     let text = next.sentence(FrontEnd::Python);
     if text.contains("`ucom ") { text.replace('`', "") } else { text }

@@ -22,7 +22,7 @@ mod wire;
 
 use pyo3::prelude::*;
 
-/// Compiled part of the package `openjtc`; users import the Python modules instead.
+/// Compiled part of the package `openjtc`. Users import the Python modules instead.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

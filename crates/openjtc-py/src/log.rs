@@ -1,4 +1,4 @@
-//! Log of the flight recorder: every tick of the last seconds before the first error, which can be replayed.
+//! Log of the flight recorder: every tick of the last seconds before the first error. The log can be replayed.
 
 use std::path::PathBuf;
 
@@ -64,7 +64,7 @@ impl FlightLog {
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<FlightLog>()
 }

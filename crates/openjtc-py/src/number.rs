@@ -1,4 +1,5 @@
-//! Range checks of numbers from Python. A number out of range gives an error with value and limit; a number is never changed silently.
+//! Range checks of numbers from Python. If a number is out of range, the error contains the value and the limit. A number is never
+//! changed silently.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -7,7 +8,8 @@ use host_kit::Facts;
 
 use crate::error::Failure;
 
-/// Returns the number if it is in this range, else an error. `what` and `unit` are the name and the unit of the number in the error.
+/// Returns the number if it is in this range; otherwise returns an error. The error contains `what` and `unit` as the name and the
+/// unit of the number.
 pub(crate) fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &str) -> Result<f64, Failure> {
     if range.contains(&value) {
         return Ok(value);
@@ -21,13 +23,13 @@ pub(crate) fn within(value: f64, range: RangeInclusive<f64>, what: &str, unit: &
     Err(failure.with(Facts::beyond(value, limit)))
 }
 
-/// Returns a duration of up to `most` seconds.
+/// Converts a number to a duration of up to `most` seconds.
 pub(crate) fn seconds(value: f64, most: f64, what: &str) -> Result<Duration, Failure> {
     within(value, 0.0..=most, what, "s").map(Duration::from_secs_f64)
 }
 
-/// Converts seconds to a timeout. A negative number gives a timeout of zero. If the number is too large for the
-/// clock, the wait has no limit.
+/// Converts seconds to a timeout. A negative number gives a timeout of zero. If the number is too large for the clock, the timeout has
+/// no limit.
 pub(crate) fn timeout(value: f64, what: &str) -> Result<Duration, Failure> {
     if value.is_nan() {
         return seconds(value, f64::INFINITY, what);

@@ -53,7 +53,7 @@ impl Plan {
         PyArray1::from_slice(py, &self.planned.waypoint_times)
     }
 
-    /// Returns the time intervals in which a joint is at a limit.
+    /// Returns the time intervals in which a joint is at one of its limits.
     fn binding<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>, Failure> {
         json::plain(py, &self.planned.binding)
     }
@@ -89,7 +89,7 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    /// Returns the blend that was passed to the call, or else the blend of the planner.
+    /// Returns the blend that was passed to the call. Without such a blend, returns the blend of the planner.
     fn blend(&self, given: Option<f64>) -> Result<f64, Failure> {
         given.map_or(Ok(self.blend), |blend| distance("blend", blend))
     }
@@ -140,7 +140,7 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     )))
 }
 
-/// Returns the torque margin that was passed to the call (%), or else the default.
+/// Returns the torque margin that was passed to the call, %. Without such a margin, returns the default.
 pub(crate) fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;
@@ -172,7 +172,7 @@ impl Planner {
         Ok(Self { arm, config, speed, blend, blend_m, line, jerk, temperature, margin_pct })
     }
 
-    /// Plans a motion between two positions; the arm is at rest at both.
+    /// Plans a motion between two positions. The arm is at rest at both positions.
     fn to(&self, py: Python<'_>, start: &Bound<'_, PyAny>, to: &Bound<'_, PyAny>) -> PyResult<Plan> {
         let target = Target::Joints(array::joints(to, "to")?);
         let start = array::joints(start, "start")?;
@@ -194,7 +194,7 @@ impl Planner {
     }
 
     /// Plans a motion through positions (N, 6). `blend` (rad) replaces the blend of the planner. `times` are in s from the first
-    /// position; NaN means that the position is reached as soon as the limits allow.
+    /// position. For a time of NaN, the arm reaches the position as soon as the limits allow.
     #[pyo3(signature = (positions, blend=None, times=None))]
     fn through(
         &self,

@@ -1,4 +1,4 @@
-//! Simulated arm with its drives, for controllers that are written in Python.
+//! Simulated arm with its drives, for controllers written in Python.
 
 use jtc_bus::{Answer, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::JOINTS;
@@ -11,9 +11,10 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, pass};
 use crate::simulator::truth;
 
-/// Boot time of the drives, ms. In this time, enough samples arrive to fill the averaging window of the drive speed.
+/// Boot time of the drives, ms. During the boot time, enough samples arrive to fill the averaging window of the
+/// drive speed.
 const BOOT_MS: u32 = 12;
-/// Maximum time until the drives are enabled, in ms.
+/// Maximum time until the drives are enabled, ms.
 const BRING_UP_MS: u64 = 2_000;
 
 /// Arm with drives, or arm without drives.
@@ -34,7 +35,7 @@ impl Plant {
     fn new(py: Python<'_>, arm: SimulatedArm<'_>, drives: bool) -> Result<Self, Failure> {
         let mut config = SimConfig { support: Support::Brakes, gripper: false, ..arm.config()? };
         for drive in &mut config.drives {
-            // Shortens the boot and alignment times of simulated motors.
+            // The boot and alignment times of the simulated drives are short, so that the plant starts quickly.
             *drive = DriveConfig { boot_ms: BOOT_MS, first_enable_ms: 1, ..*drive };
         }
         let plant = SimPlant::new(&config);
@@ -61,7 +62,7 @@ impl Plant {
         py.detach(|| self.bring_up())
     }
 
-    /// Applies a torque for `ms` milliseconds.
+    /// Applies torques for `ms` milliseconds.
     fn step(&mut self, py: Python<'_>, torque: &Bound<'_, PyAny>, ms: u64) -> PyResult<()> {
         let torque = array::joints(torque, "torque")?;
         pass(py, ms, || self.millisecond(&torque))
@@ -94,7 +95,7 @@ impl Plant {
         truth(py, self.plant.truth(), what)
     }
 
-    /// Flags of the drives that hold their joints.
+    /// Flags that are `true` for drives that hold their joints.
     #[getter]
     fn enabled(&self) -> Vec<bool> {
         let states = self.plant.node_states();
@@ -129,7 +130,7 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// Sends a request to the drives, and stores their answers to Move frames.
+    /// Sends a request to the drives, and stores the drives' answers to Move frames.
     fn ask(&mut self, request: &Request) {
         let mut answers = Vec::new();
         self.plant.receive(self.ticks * 1_000, &request.emit(), &mut answers);
@@ -143,7 +144,8 @@ impl Plant {
         }
     }
 
-    /// Configures and enables the drives in the same way as the controller does. Until then, brakes hold the arm.
+    /// Configures and enables the drives in the same way as the controller does. Until the drives are enabled,
+    /// brakes hold the arm.
     fn bring_up(&mut self) -> Result<(), Failure> {
         if !self.drives {
             return Ok(());
@@ -156,7 +158,7 @@ impl Plant {
             let states = self.plant.node_states();
             let all = |state: NodeState| states[..JOINTS].iter().all(|each| *each == state);
             if all(NodeState::ENABLED) {
-                // The first step begins from these measured values.
+                // The first step begins with the values that the drives measure here.
                 self.ask(&Request::zero_torque(false));
                 self.ticks = 0;
                 return Ok(());
@@ -182,7 +184,7 @@ impl Plant {
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Plant>()
 }

@@ -1,4 +1,4 @@
-//! Connection to a controller: a single thread runs the session, and the Python threads send jobs to this thread.
+//! Connection to a controller. A single thread runs the session, and the Python threads send jobs to this thread.
 
 mod commands;
 pub(crate) mod motion;
@@ -39,7 +39,7 @@ use worker_state::{Simulated, Target, Way, WorkerState};
 const LOOK: Duration = Duration::from_millis(2);
 /// Longest jog, s.
 const JOG_MAX: f64 = 600.0;
-/// Maximum duration of a teaching recording, in s.
+/// Maximum duration of a teaching recording, s.
 const TEACH_MAX: f64 = 3600.0;
 
 /// Connection of `openjtc.Robot`.
@@ -85,13 +85,13 @@ impl Link {
         self.worker.call(py, job)
     }
 
-    /// Returns `true` until a requested run has ended; meanwhile the thread of the connection does not answer queries.
+    /// Returns `true` until a requested run has ended. Until then, the thread of the connection does not answer queries.
     fn is_running(&self) -> bool {
         self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Sends a request to the current or next run, which executes the request when the arm moves. Without a run,
-    /// the request is sent directly to the controller.
+    /// Sends a request to the current or next run. The run executes the request when the arm moves. Without a run, the
+    /// request is sent directly to the controller.
     fn wish(
         &self,
         py: Python<'_>,
@@ -142,7 +142,7 @@ impl Link {
         Ok(Self { worker: Worker::begin(py, target)? })
     }
 
-    /// Connects through a serial port or an agent.
+    /// Connects to a controller through a serial port or an agent.
     #[staticmethod]
     #[pyo3(signature = (target, arm, baud, name, token, certificates))]
     fn open(
@@ -170,7 +170,7 @@ impl Link {
 
     /// Returns the number of Stops so far. The next Stop discards every earlier request.
     fn asked(&self) -> u64 {
-        // In a forked process this number has no effect, because each request is refused.
+        // In a forked process the number does not matter, because each request is refused.
         self.worker.now().unwrap_or_default()
     }
 
@@ -206,7 +206,7 @@ impl Link {
         options.begin(slf, Course::To { target, line, margin_pct })
     }
 
-    /// Moves to a pose. `flange` is x y z (m) and roll pitch yaw (rad) in the base frame.
+    /// Moves the arm to a pose of the flange. `flange` is x y z (m) and roll pitch yaw (rad) in the base frame.
     #[pyo3(signature = (flange, line, margin, options))]
     fn move_to_flange(
         slf: &Bound<'_, Self>,
@@ -233,14 +233,15 @@ impl Link {
         })
     }
 
-    /// Stops the arm on its path, even if another program moves it, and waits for standstill. Discards all earlier requests.
+    /// Stops the arm on its path, even if another program moves the arm, and waits for standstill. Discards all earlier
+    /// requests.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.worker.stop(py)
     }
 
     fn speed(&self, py: Python<'_>) -> PyResult<f64> {
         let shared = &self.worker.shared;
-        // During a run the thread does not answer queries, so the run publishes the speed.
+        // During a run, the thread of the connection does not answer queries, so the run publishes the speed.
         while self.is_running() {
             if let Some(speed) = *lock(&shared.speed) {
                 return Ok(speed);
@@ -263,7 +264,7 @@ impl Link {
         })
     }
 
-    /// Jogs at these velocities (rad/s) for this time, and returns the position at rest (rad).
+    /// Jogs at the velocities `velocity` (rad/s) for `seconds` (s), and returns the positions at rest (rad).
     fn jog(&self, py: Python<'_>, velocity: &Bound<'_, PyAny>, seconds: f64) -> PyResult<[f64; JOINTS]> {
         let velocity = array::joints(velocity, "velocity")?;
         let time = number::seconds(seconds, JOG_MAX, "seconds")?;
@@ -277,8 +278,8 @@ impl Link {
         self.worker.call_always(py, WorkerState::hold)
     }
 
-    /// Records the joint positions for this time (s), while the operator guides the arm by hand. `take_taught` returns
-    /// the positions, even if the recording was interrupted.
+    /// Records the joint positions for `seconds` (s), while the operator guides the arm by hand. `take_taught` returns the
+    /// positions, even if the recording was interrupted.
     fn record_teaching(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = number::seconds(seconds, TEACH_MAX, "seconds")?;
         self.call(py, move |state, asked| state.record_teaching(time, asked))
@@ -291,11 +292,11 @@ impl Link {
         (times, array::matrix(py, &rows))
     }
 
-    /// Returns a status that arrived after the start of this call.
+    /// Returns a status that arrived after this call began.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let shared = &self.worker.shared;
         let before = shared.seen();
-        // During a run the thread does not answer queries, so the run publishes each status.
+        // During a run, the thread of the connection does not answer queries, so the run publishes each status.
         while self.is_running() {
             if shared.seen() != before
                 && let Some(status) = *lock(&shared.status)
@@ -313,7 +314,7 @@ impl Link {
         queries::status(py, &status, stop)
     }
 
-    /// Waits at most `seconds` (s) until the arm is held with all drives enabled.
+    /// Waits at most `seconds` (s) until the controller holds the arm with all drives enabled.
     fn wait_ready(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let longest = number::timeout(seconds, "timeout")?;
         self.call(py, move |state, asked| {
@@ -328,7 +329,7 @@ impl Link {
     }
 }
 
-/// Registers the classes.
+/// Registers the classes in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Link>()?;
     module.add_class::<Motion>()

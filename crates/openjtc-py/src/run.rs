@@ -103,7 +103,7 @@ impl Samples {
         self.notes.clone()
     }
 
-    /// Text of the first failure, one line.
+    /// Text of the first failure, in one line.
     #[getter]
     fn failure(&self) -> Option<String> {
         self.broken.as_ref().map(RunFailure::headline)
@@ -154,7 +154,7 @@ impl Samples {
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Samples>()
 }

@@ -10,10 +10,11 @@ use crate::controller::of_arm;
 use crate::dynamics::{PayloadNumbers, payload};
 use crate::error::Failure;
 
-/// Model errors as Python passes them: relative errors of masses and frictions, and factors instead of random errors.
+/// Model errors as Python passes them: relative errors of masses and frictions, and factors that replace random
+/// errors.
 type ErrorNumbers = (f64, f64, Option<[f64; 7]>, Option<[f64; JOINTS]>);
 
-/// Arguments of `openjtc.sim`. `model_error` contains the relative errors of mass and friction, and the factors for
+/// Arguments of `openjtc.sim`. `model_error` contains the relative errors of mass and friction, and the factors of
 /// the masses and frictions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -80,7 +81,7 @@ impl SimulatedArm<'_> {
     }
 }
 
-/// Returns an error for the first number that is out of range, with the number of its joint.
+/// Returns an error for the first number that is out of range. The range error contains the number of the joint.
 fn in_range(what: &str, numbers: &[f64; JOINTS], (low, high): (f64, f64), unit: &str) -> Result<(), Failure> {
     match (1..).zip(numbers).find(|(_, number)| !(low..=high).contains(*number)) {
         None => Ok(()),
@@ -105,7 +106,7 @@ pub(crate) fn pass(py: Python<'_>, ms: u64, mut millisecond: impl FnMut() + Send
     Ok(())
 }
 
-/// Parses the kind of support that carries the arm while its drives are not enabled.
+/// Parses the kind of support of the arm while its drives are not enabled.
 pub(crate) fn support(name: &str) -> Result<Support, Failure> {
     Ok(match name {
         "brakes" => Support::Brakes,
@@ -118,7 +119,8 @@ pub(crate) fn support(name: &str) -> Result<Support, Failure> {
     })
 }
 
-/// Parses faults from the text of a fault file. Paths of hand files are relative to the working directory of Python.
+/// Parses faults from the text of a fault file. Paths of hand files are relative to the working directory of the
+/// Python program.
 pub(crate) fn faults(text: &str) -> Result<FaultPlan, Failure> {
     let load = |file: &str| {
         let trajectory = Loaded::load(file.as_ref(), None).map_err(|error| error.to_string())?.trajectory;

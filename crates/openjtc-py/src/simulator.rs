@@ -12,7 +12,8 @@ use crate::error::Failure;
 use crate::simulated::{SimulatedArm, faults, hand, pass, support};
 use crate::telemetry::Telemetry;
 
-/// Inputs of the controller in one millisecond: frames, bytes of the host, acknowledged, bus-off, safety input, status free, ticked.
+/// Inputs of the controller in one millisecond: frames, bytes of the host, and the flags acknowledged, bus-off, safety input, status
+/// free, ticked.
 type PyInputs<'py> = (Vec<PyFrame<'py>>, Bound<'py, PyBytes>, bool, bool, bool, bool, bool);
 /// Outputs of the controller in one millisecond: frame, bytes to the host, safety output.
 type PyOutputs<'py> = (Option<PyFrame<'py>>, Bound<'py, PyBytes>, bool);
@@ -121,7 +122,7 @@ impl Simulator {
         self.world.bus_frames().iter().map(|timed| to_python(py, &timed.frame)).collect()
     }
 
-    /// Returns the events of the simulation: the time in s and the text of each.
+    /// Returns the events of the simulation. Each event has a time in s and a text.
     fn events(&self) -> Vec<(f64, String)> {
         let entries = self.world.log().entries();
         entries.map(|entry| (entry.time_us as f64 * 1e-6, entry.event.to_string())).collect()
@@ -159,7 +160,7 @@ impl Simulator {
     }
 }
 
-/// Returns one array of true values of the arm.
+/// Returns true values of the arm as one array.
 pub(crate) fn truth<'py>(
     py: Python<'py>,
     truth: &Truth,
@@ -176,7 +177,7 @@ pub(crate) fn truth<'py>(
     Ok(PyArray1::from_slice(py, values))
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Simulator>()
 }

@@ -95,7 +95,7 @@ impl Telemetry {
         self.of(py, |joint| joint.set_acceleration)
     }
 
-    /// Commanded positions for the time of the measurement, in rad. The control law compares the measured positions with these positions.
+    /// Commanded positions for the time of the measurement, rad. The control law compares the measured positions with these positions.
     #[getter]
     fn due_position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.due_position)
@@ -119,49 +119,49 @@ impl Telemetry {
         self.of(py, |joint| joint.temperature)
     }
 
-    /// Torques of the model (inverse dynamics and rotors), in N·m.
+    /// Torques of the model (inverse dynamics and rotors), N·m.
     #[getter]
     fn torque_model<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_model)
     }
 
-    /// Proportional terms of the torques, in N·m.
+    /// Proportional parts of the torques, N·m.
     #[getter]
     fn torque_p<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_p)
     }
 
-    /// Integral parts, N·m.
+    /// Integral parts of the torques, N·m.
     #[getter]
     fn torque_i<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_i)
     }
 
-    /// Derivative parts, N·m.
+    /// Derivative parts of the torques, N·m.
     #[getter]
     fn torque_d<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_d)
     }
 
-    /// Friction compensation, N·m.
+    /// Torques of the friction compensation, N·m.
     #[getter]
     fn torque_friction<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_friction)
     }
 
-    /// Other torques, in N·m: the torques that smooth a change of state, and the payload and braking torques in Teaching.
+    /// Other torques, N·m: the torques that smooth a change of state, and the payload and braking torques in Teaching.
     #[getter]
     fn torque_other<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque_other)
     }
 
-    /// Torques commanded on the bus, N·m.
+    /// Torques that the controller commands on the joint bus, N·m.
     #[getter]
     fn torque<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.of(py, |joint| joint.torque)
     }
 
-    /// Ticks since the start of the controller.
+    /// Number of ticks since the start of the controller.
     #[getter]
     fn tick(&self) -> u64 {
         self.0.tick
@@ -173,37 +173,38 @@ impl Telemetry {
         self.0.state.name()
     }
 
-    /// State of the trajectory: `Null`, `Stop` (complete, at its start), `Pause`, `Execute`, `Finish`.
+    /// State of the trajectory: `Null`, `Stop` (complete, arm at its start), `Pause`, `Execute`, `Finish`.
     #[getter]
     fn trajectory(&self) -> &'static str {
         self.0.trajectory.name()
     }
 
-    /// Time on the trajectory, in ms.
+    /// Time on the trajectory, ms.
     #[getter]
     fn point(&self) -> u32 {
         self.0.point
     }
 
-    /// True if a Pause or Stop brakes with the full torque.
+    /// True if a Pause or Stop brakes the arm with the full torque.
     #[getter]
     fn braking(&self) -> bool {
         self.0.braking
     }
 
-    /// Error word; 0 means no error.
+    /// Error word of the controller; 0 means no error.
     #[getter]
     fn errors(&self) -> u16 {
         self.0.errors
     }
 
-    /// Error words of the joints, found by the controller.
+    /// Joint errors found by the controller, one error word per joint.
     #[getter]
     fn joint_errors(&self) -> Vec<u16> {
         self.0.joints.iter().map(|joint| joint.internal).collect()
     }
 
-    /// For each joint, true if its position and velocity were measured for this tick. The values of the other joints are predicted.
+    /// Flags of the joints: true if the position and velocity of the joint were measured for this tick. For the other joints, the values
+    /// are predicted.
     #[getter]
     fn fresh(&self) -> Vec<bool> {
         self.0.joints.iter().map(|joint| joint.fresh).collect()
@@ -236,7 +237,7 @@ impl Telemetry {
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Telemetry>()
 }

@@ -20,7 +20,7 @@ use crate::error::Failure;
 #[pyclass(frozen, module = "openjtc")]
 pub(crate) struct Trajectory {
     pub inner: Arc<HostTrajectory>,
-    /// Notes on data that the reader derived, resampled or omitted.
+    /// Notes on data that the loader derived, resampled or omitted.
     notes: Vec<String>,
 }
 
@@ -47,7 +47,8 @@ impl Trajectory {
 
 #[pymethods]
 impl Trajectory {
-    /// Makes a trajectory from points (N, 6), `step_ms` (ms) apart: positions (rad), velocities (rad/s) and accelerations (rad/s²).
+    /// Makes a trajectory from points (N, 6), which are `step_ms` (ms) apart: positions (rad), velocities (rad/s) and accelerations
+    /// (rad/s²).
     #[new]
     fn new(
         step_ms: u16,
@@ -88,7 +89,7 @@ impl Trajectory {
         py.detach(|| Self::loaded(Loaded::parse(text, arm.map(|arm| &arm.inner.joint_names))?, degrees))
     }
 
-    /// Loads the measured motion of a recording.
+    /// Loads the measured motion from a recording.
     #[staticmethod]
     fn load_measured(py: Python<'_>, path: PathBuf) -> Result<Self, Failure> {
         py.detach(|| Self::loaded(Loaded::load_measured(&path)?, false))
@@ -100,13 +101,13 @@ impl Trajectory {
         self.inner.step_ms
     }
 
-    /// Time from the first point to the last one, s.
+    /// Time from the first point to the last point, s.
     #[getter]
     fn duration(&self) -> f64 {
         self.inner.duration_s()
     }
 
-    /// Notes on data that the reader derived, resampled or omitted.
+    /// Notes on data that the loader derived, resampled or omitted.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
@@ -137,7 +138,7 @@ impl Trajectory {
         self.channel(py, |point| point.acceleration)
     }
 
-    /// Returns the trajectory on its path at another speed, 1 to 100 % of the original speed.
+    /// Returns a trajectory with the same path at another speed, 1 to 100 % of the original speed.
     fn at_speed(&self, percent: f64) -> Result<Self, Failure> {
         Ok(Self::of(plan::at_speed(&self.inner, percent)?))
     }
@@ -160,7 +161,7 @@ impl Trajectory {
     }
 }
 
-/// Registers the class.
+/// Registers the class in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Trajectory>()
 }

@@ -1,10 +1,9 @@
-//! Chains of UCoM boards: a session on a bus in a separate thread, and the calls from Python to it.
+//! Chains of UCoM boards. A separate thread runs a session on a bus, and Python calls this thread.
 //!
-//! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python threads, and the errors that are
-//!   raised.
-//! - [`worker_state`], [`operator`]: the session in that thread.
-//! - [`procedures`], [`running`], [`values`], [`update`]: procedures of the session; Python converts their JSON results to dataclasses.
-//! - [`chain`], [`samples`], [`recording`], [`simulated`]: the classes.
+//! - [`owner`], [`shared`], [`alarms`]: the thread, its requests, the waits of Python threads, and the errors that are raised.
+//! - [`worker_state`], [`operator`]: the session that runs in the thread.
+//! - [`procedures`], [`running`], [`values`], [`update`]: procedures of the session. Python converts the JSON results to dataclasses.
+//! - [`chain`], [`samples`], [`recording`], [`simulated`]: the Python classes.
 
 mod alarms;
 mod chain;
@@ -23,7 +22,7 @@ mod worker_state;
 
 use pyo3::prelude::*;
 
-/// Adds the classes to the module.
+/// Registers the classes in the Python module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<chain::Chain>()?;
     module.add_class::<recording::ChainRecording>()?;

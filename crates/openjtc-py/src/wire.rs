@@ -1,4 +1,4 @@
-//! Makes and reads frames of the line to the host and of the joint bus.
+//! Makes and reads frames for the line to the host and for the joint bus.
 
 use jtc_bus::{Answer, GripperReport, JOINTS, JointReport, NODES, NodeState, Request, Scale};
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX, settings};
@@ -28,7 +28,7 @@ fn emitted(command: &Command<'_>) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
-/// Makes the frame of a command without arguments, by its name in `openjtc.control.encode`.
+/// Makes the frame of a command without arguments. `name` is the text that `openjtc.control.encode` passes, for example `pump on`.
 #[pyfunction]
 fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes>, Failure> {
     let command = match name {
@@ -50,7 +50,8 @@ fn encode_command<'py>(py: Python<'py>, name: &str) -> Result<Bound<'py, PyBytes
     Ok(PyBytes::new(py, &emitted(&command)?))
 }
 
-/// Makes the frames of the arm parameters: friction, model and gains. The gains are the last frame, because the controller waits for them.
+/// Makes the frames of the arm parameters: friction, model and gains. The gains are the last frame, because the controller waits for the
+/// gains.
 #[pyfunction]
 fn encode_parameters<'py>(py: Python<'py>, arm: &Arm) -> Result<Vec<Bound<'py, PyBytes>>, Failure> {
     let set = arm.inner.parameter_set();
@@ -114,7 +115,7 @@ fn encode_payload(py: Python<'_>, numbers: PayloadNumbers) -> Result<Bound<'_, P
     Ok(PyBytes::new(py, &bytes[..length]))
 }
 
-/// Reads the statuses in the bytes that a controller sent.
+/// Reader of the statuses in the bytes that a controller sends.
 #[pyclass(module = "openjtc._native")]
 struct StatusReader {
     receiver: StatusReceiver,
@@ -127,7 +128,7 @@ impl StatusReader {
         Self { receiver: StatusReceiver::new() }
     }
 
-    /// Returns the statuses that are completed by these bytes, oldest first.
+    /// Returns the statuses that these bytes complete, oldest first.
     fn feed<'py>(&mut self, py: Python<'py>, bytes: &[u8]) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut rest = bytes;
         let mut found = Vec::new();
@@ -160,7 +161,7 @@ fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// Reads a request of the controller to the nodes from a frame: its kind and its numbers.
+/// Reads a request of the controller to the nodes from a frame. Returns the kind and the numbers of the request.
 #[pyfunction]
 fn bus_request<'py>(
     py: Python<'py>,
@@ -232,7 +233,7 @@ fn gripper_answer(py: Python<'_>, pump: bool, part: bool, state: u8, errors: u8)
     to_python(py, &Answer::Gripper(report).emit(Scale::CURRENT))
 }
 
-/// Makes the answer of a node to a request for its state.
+/// Makes the answer of a node to a request for a state.
 #[pyfunction]
 #[pyo3(name = "bus_state_answer")]
 fn state_answer(py: Python<'_>, number: u8, state: u8) -> Result<PyFrame<'_>, Failure> {
@@ -240,7 +241,7 @@ fn state_answer(py: Python<'_>, number: u8, state: u8) -> Result<PyFrame<'_>, Fa
     Ok(to_python(py, &answer.emit(Scale::CURRENT)))
 }
 
-/// Makes the answer of a node to a configuration.
+/// Makes the answer of a node to a configuration request.
 #[pyfunction]
 #[pyo3(name = "bus_configured_answer")]
 fn configured_answer(py: Python<'_>, number: u8, accepted: bool) -> Result<PyFrame<'_>, Failure> {

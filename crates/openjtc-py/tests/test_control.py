@@ -1,5 +1,5 @@
-"""Tests of the controller stepped from Python: its outputs are bit for bit equal to those of the simulator's controller,
-and it works with drives written in Python."""
+"""Tests of the controller that Python runs tick by tick. The outputs must be bit for bit equal to the outputs of the simulator's
+controller. The controller must also work with drives written in Python."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def quintic(start, goal, seconds, step_ms=10):
 
 
 def stepped_beside(simulator, controller, until, limit_ms=60_000, spoil=None):
-    """Steps both until `until()`. Returns the first millisecond in which an output differs, or None."""
+    """Steps the simulator and the controller until `until()`. Returns the first millisecond in which an output differs, or None."""
     for ms in range(limit_ms):
         if until():
             return None
@@ -94,7 +94,7 @@ def test_another_input_has_another_output():
 
 
 class Drives:
-    """Seven nodes on their own bus. Each joint is an inertia of 2 kg·m² without gravity and friction."""
+    """Seven nodes on their own bus. Each joint has an inertia of 2 kg·m², and neither gravity nor friction."""
 
     def __init__(self):
         self.state = [bus.INIT] * 7
@@ -124,7 +124,8 @@ def test_drives_in_python_are_brought_up_and_held_until_they_are_silent():
         out = controller.tick(Inputs(bus=answers, host=host))
         answers, host = drives.answers(out.bus), b""
         seen += statuses.feed(out.host)
-        # The controller compensates gravity, but these joints have none. So the gravity torque is subtracted.
+        # The controller compensates gravity, but gravity does not act on these joints. The test therefore
+        # subtracts the gravity torque.
         load = drives.torque - model.gravity(drives.position) if drives.state[0] == bus.ENABLED else np.zeros(6)
         drives.velocity = drives.velocity + load / 2.0 * 1e-3
         drives.position = drives.position + drives.velocity * 1e-3

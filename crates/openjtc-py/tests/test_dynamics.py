@@ -20,8 +20,7 @@ def arm():
 
 @pytest.fixture
 def states(request):
-    """Returns random positions, velocities, accelerations and torques. The seed is printed, so that it is shown if the test
-    fails."""
+    """Returns random positions, velocities, accelerations and torques. The function prints the seed, so that a failed test shows it."""
     seed = int(np.random.SeedSequence().entropy % 2**32)
     print("seed", seed)
     rng = np.random.default_rng(seed)
@@ -147,7 +146,7 @@ def test_friction_is_odd_and_that_of_the_file(arm):
     speed = np.abs(qd)
     powers = sum(c[:, k] * speed**k for k in range(4))
     expected = np.sign(qd) * np.clip(1 + c[:, 4] * (30.0 - c[:, 5]), 0.2, 2) * powers
-    fast = speed > 0.1  # slower, the sign is a straight line
+    fast = speed > 0.1  # at lower speeds, the sign function is replaced by a straight line
     assert np.allclose(friction[fast], expected[fast], rtol=1e-12)
     assert not np.array_equal(dynamics.friction(qd, [20, 30, 40, 50, 20, 30]), friction)
 

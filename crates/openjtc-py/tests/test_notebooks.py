@@ -1,4 +1,4 @@
-"""Runs the notebooks from top to bottom, and checks that the report of a run is shown in them."""
+"""Runs the notebooks from top to bottom, and checks that the notebooks show the report of a run."""
 
 from __future__ import annotations
 

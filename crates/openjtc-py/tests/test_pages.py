@@ -1,9 +1,9 @@
 """Runs the Python lines of the documentation pages and compares their output with the pages.
 
-``pycon`` blocks contain statements after ``>>>`` and their output. ``python`` blocks contain only statements. The blocks of a page run one
-after the other in one namespace and one temporary folder. A comment directly above a block is an option: ``<!-- not run: REASON -->``,
-``<!-- needs: PACKAGE -->`` (skips the block if the package is not installed), or ``<!-- numbers vary -->`` (does not compare numbers).
-``UPDATE_DOCS=1`` updates the output in the page. Simulated arms run at ``SPEED`` times real time.
+``pycon`` blocks contain statements after ``>>>`` and the output of the statements. ``python`` blocks contain only statements. The blocks of
+a page run one after the other in one namespace and one temporary folder. A comment directly above a block is an option:
+``<!-- not run: REASON -->``, ``<!-- needs: PACKAGE -->`` (skips the block if the package is not installed), or ``<!-- numbers vary -->``
+(does not compare numbers). ``UPDATE_DOCS=1`` updates the output in the page. Simulated arms run at ``SPEED`` times real time.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?(?:0x[0-9a-fA-F]+|\d[\d_]*(?:\.\d*)?
 
 
 def pages() -> list[Path]:
-    """Returns the pages with Python blocks; an empty list if the package is tested without its repository."""
+    """Returns the pages with Python blocks. The list of pages is empty if the package is tested without its repository."""
     candidates = [ROOT / "README.md", ROOT / "crates/openjtc-py/README.md", *sorted((ROOT / "docs").glob("*.md"))]
     return [page for page in candidates if page.exists() and BLOCK.search(page.read_text(encoding="utf-8"))]
 
 
 def examples(text: str) -> list[tuple[str, str]]:
-    """Returns source and shown output of each statement of a ``pycon`` block."""
+    """Returns the source and the shown output of each statement of a ``pycon`` block."""
     found: list[tuple[list[str], list[str]]] = []
     for line in text.splitlines():
         if line == ">>>" or line.startswith(">>> "):
@@ -51,7 +51,7 @@ def examples(text: str) -> list[tuple[str, str]]:
 
 
 def run(source: str, names: dict[str, object], mode: str) -> tuple[str, bool]:
-    """Runs a statement, or with "exec" a script. Returns its output, and True if it ended in an exception."""
+    """Runs a statement, or a script if `mode` is "exec". Returns the output, and True if the statement or script ended in an exception."""
     out = io.StringIO()
     try:
         # Progress bars are drawn on stderr.
@@ -68,7 +68,8 @@ def same(shown: str, printed: str, varying: bool) -> bool:
 
     def prepared(text: str) -> str:
         if varying:
-            # Joint and board numbers are compared, because they identify the joint or board.
+            # Joint and board numbers are compared, because such a number identifies a joint or a
+            # board.
             text = re.sub(r"\b(joints?|boards?) (\d+)", lambda m: f"{m[1]} " + "abcdefghij"[int(m[2]) % 10], text)
             text = re.sub(r"\s", "", NUMBER.sub("#", text))
         return "\n".join(line.rstrip() for line in text.strip("\n").splitlines())
@@ -127,7 +128,7 @@ def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def told_to_install() -> list[tuple[Path, str]]:
-    """Returns the arguments of every `pip install` in the project, word by word."""
+    """Returns the arguments of every `pip install` in the project as a list of words."""
     places = ["README.md", "docs", "crates/openjtc-py", "crates/jtc-host/src", "crates/jtc-cli/src", "crates/ucom-cli/src", "references"]
     kinds = {".md", ".py", ".pyi", ".rs", ".ipynb", ".toml"}
     files = [file for place in places for file in [ROOT / place, *sorted((ROOT / place).rglob("*"))] if file.suffix in kinds]
@@ -141,8 +142,8 @@ def told_to_install() -> list[tuple[Path, str]]:
 
 
 def test_nobody_is_told_to_install_a_name_that_is_not_ours():
-    """The package is not in a package index, so `pip install` with its name could install a stranger's code. The documentation
-    must give the path of the wheel."""
+    """The package is not in a package index, so `pip install` with its name could install code of another author. The documentation must
+    give the path of the wheel."""
     words = told_to_install()
     if not (ROOT / "docs").exists():
         pytest.skip("the package is tested without its repository")

@@ -60,7 +60,7 @@ def test_a_run_has_figures_arrays_tables_and_reports(robot, tmp_path: Path):
     rms = 1e3 * np.sqrt(np.mean(a["error"][operating] ** 2, axis=0))
     assert [joint.rms_error_mrad for joint in run.joints] == pytest.approx(rms, rel=0.05)
     assert run.duration == pytest.approx(openjtc.example("motion").duration, abs=0.3)
-    # The parts of the torque sum up to the torque.
+    # The parts of the torque must add up to the torque.
     parts = sum(a[f"torque_{part}"] for part in ("model", "p", "i", "d", "friction"))
     assert np.abs(parts - a["torque"])[operating].max() < 1.0
     page = run.report(tmp_path / "run.html").read_text(encoding="utf-8")
@@ -108,7 +108,7 @@ def test_what_is_refused_has_its_facts_and_moves_nothing(robot):
     assert error.cause and error.next and "joint 1" in error.message
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.joint, again.limit) == (str(error), error.joint, error.limit)
-    # A trajectory with another start position is refused.
+    # A trajectory with another start position must be refused.
     with pytest.raises(openjtc.RefusedError) as caught:
         robot.run(robot.plan([HOME, HOME + 0.2]))
     assert caught.value.joint is not None and "approach=True" in caught.value.next
@@ -128,7 +128,7 @@ def test_a_recording_that_is_there_is_not_written_over(robot, tmp_path: Path):
     with pytest.raises(openjtc.UsageError, match="nothing was sent"):
         robot.move(HOME, record=file)
     assert file.read_text() == "mine"
-    # A refused motion leaves no file.
+    # A refused motion must leave no file.
     with pytest.raises(openjtc.RefusedError):
         robot.move([4, 0, 0, 0, 0, 0], record=tmp_path / "none.csv")
     assert not (tmp_path / "none.csv").exists()
@@ -153,7 +153,7 @@ def test_a_move_without_a_speed_is_slow_and_says_so(robot):
     robot.move(HOME + 0.1, speed=100)
     assert not robot.run(way, approach=True, speed=100).notes
     assert not robot.run(robot.plan([HOME, [0] * 6])).notes
-    # Several approaches give a single note.
+    # Several approaches must give a single note.
     assert robot.run(robot.plan([robot.position, HOME]), approach=True, repeat=3).notes.count(f"approach {told}") == 1
 
 
@@ -197,7 +197,7 @@ def test_a_blend_in_degrees_is_refused_where_rad_are_meant(robot, blend: float):
 
 def test_a_run_in_which_joints_stand_still_is_small_in_a_notebook(robot):
     run = robot.move([0, 30, 0, 0, 0, 0], degrees=True)
-    # A notebook asks an object for every representation and shows one of them.
+    # A notebook requests every representation of an object, and shows one of them.
     forms = [form for form in ("html", "svg", "png", "jpeg", "pdf", "markdown") if hasattr(run, f"_repr_{form}_")]
     assert forms == ["html"] and len(run._repr_html_()) < 2_000_000
 
@@ -311,7 +311,7 @@ def test_a_stop_is_the_end_of_all_that_was_asked_for_before(live):
     assert first.wait(30).outcome == "stopped"
     with pytest.raises(openjtc.FaultError, match="cancelled"):
         second.wait(30)
-    # A later request is executed.
+    # A later request must be executed.
     assert live.move(HOME).outcome == "finished"
 
 
@@ -352,7 +352,7 @@ def test_the_end_of_a_context_and_of_a_program_stops_what_moves(tmp_path: Path):
     with pytest.raises(openjtc.NoLinkError, match="closed"):
         robot.move(HOME)
     robot.close()
-    # This is also checked without a context manager.
+    # The test also checks this without a context manager.
     program = (
         "import openjtc\n"
         "robot = openjtc.connect('sim:', speed=10.0)\n"
@@ -440,7 +440,7 @@ def test_a_controller_recovers_and_says_how(robot):
 
 
 def test_a_held_stop_says_what_was_found(robot):
-    """J-69: status, info, doctor and error have joint, value and limit of the push."""
+    """J-69: status, info, doctor and error contain joint, value and limit of the push."""
     robot.move(HOME)
     robot.push(5, 38, 0.5)
     until(lambda: robot.status.held_stop is not None)
@@ -479,7 +479,7 @@ def test_settings_info_and_arm_are_those_of_the_controller(robot):
     assert robot.info["board"] == "simulator" and robot.info["firmware"] == openjtc.__version__
     with pytest.raises(openjtc.UsageError, match="does not exist"):
         robot.set_settings({"no_such": 1.0})
-    # Settings can only change while the drives have no torque.
+    # Settings can change only while the drives have no torque.
     with pytest.raises(openjtc.Error, match="not allowed"):
         robot.set_settings({"ramp_ms": 300})
 
@@ -520,7 +520,7 @@ def test_there_is_no_such_port_or_agent():
 
 @pytest.mark.skipif("JTC" not in os.environ, reason="the environment names no program jtc")
 def test_the_same_lines_over_a_serial_port_and_through_an_agent(tmp_path: Path):
-    """Uses ``jtc sim`` at a pseudo-terminal and ``jtc serve``, in separate processes."""
+    """The test runs ``jtc sim`` at a pseudo-terminal and ``jtc serve``, in separate processes."""
     jtc = os.environ["JTC"]
     env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "HOME": str(tmp_path)}
     port = tmp_path / "port"
@@ -540,6 +540,6 @@ def test_the_same_lines_over_a_serial_port_and_through_an_agent(tmp_path: Path):
             robot.wait_ready()
             run = robot.move([0.1, 0.2, -0.4, 0, 0.2, 0])
             assert run.outcome == "finished" and len(run) > 5
-        # The agent refuses an unknown token.
+        # The agent must refuse an unknown token.
         with pytest.raises(openjtc.RefusedError, match="denies access to this program"):
             openjtc.connect(url, token="x" * 30)

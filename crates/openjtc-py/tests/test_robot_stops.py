@@ -1,5 +1,5 @@
-"""Tests of everything that stops an arm: Stop, Ctrl-C, and the end of a ``with`` block, of a wait for a motion, and of
-the program."""
+"""Tests of everything that stops an arm: Stop, Ctrl-C, the end of a ``with`` block, the end of a wait for a motion, and the end of the
+program."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def live():
 
 @pytest.fixture
 def port(tmp_path: Path):
-    """Yields a simulated controller at a pseudo-terminal, in a separate process, so that it survives the end of a program."""
+    """Yields a simulated controller at a pseudo-terminal. The simulator runs in a separate process, so that it continues after the end of a
+    program."""
     path = tmp_path / "port"
     env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "HOME": str(tmp_path)}
     serial = [os.environ["JTC"], "sim", "--serial", path]
@@ -55,12 +56,12 @@ def port(tmp_path: Path):
 
 
 class Wire:
-    """Simulated controller at a pseudo-terminal. The test sees its bytes and can suppress them."""
+    """Simulated controller at a pseudo-terminal. The test reads the bytes of the controller and can suppress them."""
 
     def __init__(self) -> None:
         self.simulator, self.sent, self.is_silent, self.is_over = Simulator(), b"", False, False
-        #: Bytes that simulate another program. The callback gets the bytes sent here before the controller receives
-        #: them.
+        #: Bytes that simulate another program. The callback gets the bytes that this program sends before the
+        #: controller receives them.
         self.to_send, self.on_sent = b"", None
         self.master, self.slave = pty.openpty()
         tty.setraw(self.master)
@@ -118,7 +119,7 @@ def is_moving(robot: openjtc.Robot) -> bool:
 
 
 def stands(robot: openjtc.Robot) -> bool:
-    """Returns True if the arm is at rest, is held, and stays there."""
+    """Returns True if the arm is at rest, the controller holds it, and it stays at its position."""
     status = robot.status
     before, state = status.position, status.state
     time.sleep(0.15)
@@ -127,7 +128,7 @@ def stands(robot: openjtc.Robot) -> bool:
 
 
 class Aside:
-    """Call in a separate thread, with its result and its exception."""
+    """Call that runs in a separate thread, with its result and its exception."""
 
     def __init__(self, act) -> None:
         self.result = self.error = None
@@ -158,7 +159,7 @@ def press_after(seconds: float) -> Aside:
     return Aside(lambda: (time.sleep(seconds), os.kill(os.getpid(), signal.SIGINT)))
 
 
-# A Stop discards all earlier requests.
+# Tests that a Stop discards all earlier requests.
 
 
 def test_what_waits_for_its_turn_is_not_done_after_a_stop(live, tmp_path: Path):
@@ -199,7 +200,7 @@ def test_a_place_by_its_name_is_not_looked_up_first_and_gone_to_after_a_stop(liv
         waiting.join()
         assert isinstance(waiting.error, openjtc.FaultError) and waiting.error.code == "cancelled"
         assert stands(robot)
-        # The request was made before the Stop, and begins after it.
+        # The request was made before the Stop, but begins after the Stop.
         asked = robot._link.asked()
         robot.stop()
         with pytest.raises(openjtc.FaultError, match="cancelled"):
@@ -220,7 +221,7 @@ def test_a_stop_between_the_upload_and_the_execution_counts(live):
         assert stands(live)
 
 
-# Stops by this thread, other threads and other programs.
+# Tests of Stops by this thread, by other threads and by other programs.
 
 
 def test_a_stop_ends_the_program_that_waits_for_its_motion(live):
@@ -265,7 +266,7 @@ def test_a_motion_that_the_program_stops_itself_is_no_error(live):
 def test_a_stop_acts_whatever_the_connection_is_busy_with(live):
     live.disable()
     live.use_defaults()
-    # Several threads wait until the drives hold the arm.
+    # Several threads wait until the controller holds the arm with all drives enabled.
     waiting = [Aside(lambda: live.wait_ready(30)) for _ in range(3)]
     waiting.append(Aside(live.doctor))
     time.sleep(0.05)
@@ -283,11 +284,11 @@ def test_a_stop_is_written_first_of_all(wire: Wire):
         robot.use_defaults()
         robot.wait_ready()
         assert wire.stops() == 0
-        # Even if the arm is at rest, the Stop is written before any query.
+        # The Stop must be written before any query, even if the arm is at rest.
         before = len(wire.sent)
         robot.stop()
         assert wire.sent[before:].startswith(encode.stop())
-        # Tests a Stop during another wait, and a Stop on a silent line, which raises an error.
+        # The test covers a Stop during another wait, and a Stop on a silent line, which raises an error.
         robot.disable()
         waiting = Aside(lambda: robot.wait_ready(60))
         time.sleep(0.2)
@@ -310,7 +311,8 @@ def test_what_a_stop_overtakes_on_its_way_is_not_sent(wire: Wire):
         until(lambda: robot.status.trajectory == "Pause")
         executed = wire.sent.count(encode.execute())
 
-        # A resume reads the controller's settings before it sends Execute. The Stop comes in between.
+        # A resume reads the controller's settings before it sends Execute. The Stop is requested between these two
+        # steps.
         def stop(data: bytes) -> None:
             if any(bytes([0x9B, kind]) in data for kind in range(0x40, 0x60)):
                 wire.on_sent = None
@@ -332,7 +334,7 @@ def test_a_stop_of_somebody_else_ends_all_that_waits_here(wire: Wire):
         motion = robot.start(openjtc.example("motion"), approach=True)
         second = robot.start(openjtc.example("motion"), approach=True)
         until(lambda: is_moving(robot))
-        # The Stop arrives like a Stop of another client that an agent forwards.
+        # The Stop arrives like a Stop that an agent forwards from another client.
         wire.to_send = encode.stop()
         with pytest.raises(openjtc.StoppedError) as caught:
             motion.wait(30)
@@ -352,7 +354,7 @@ def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
         robot = ends.enter_context(openjtc.connect(wire.path))
         robot.use_defaults()
         robot.wait_ready()
-        # The Stop comes while the connection is busy and further requests wait.
+        # The Stop is requested while the connection is busy and further requests wait.
         if busy == "jog":
             Aside(lambda: robot.jog(0.1, 5.0, joint=1))
         elif busy == "flight_log":
@@ -360,13 +362,13 @@ def test_a_stop_of_another_program_voids_what_waits_however_late_its_turn_comes(
         waiting = [robot.start(openjtc.example("motion"), approach=True) for _ in range(5)]
         halt_as_another_program(wire.path, folder)
         executed = wire.sent.count(encode.execute())
-        # This is longer than the hold-off of new requests after a Stop.
+        # The wait is longer than the hold-off of new requests after a Stop.
         time.sleep(4.0)
         for motion in waiting:
             with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
                 motion.wait(30)
         assert stands(robot) and wire.sent.count(encode.execute()) == executed
-        # After that a new request is executed.
+        # After the hold-off, the connection must execute a new request.
         assert robot.run(openjtc.example("motion"), approach=True).outcome == "finished"
 
 
@@ -382,7 +384,7 @@ def test_a_stop_at_the_agent_voids_what_waits_however_late_its_turn_comes(tmp_pa
         with urllib.request.urlopen(stop, timeout=10) as answer:
             assert answer.status == 200
         before = robot.position
-        # This is longer than the hold-off of new requests after a Stop.
+        # The wait is longer than the hold-off of new requests after a Stop.
         time.sleep(4.0)
         for motion in waiting:
             with pytest.raises(openjtc.FaultError, match=r"cancelled|stopped"):
@@ -422,7 +424,7 @@ def test_jogging_that_is_stopped_is_an_error_and_the_arm_rests(live):
 @needs_jtc
 def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str):
     def paused() -> None:
-        # This program ends while its motion is paused, without closing its connection.
+        # The program ends while its motion is paused, without closing its connection.
         program = (
             "import os, sys, time, openjtc\n"
             "robot = openjtc.connect(sys.argv[1])\n"
@@ -459,7 +461,7 @@ def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str)
             robot.doctor()
         pressed.join()
         assert robot.status.trajectory == "Stop" and stands(robot)
-    # A resume that was requested before a Stop is discarded.
+    # The connection must discard a resume that was requested before a Stop.
     paused()
     with openjtc.connect(port) as robot:
         doctor = Aside(robot.doctor)
@@ -472,7 +474,7 @@ def test_a_motion_that_is_resumed_outside_a_run_is_stopped_by_the_end(port: str)
         assert waiting.error is not None and robot.status.trajectory == "Stop" and stands(robot)
 
 
-# Status and pause right after the start.
+# Tests of status and pause directly after the start.
 
 
 def test_a_status_and_a_pause_right_after_the_start_do_not_wait_for_the_end(live):
@@ -492,7 +494,7 @@ def test_a_second_motion_waits_and_the_first_is_paused(live):
     motion = live.start(openjtc.example("motion"), approach=True)
     second = live.start(openjtc.example("motion"), approach=True)
     until(lambda: is_moving(live))
-    # Each motion has its own progress.
+    # Each motion must have its own progress.
     assert motion.progress[0] in ("approach", "upload", "motion") and second.progress[0] == "waiting"
     begin = time.monotonic()
     live.speed = 0.5
@@ -518,11 +520,11 @@ def test_several_threads_wait_for_a_motion_and_each_gets_it(live):
     assert motion.is_done and motion.wait().outcome == "finished"
 
 
-# Ctrl-C.
+# Tests of Ctrl-C.
 
 
 class Pressed:
-    """Progress bar that raises `KeyboardInterrupt`, or an error because it cannot be drawn."""
+    """Progress bar that raises `KeyboardInterrupt`, or raises an error because it cannot be drawn."""
 
     disable = False
     error: type[BaseException] = KeyboardInterrupt
@@ -607,7 +609,7 @@ def test_ctrl_c_ends_waiting_for_what_does_not_come(live):
     live.wait_ready(60)
 
 
-# Teaching is switched off when its context ends.
+# Tests that teaching is switched off when its context ends.
 
 
 def test_teaching_ends_with_a_stop_an_error_ctrl_c_and_the_connection(live):
@@ -650,7 +652,7 @@ def test_teaching_ends_with_the_connection_and_what_was_asked_before_a_stop_does
         assert robot.status.state == "HoldPos"
 
 
-# The end of programs.
+# Tests of the end of programs.
 
 
 @needs_jtc
@@ -705,7 +707,7 @@ def test_a_child_process_leaves_the_connection_to_its_parent(tmp_path: Path):
         "        os.write(there, b'x')\n"
         "        time.sleep(30)\n"
         "        os._exit(9)\n"
-        # A signal that arrives during the fork of the interpreter is lost.
+        # A signal is lost if it arrives while the interpreter forks.
         "    os.read(here, 1)\n"
         "    os.kill(child, 15)\n"
         "    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -15\n"
@@ -740,7 +742,7 @@ def test_that_the_arm_may_be_moving_is_to_be_seen_in_what_ended_the_block(tmp_pa
             sim.kill()
 
 
-# asyncio.
+# Tests of asyncio.
 
 
 def test_whatever_ends_a_task_stops_its_arm(live):
@@ -748,7 +750,7 @@ def test_whatever_ends_a_task_stops_its_arm(live):
         with pytest.raises(asyncio.TimeoutError):
             await asyncio.wait_for(live.run_async(openjtc.example("motion"), approach=True), 0.5)
         assert stands(live)
-        # The task is cancelled before it has begun.
+        # The test cancels the task before the task has begun.
         task = asyncio.create_task(live.run_async(openjtc.example("motion"), approach=True))
         await asyncio.sleep(0)
         task.cancel()
@@ -769,7 +771,7 @@ def test_whatever_ends_a_task_stops_its_arm(live):
 
 
 def test_a_closing_connection_takes_no_request_and_every_close_waits_for_its_end():
-    """No request begins after the Stop of ``close``, and a second ``close`` returns after standstill too."""
+    """No request may begin after the Stop of ``close``. A second ``close`` must also return only after standstill."""
     robot = openjtc.connect("sim:", speed=1.0)
     motion = robot.start(openjtc.example("motion"), approach=True)
     while motion.progress[0] != "motion":
@@ -781,7 +783,8 @@ def test_a_closing_connection_takes_no_request_and_every_close_waits_for_its_end
     with pytest.raises(openjtc.NoLinkError) as refused:
         robot.start(openjtc.example("motion"), approach=True)
     assert refused.value.code == "closed"
-    # This returns only after the thread of the connection has ended, so the other call returns at once.
+    # The call of `close` returns only after the thread of the connection has ended, so the other call returns at
+    # once.
     robot.close()
     closing.join(timeout=5)
     assert not closing.is_alive()

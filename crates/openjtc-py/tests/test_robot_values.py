@@ -56,7 +56,7 @@ def test_odd_numbers_are_refused_with_value_and_limit(robot):
         with pytest.raises(openjtc.UsageError) as caught:
             act()
         assert np.isnan(caught.value.value)
-    # An invalid timeout does not end the motion.
+    # An invalid timeout must not end the motion.
     assert motion.wait(INF).outcome == "finished"
     assert motion.wait(-1).outcome == "finished"
 
@@ -99,7 +99,7 @@ def test_no_number_panics(robot):
             except Exception as error:
                 # A panic would not be one of these exceptions.
                 assert isinstance(error, (openjtc.Error, OverflowError)), repr(error)
-            # A push may have put the controller into Error.
+            # A push may have brought the controller into Error.
             if robot.status.state == "Error":
                 robot.recover()
 
@@ -150,7 +150,7 @@ def test_another_arm_than_the_one_that_was_named_is_neither_moved_nor_let_go(tmp
         robot.set_settings({"velocity_max_rad_s": [1.25] * 6})
         robot.use_defaults()
         robot.wait_ready()
-        # The controller's arm can be read, but motions are refused.
+        # The controller's arm can be read, but motions must be refused.
         assert robot.arm.limits["velocity_max"] == pytest.approx(1.25)
         refused = (lambda: robot.move(HOME), lambda: robot.jog(0.1, 0.2, joint=1), lambda: robot.teach().__enter__(), robot.resume)
         for act in refused:
@@ -198,7 +198,7 @@ def test_what_a_silent_joint_measures_is_not_known(robot):
     robot.inject(f'format = 2\n[[fault]]\nkind = "node-silent"\njoint = 3\nat_s = {now + 0.5}\n')
     while robot.status.state != "Error":
         pass
-    # The joint was never measured, because its drive is lost before the controller has received its first answer.
+    # The drive is lost before the controller has received its first answer, so the joint was never measured.
     with pytest.raises(openjtc.Error):
         robot.recover()
     status = robot.status

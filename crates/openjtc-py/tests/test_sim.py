@@ -111,7 +111,7 @@ def test_a_payload_hangs_on_the_arm():
         simulator.step(4_000)
     extra = Dynamics(Arm.avena(), Payload(3.0)).gravity(light.position) - Dynamics(Arm.avena()).gravity(light.position)
     more = heavy.torque - light.torque
-    # Without friction, the drives carry the whole torque of the payload.
+    # Without friction, the drives carry the whole torque that the payload causes.
     assert abs(extra[1]) > 5.0 and abs(more[1] - extra[1]) < 0.2 * abs(extra[1]), (more, extra)
 
 
@@ -132,7 +132,7 @@ def test_gravity_compensation_holds_the_plant(drives):
 
 
 def test_an_arm_without_friction_follows_its_dynamics():
-    """Compares with the explicit integration of `Dynamics.forward` in steps of 0.1 ms."""
+    """Compares the plant with the explicit integration of `Dynamics.forward` in steps of 0.1 ms."""
     seed = int(np.random.SeedSequence().entropy % 2**32)
     print("seed", seed)
     rng = np.random.default_rng(seed)
@@ -169,15 +169,15 @@ def test_drives_measure_as_drives_do_and_trip():
 
 
 def test_the_plant_of_a_seed_is_the_arm_of_its_simulator():
-    """Replays the torques of the simulator's controller. The plant with the same seed moves in the same way, and the plant with
-    another seed does not."""
+    """Replays the torques of the simulator's controller. The plant with the same seed must move in the same way, and the plant with another
+    seed must move differently."""
     about = {"model_error": ModelError(mass=0.3), "start": [0, 0.4, -0.8, 0, 0.2, 0]}
     simulator = Simulator(Arm.avena(), seed=11, **about)
     simulator.wait("Init")
     simulator.write(b"".join(encode.use_defaults()))
     while np.array_equal(simulator.position, about["start"]):
         simulator.step()
-    # The millisecond in which the drives were enabled is over, like in a new plant.
+    # The drives of the simulator were enabled in an earlier millisecond, like the drives of a new plant.
     plants = [Plant(Arm.avena(), seed=seed, **about) for seed in (11, 12)]
     for _ in range(500):
         simulator.step()

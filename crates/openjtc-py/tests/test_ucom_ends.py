@@ -26,22 +26,22 @@ from ucom_bus import (  # noqa: F401  # fixtures
 
 from openjtc import errors, ucom
 
-#: PC_START and MCA_PC_START to board 0, and the answer to the first.
+#: PC_START and MCA_PC_START to board 0, and the answer to PC_START.
 START, START_LOOP, READY = 0x300, 0x540, 0x500
-#: Time for which a board is silent, s; the board is not lost before 20 s.
+#: Time for which a board is silent, s. The profile of this test counts a board as lost after 20 s.
 SILENT_S = 2.5
 
 
 @pytest.fixture
 def patient(tmp_path: Path) -> Path:
-    """Returns a profile in which a board is considered lost only after 20 s of silence."""
+    """Returns a profile in which a board counts as lost only after 20 s of silence."""
     profile = tmp_path / "patient.toml"
     profile.write_text("alive.dsp_lost = 20000\n")
     return profile
 
 
 def heartbeats(bus: Bus, seconds: float) -> int:
-    """Counts the heartbeats of a PC within this time."""
+    """Counts the heartbeats that a PC sends within this time."""
     before = len(bus.frames)
     time.sleep(seconds)
     return bus.frames[before:].count(ALIVE)
@@ -57,7 +57,7 @@ def runs_for_a_stranger(bus: Bus, board: int) -> None:
 
 
 def silent(sim: ucom.SimulatedChain, board: int, seconds: float = SILENT_S) -> float:
-    """Silences a board from now on. Returns the time of the start."""
+    """Makes a board silent from now on. Returns the time at which the silence begins."""
     begun = time.monotonic()
     sim.fault(f"silent board={board} for_s={seconds}")
     time.sleep(0.1)
@@ -117,7 +117,7 @@ def test_texts_that_cannot_be_had_are_no_failed_run(
         chain.init()
 
         def silence() -> None:
-            # Waits for the frame that enables its outputs, and the board's answer.
+            # Waits for the frame that enables the board's outputs, and for the board's answer.
             bus.wait(lambda: bus.frames.count((ADMIN_TO + 1, ACTIVE)) == 2)
             silent(sim, 1)
 
@@ -145,7 +145,7 @@ def test_a_number_that_two_boards_have_is_an_error_while_one_runs(sim: ucom.Simu
         assert shared.value.code == "number-shared" and shared.value.board == 1
         chain.check()
     finally:
-        # Both boards are commanded to stop; their answers look alike.
+        # The test commands both boards to stop. The answers of both boards look alike.
         with contextlib.suppress(errors.Error):
             chain.close()
 
@@ -159,7 +159,7 @@ def test_a_stop_in_the_middle_of_an_update_waits_for_no_byte_of_it(
         results: list[ucom.UpdateReport] = []
         update = threading.Thread(target=lambda: results.append(chain.update(image, 2, raw=True, force=True)))
         update.start()
-        # PC_PROG to board 2.
+        # Waits for a PC_PROG frame to board 2.
         numbered_bus.wait(lambda: any(identifier == 0x2C2 for identifier, _ in numbered_bus.frames))
         before = len(numbered_bus.frames)
         chain.stop(1)

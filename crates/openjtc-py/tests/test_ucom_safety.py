@@ -1,4 +1,4 @@
-"""Tests that the end of a chain and failures leave outputs safe, and that a failure is reported."""
+"""Tests that the end of a chain and failures leave outputs safe, and that the package reports failures."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_what_nobody_has_looked_at_is_an_error_at_the_end(numbered: ucom.Simulat
     with pytest.raises(errors.FaultError) as left:
         with ucom.connect(numbered) as chain:
             chain.run()
-            # MCA_ADMIN_DATA of another PC, all flags 0, to board 2.
+            # Another PC sends MCA_ADMIN_DATA with all flags 0 to board 2.
             numbered_bus.send(ADMIN_TO + 2, bytes(4))
             numbered_bus.wait(lambda: any(event.kind == "left-loop" for event in chain.events()))
     assert left.value.code == "left-loop" and left.value.board == 2
@@ -87,7 +87,7 @@ def test_ctrl_c_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus:
             # The control loop of board 3 does not run, so this call waits.
             next(chain.monitor(3))
         timer.join()
-        # Before the context ends.
+        # The check is made before the context ends.
         assert not any(numbered_bus.started(board) for board in (1, 2, 3)) and not numbered_bus.sends_outputs(1)
         assert chain.board_values(1)[1].stale
 
@@ -105,7 +105,7 @@ if sys.argv[2] == "monitor":
 
 @pytest.mark.parametrize("how", ["monitor", "end"])
 def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, numbered_bus: Bus, how: str) -> None:
-    """Checked without a context manager: by Ctrl-C in a call, and at the end of the program."""
+    """The test does not use a context manager: it covers Ctrl-C in a call, and the end of the program."""
     before = len(numbered_bus.frames)
     child = subprocess.Popen([sys.executable, "-c", CHILD, numbered.url, how], stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None and child.stdout.readline() == "runs\n"
@@ -114,8 +114,8 @@ def test_a_program_that_ends_leaves_outputs_safe(numbered: ucom.SimulatedChain, 
         child.send_signal(signal.SIGINT)
     assert child.wait(30) == (-signal.SIGINT if how == "monitor" else 0)
     child.stdout.close()
-    # The program itself has stopped the boards, because their applications have ended. Missing heartbeats would only end the
-    # control loops.
+    # The program itself has stopped the boards, because their applications have ended. Missing heartbeats would only
+    # end the control loops.
     assert not numbered_bus.started(1) and not numbered_bus.started(2)
     numbered_bus.wait(lambda: numbered_bus.came(ADMIN_TO + 1, ACTIVE, before))
     ran = numbered_bus.frames.index((ADMIN_TO + 1, ACTIVE), before)
@@ -192,7 +192,7 @@ def test_a_stop_ends_a_run_that_still_reads_its_file(
 
         thread = threading.Thread(target=run, daemon=True)
         thread.start()
-        # The run reads the pipe from here on.
+        # The run reads the pipe from this point on.
         with file.open("w") as pipe:
             chain.stop()
             pipe.write("boards:\n  - board: 1\n    flash_number: 0x0021\n    program_id: any\n    par:\n      kp: 1\n")
@@ -236,7 +236,7 @@ def test_python_can_sees_what_a_chain_does_on_the_bus_of_the_program() -> None:
                 while abs(outputs.get(1, 0) - 700) > 60:
                     assert time.monotonic() - since < 30, outputs
                     message = peer.recv(1)
-                    # Packages of sensor outputs: offset, then up to three words.
+                    # Packages of sensor outputs contain an offset, then up to three words.
                     if message is not None and 0x381 <= message.arbitration_id <= 0x39F and message.data[:2] == b"\0\0":
                         outputs[message.arbitration_id - 0x380] = int.from_bytes(message.data[2:4], "little", signed=True)
                 assert abs(float(chain["1.position"] or 0) - 700) < 80

@@ -14,20 +14,20 @@ from openjtc import ucom
 
 #: Identifier of MCA_ADMIN_DATA to and from board 0.
 ADMIN_TO = 0x600
-#: Data of MCA_ADMIN_DATA: run, active, debug, global debug.
+#: Data of MCA_ADMIN_DATA with the flags run, active, debug and global debug.
 STOPPED, SAFE, ACTIVE = bytes(4), bytes([1, 0, 0, 0]), bytes([1, 1, 0, 0])
-#: The heartbeat of a PC.
+#: Frame of a PC's heartbeat.
 ALIVE = (0x680, b"")
 
 
 class Bus:
-    """Socketcand client in raw mode: every frame as (identifier, data)."""
+    """Socketcand client in raw mode. The client stores every frame as (identifier, data)."""
 
     def __init__(self, url: str) -> None:
         host, port, channel = re.fullmatch(r"socketcand:([^:]+):(\d+)/(\w+)", url).groups()  # type: ignore[union-attr]
         self.socket = socket.create_connection((host, int(port)))
         self.frames: list[tuple[int, bytes]] = []
-        #: Time of each frame on the bus, s, from the clock of the bus server.
+        #: Time of each frame on the bus, s, by the clock of the bus server.
         self.times: list[float] = []
         self.text, self.ended = "", False
         self.thread = threading.Thread(target=self._read)
@@ -64,7 +64,7 @@ class Bus:
         return (identifier, data) in self.frames[after:]
 
     def when(self, identifier: int, data: bytes, after: int = 0) -> float:
-        """Returns the time of the first such frame after the first `after` frames, s by the server of the bus."""
+        """Returns the time of this frame, s, by the clock of the bus server. Only frames after the first `after` frames count."""
         self.wait(lambda: self.came(identifier, data, after))
         return self.times[self.frames.index((identifier, data), after)]
 

@@ -13,7 +13,7 @@ unless a name says otherwise.
 - `connect` and `Robot`: motions, jogging, teaching, arms, payloads, the flight recorder of one controller.
 - `Planner`: motions from poses and waypoints within all limits, without a controller.
 - `openjtc.dynamics`: kinematics and dynamics of an arm, vectorised.
-- `openjtc.sim`: the simulated arm step by step, with the real controller or your own.
+- `openjtc.sim`: the simulated arm step by step, with the real controller or with your own controller.
 - `openjtc.control`: the control code of the boards, tick by tick.
 - `openjtc.ucom`: chains of UCoM boards.
 """
@@ -74,6 +74,6 @@ def example(name: str) -> Trajectory:
     """Returns an example trajectory by its name: ``motion``, ``lines`` …; ``jtc example`` lists the names.
 
     Raises:
-        UsageError: The name is unknown; the message lists the names.
+        UsageError: The name of the trajectory is unknown; the message lists the valid names.
     """
     return Trajectory.parse(example_text(name))

@@ -25,14 +25,14 @@ Self = TypeVar("Self", bound="Connected")
 
 
 class Connected:
-    """Base class of `openjtc.Robot`: everything except motions."""
+    """Base class of `openjtc.Robot`: all methods except motions."""
 
     def __init__(self, link: _native.Link) -> None:
         self._link = link
-        #: For each thread: total number of Stops at the time of the last Stop that the thread requested.
+        #: Total number of Stops at the time of the last Stop that a thread requested, for each thread.
         self._stops: dict[int, int] = {}
 
-    # The connection
+    # The connection to the controller.
 
     def __enter__(self: Self) -> Self:
         return self
@@ -49,7 +49,8 @@ class Connected:
         try:
             self.close()
         except Error as second:
-            # The error that ended the block is raised. The second error is added as a note, because the arm may be moving.
+            # The error that ended the block is raised. The error of `close` is added to it as a note, because the
+            # arm may be moving.
             text = f"and when the connection was closed: {second}"
             if hasattr(error, "add_note"):
                 error.add_note(text)
@@ -57,7 +58,7 @@ class Connected:
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     def close(self) -> None:
-        """Stops the motion of this connection, ends its teaching, and closes the connection. The controller holds the arm."""
+        """Stops the motion and ends the teaching of this connection, and closes the connection. The controller holds the arm."""
         try:
             self._link.close()
         finally:
@@ -65,7 +66,7 @@ class Connected:
 
     def _note_stop(self) -> None:
         thread = threading.get_ident()
-        # In a forked process `asked` is 0.
+        # In a forked process, `asked` returns 0.
         self._stops[thread] = max(self._stops.get(thread, 0), self._link.asked())
 
     def _stopped_since(self, asked: int) -> bool:
@@ -74,16 +75,16 @@ class Connected:
 
     @property
     def is_closed(self) -> bool:
-        """True after the connection was closed. Every later request fails."""
+        """True after the connection was closed. A closed connection refuses every request."""
         return self._link.is_closed
 
     def __repr__(self) -> str:
         return "Robot(closed)" if self.is_closed else f"Robot({self._link.port!r})"
 
-    # Status and identity
+    # Status and identity of the controller.
     @property
     def status(self) -> Status:
-        """New status of the controller."""
+        """Status of the controller that arrived after this call began."""
         status = self._link.status()
         stop = status.pop("held_stop")
         return Status(**status, held_stop=HeldStop(**stop) if stop else None)
@@ -95,10 +96,11 @@ class Connected:
 
     @property
     def arm(self) -> Arm:
-        """Arm of the controller. If the controller cannot report its arm, this is the arm given to `connect`, or the
+        """Arm of the controller. If the controller cannot report its arm, the value is the arm that was passed to `connect`, or the
         built-in arm.
 
-        If `connect` was given another arm, this is still the controller's arm, and motions, jogging and teaching are refused.
+        If another arm was passed to `connect`, the value is still the controller's arm. If the two arms differ, motions, jogging and
+        teaching are refused.
         """
         return self._link.arm()
 
@@ -107,41 +109,42 @@ class Connected:
         """Identity of the controller: board, firmware, arm, hash of its arm, boots, uptime (s); None for a controller without extensions.
 
         ``reactions`` has ``last_held_stop``, joints that yield (``yields``) or whose encoder has jumped (``encoder_jumped``),
-        ``path_rate``, and the time for which this run was held back (``held_back_s``). The value is None if the controller does not
-        report it.
+        ``path_rate``, and the time for which the controller has slowed down this run (``held_back_s``). ``reactions`` is None if the
+        controller does not report reactions.
         """
         return self._link.info()
 
     def doctor(self) -> list[Finding]:
-        """Checks link, bus and set-up for 1.5 s. Returns the findings, the worst first."""
+        """Checks link, bus and set-up for 1.5 s. Returns the findings; the worst finding is first."""
         return [Finding(**found) for found in self._link.doctor()]
 
     def wait_ready(self, timeout: float = 15.0) -> None:
-        """Waits until the controller holds the arm with all drives enabled, at most `timeout` (s).
+        """Waits until the controller holds the arm with all drives enabled. The longest wait is `timeout` (s).
 
         Raises:
             DeviceError: The controller reports an error.
-            Error: The controller does not hold the arm within `timeout`; it may lack parameters (`use_defaults`, `push_arm`).
+            Error: The controller does not hold the arm within `timeout`. The controller may lack parameters (`use_defaults`, `push_arm`).
         """
         self._link.wait_ready(timeout)
 
-    # Parameters and settings
+    # Parameters and settings of the controller.
     def push_arm(self, arm: Arm, *, store: bool = False) -> None:
-        """Sends an arm to the controller: friction, gains, model. With extensions also its limits and settings, which need Init or Error.
+        """Sends the friction, gains and model of an arm to the controller. A controller with extensions also gets the limits and settings
+        of the arm. The controller accepts limits and settings only in Init or Error.
 
         Args:
-            arm: The arm.
-            store: Stores the arm in the controller's non-volatile memory.
+            arm: Arm to send.
+            store: Also stores the arm in the controller's non-volatile memory.
         """
         self._link.push_arm(arm, store)
 
     def use_defaults(self) -> None:
-        """Lets the controller use its built-in or stored friction, gains and arm model."""
+        """Makes the controller use its built-in or stored friction, gains and arm model."""
         self._link.use_defaults()
 
     @property
     def payload(self) -> Payload:
-        """Payload at the flange that the controller uses; None: no payload. A new payload changes the torques over 0.5 s."""
+        """Payload at the flange that the controller uses. Set None for no payload. After a change, the torques change over 0.5 s."""
         mass, com, inertia = self._link.payload()
         return Payload(mass, tuple(com), tuple(inertia))
 
@@ -151,17 +154,17 @@ class Connected:
 
     @property
     def settings(self) -> dict[str, float | list[float]]:
-        """All settings of a controller with extensions, by name; a setting of joints is a list of six."""
+        """All settings of a controller with extensions, by name. The value of a joint setting is a list of six numbers."""
         return self._link.settings()
 
     def set_settings(self, values: Mapping[str, float | Sequence[float] | Array]) -> None:
-        """Changes settings by name. Either all values are changed, or none.
+        """Changes settings by name. Either all settings are changed, or no setting is changed.
 
         Args:
-            values: Value of each setting: a number, or six numbers for a setting of joints, base to wrist.
+            values: Value of each setting: a number, or six numbers for a joint setting, base to wrist.
 
         Raises:
-            UsageError: A setting is unknown, or a value is out of range: the error has joint, value and limit. No setting was changed.
+            UsageError: A setting is unknown, or a value is out of range; the error has joint, value and limit. No setting was changed.
         """
         flat: list[tuple[str, int, float]] = []
         for name, value in values.items():
@@ -174,16 +177,17 @@ class Connected:
                 flat.append((name, 0, float(numbers)))
         self._link.set_settings(flat)
 
-    # Errors and diagnosis
+    # Errors of the controller, and diagnosis.
     def recover(
         self, *, arm: Arm | None = None, defaults: bool = False, accept_device_limits: bool = False
     ) -> list[str]:
         """Brings the controller back to position hold, and returns the steps in words.
 
         Args:
-            arm: Arm with the parameters for a controller that has lost its own. Its gains are checked before anything is sent.
+            arm: Arm with the parameters for a controller that has lost its parameters. The gains of this arm are checked before any frame
+                is sent.
             defaults: Uses the parameters that are built into the controller.
-            accept_device_limits: Accepts that the controller uses other limits than ``arm`` has.
+            accept_device_limits: Accepts that the limits of the controller differ from the limits of ``arm``.
         """
         return self._link.recover(arm, defaults, accept_device_limits)
 
@@ -196,11 +200,11 @@ class Connected:
         self._link.disable()
 
     def flight_log(self) -> FlightLog:
-        """Reads the flight recorder: every tick of the last seconds before the first error."""
+        """Reads the log of the flight recorder: every tick of the last seconds before the first error."""
         return FlightLog(self._link.fetch_log())
 
     def clear_flight_log(self) -> None:
-        """Erases the log and restarts the recorder."""
+        """Erases the log of the flight recorder and restarts the recorder."""
         self._link.clear_log()
 
     # Disturbances of a simulated arm
@@ -209,7 +213,7 @@ class Connected:
         self._link.simulate(f"push {joint} {torque} {seconds}")
 
     def lead(self, path: Trajectory | Plan) -> None:
-        """Leads the simulated arm by hand along these positions while it is taught."""
+        """Guides the simulated arm along the positions of `path` during teaching, like a hand."""
         self._link.lead(path.trajectory if isinstance(path, Plan) else path)
 
     def inject(self, faults: str) -> None:

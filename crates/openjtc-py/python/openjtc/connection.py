@@ -22,15 +22,15 @@ from openjtc.robot import Robot
 __all__ = ["connect"]
 
 _open: weakref.WeakSet[Robot] = weakref.WeakSet()
-#: Process that connected last.
+#: Process that made the last connection.
 _process = os.getpid()
 
 
 @atexit.register
 def _close_all() -> None:
-    """Stops the motions of all connections when the program ends. First sends a Stop to every arm, then waits for one arm after the
-    other."""
-    # In a child process the connections are reported as closed, because they belong to the parent.
+    """Stops the motions of all connections when the program ends. First sends a Stop to every arm, and then waits for each arm in turn."""
+    # In a child process, the connections count as closed, because they belong to the parent
+    # process.
     robots = [robot for robot in list(_open) if not robot.is_closed]
     for robot in robots:
         robot._link.halt()
@@ -43,15 +43,14 @@ def _close_all() -> None:
 
 def _end(number: int, frame: FrameType | None) -> None:
     if os.getpid() != _process:
-        # A child process has no arm to stop, so the signal ends it as usual.
+        # A child process has no arm to stop, so the signal ends the child process as usual.
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
     raise SystemExit(128 + number)
 
 
 def _catch_signals() -> None:
-    """Installs signal handlers, so that a program that is ended by a signal also stops its motions. Existing signal
-    handlers are kept."""
+    """Installs signal handlers, so that a program that ends by a signal also stops its motions. Existing signal handlers stay installed."""
     global _process
     _process = os.getpid()
     if threading.current_thread() is not threading.main_thread():
@@ -77,24 +76,25 @@ def connect(
 ) -> Robot:
     """Connects to a controller.
 
-    The end of the program stops its motions. This includes an end by SIGTERM or SIGHUP: if the program has no handler for these
+    The end of the program stops its motions. This includes an end by SIGTERM or SIGHUP. If the program has no handler for these
     signals, the first connection in the main thread installs handlers that raise `SystemExit`. SIGKILL and a loss of power cannot be
-    handled: on a serial line the motion continues, but an agent stops the motion of a program that has disconnected.
+    handled. After a kill or a loss of power, a motion on a serial line continues, but an agent stops the motion of a program that has
+    disconnected.
 
     Args:
-        target: ``sim:`` for a simulated controller, drives and arm in this process, which hold the arm at once; ``/dev/ttyUSB0`` for a
+        target: ``sim:`` for a simulated controller with drives and arm in this process, which holds the arm at once; ``/dev/ttyUSB0`` for a
             serial port, through the agent that owns the port, if any; ``http://HOST:PORT`` or ``https://…`` for an agent (``jtc serve``).
-        arm: The arm, or its file (TOML, URDF); None: the controller's arm if the controller can report it, else the built-in one. A
-            controller with another arm refuses motions.
+        arm: The arm, or its file (TOML, URDF); None: the controller's arm if the controller can report it, otherwise the built-in arm. If
+            the controller has another arm, motions are refused.
         baud: Rate of a serial port, Bd.
-        speed: Speed of the simulator, times real time; None: as fast as possible, and time passes only during calls.
+        speed: Speed of the simulator, times real time; None: as fast as possible; simulated time then passes only during calls.
         seed: Seed of the simulator's random numbers.
         faults: Faults in the simulator, as the text of a fault file (``jtc help faults``).
-        payload: Payload of the simulated arm; its controller does not know it.
+        payload: Payload of the simulated arm; the controller does not know this payload.
         name: Name under which an agent shows this program to other clients; None: user and program.
         token: Token for another user's agent; the token of your own agent is found automatically.
-        certificates: PEM file with the certificates for an agent at ``https://``; None: the certificate of your own agent, else of the
-            system.
+        certificates: PEM file with the certificates for an agent at ``https://``; None: the certificate of your own agent, otherwise the
+            certificates of the system.
 
     Raises:
         NoLinkError: The port or agent does not exist, or no controller answers.

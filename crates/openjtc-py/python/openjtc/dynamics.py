@@ -1,8 +1,8 @@
 """Dynamics and kinematics of an arm, for many states in one call.
 
-Joint vectors have the shape (6,) for one state or (N, 6) for N states, one column per joint, base to wrist. Both shapes may be mixed: an
-argument of shape (6,) applies to every row. Positions are rad, velocities rad/s, accelerations rad/s², torques N·m, lengths m. Poses are
-homogeneous 4×4 matrices in the base frame. Other threads run while a call computes.
+Joint vectors have the shape (6,) for one state or (N, 6) for N states, with one column per joint, base to wrist. The two shapes of joint
+vectors may be mixed: an argument of shape (6,) applies to every row. Positions are in rad, velocities in rad/s, accelerations in rad/s²,
+torques in N·m, lengths in m. Poses are homogeneous 4×4 matrices in the base frame. Other Python threads can run during a call.
 
     >>> from openjtc import Arm
     >>> from openjtc.dynamics import Dynamics
@@ -29,12 +29,12 @@ Floats = NDArray[np.float64]
 
 
 class Dynamics:
-    """Dynamics of one arm. The object does not change.
+    """Dynamics of one arm. The object is immutable.
 
     Args:
-        arm: The arm.
+        arm: Arm with the model.
         payload: Payload at the flange.
-        gravity: Acceleration of gravity (3,) in the base frame, m/s²; None: the value of the arm's file.
+        gravity: Acceleration of gravity (3,) in the base frame, m/s²; None: the value in the arm file.
 
     Raises:
         UsageError: The payload is not physically consistent, or gravity is not a vector of finite numbers.
@@ -49,7 +49,7 @@ class Dynamics:
     def inverse(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Floats:
         """Computes joint torques from positions, velocities and accelerations, by the recursive Newton-Euler algorithm.
 
-        Rotors and friction are not included: add ``rotor_inertia * qdd`` and :meth:`friction`.
+        The joint torques do not include rotors and friction. To include them, add ``rotor_inertia * qdd`` and :meth:`friction`.
 
         Returns:
             Torques (6,) or (N, 6), N·m.
@@ -66,7 +66,7 @@ class Dynamics:
             q: Positions, rad.
             qd: Velocities, rad/s.
             tau: Torques at the joints, N·m.
-            rotors: Includes the rotor inertias of the arm (:attr:`rotor_inertia`); False: only the rigid bodies.
+            rotors: True includes the rotor inertias of the arm (:attr:`rotor_inertia`). False includes only the rigid bodies.
 
         Returns:
             Accelerations (6,) or (N, 6), rad/s².
@@ -81,8 +81,8 @@ class Dynamics:
         return self._native.gravity(q)
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
-        """Computes joint-space mass matrices: (6, 6) or (N, 6, 6), kg·m². The matrices are symmetric and do not include
-        the rotors."""
+        """Computes joint-space mass matrices: (6, 6) or (N, 6, 6), kg·m². The matrices are symmetric and do not include the rotor
+        inertias."""
         return self._native.mass_matrix(q)
 
     def friction(self, qd: ArrayLike, temperature: ArrayLike = 25.0) -> Floats:
@@ -90,7 +90,7 @@ class Dynamics:
 
         Args:
             qd: Velocities, rad/s.
-            temperature: Temperatures of the bearings, °C: one number for all, (6,) or (N, 6).
+            temperature: Temperatures of the bearings, °C: one number for all joints, (6,) or (N, 6).
 
         Returns:
             Torques (6,) or (N, 6), N·m.
@@ -102,7 +102,7 @@ class Dynamics:
         return self._native.friction(qd, np.full(6, degrees) if degrees.ndim == 0 else degrees)
 
     def forward_kinematics(self, q: ArrayLike) -> Floats:
-        """Computes poses of the flange: (4, 4) or (N, 4, 4)."""
+        """Computes poses of the flange in the base frame: (4, 4) or (N, 4, 4)."""
         return self._native.forward_kinematics(q)
 
     def frames(self, q: ArrayLike) -> Floats:
@@ -112,8 +112,8 @@ class Dynamics:
     def jacobian(self, q: ArrayLike) -> Floats:
         """Computes geometric Jacobians of the flange in the base frame: (6, 6) or (N, 6, 6).
 
-        Rows 0 to 2 are the velocity of the flange (m/rad), rows 3 to 5 its angular velocity (rad/rad), with one column
-        per joint.
+        Rows 0 to 2 are the velocity of the flange (m/rad). Rows 3 to 5 are the angular velocity of the flange (rad/rad). The matrix has one
+        column per joint.
         """
         return self._native.jacobian(q)
 
@@ -134,9 +134,10 @@ class Dynamics:
         return self._native.inverse_kinematics(pose, near)
 
     def all_inverse_kinematics(self, pose: ArrayLike) -> Floats:
-        """Computes all joint positions within the limits that bring the flange to one pose (4, 4): (M, 6), rad; M is 0 without a solution.
+        """Computes all joint positions within the limits that bring the flange to one pose (4, 4). The array of joint positions is (M, 6),
+        rad; M is 0 without a solution.
 
-        A singular pose has infinitely many solutions; some of them are returned.
+        A singular pose has infinitely many solutions; the function returns some of them.
         """
         return self._native.all_inverse_kinematics(pose)
 

@@ -1,4 +1,5 @@
-"""Errors, each with the failed request, the place, value and limit, the likely cause, and the remedy."""
+"""Errors of the package. Each error has the failed request, the position of the error, value and limit, the likely cause, and the
+remedy."""
 
 from __future__ import annotations
 
@@ -9,17 +10,17 @@ if TYPE_CHECKING:
 
 
 class Error(Exception):
-    """Any error of openjtc.
+    """Any error of openjtc. All other errors of the package are subclasses.
 
     Attributes:
-        message: The failed request, its place, value and limit.
-        code: Short name for programs. If ``jtc`` has the same error, the name is the same in ``jtc``.
+        message: The failed request, the position of the error, value and limit.
+        code: Short name for programs. If the command ``jtc`` has the same error, it uses the same name.
         joint: Joint, counted from 1; None if the error is not about one joint.
-        point: Point of the trajectory, counted from 0; during a motion the time on its path, ms.
+        point: Point of the trajectory, counted from 0; during a motion the time on the path, ms.
         value: Value that was found, in the unit of the message.
-        limit: Allowed value, in the same unit.
+        limit: Allowed value, in the unit of ``value``.
         cause: Usual cause; empty if unknown.
-        next: Next step that helps; empty if unknown.
+        next: Next step for the user; empty if unknown.
         board: Number of the UCoM board; None if the error is not about a single board.
         run: Run of a motion that ended in this error; None for any other error.
     """
@@ -63,11 +64,11 @@ class Error(Exception):
 
 
 class UsageError(Error, ValueError):
-    """A wrong argument, or a file that cannot be understood. No frame was sent."""
+    """A wrong argument, or an invalid file. No frame was sent."""
 
 
 class RefusedError(Error):
-    """A check refused the request: nothing was sent, moved or changed."""
+    """A check refused the request. No frame was sent, and nothing was moved or changed."""
 
 
 class DeviceError(Error):
@@ -83,17 +84,17 @@ class FaultError(Error):
 
 
 class HeldStopError(FaultError):
-    """The controller stopped the arm and holds it after a contact, or because of a load that its model does not include. The code
-    is ``held-stop``.
+    """The controller stopped the arm and holds it after a contact, or because of a load that its model does not include. The code is
+    ``held-stop``.
 
-    ``text``, ``joint``, ``value`` and ``limit`` describe the cause. The arm does not move until ``robot.recover()``. Look at the arm before
-    that call.
+    ``text``, ``joint``, ``value`` and ``limit`` describe the cause. The arm does not move until you call ``robot.recover()``. Look at the
+    arm before that call.
 
     Attributes:
-        kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …; empty if the controller
-            does not report it.
+        kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …; empty if the controller does
+            not report the cause.
         unit: Unit of ``value`` and ``limit``; empty if they have no unit.
-        text: Cause in words; empty if the controller does not report it.
+        text: Cause in words; empty if the controller does not report the cause.
     """
 
     def __init__(
@@ -124,5 +125,5 @@ class HeldStopError(FaultError):
 class StoppedError(FaultError):
     """Another thread, another program or an operator stopped the arm during the call. The code is ``stopped``.
 
-    ``run`` has the samples of a motion until then. A program that continues moves an arm that was stopped on purpose.
+    ``run`` has the samples of the motion until the stop. A program that continues moves an arm that was stopped on purpose.
     """

@@ -26,7 +26,7 @@ FilePath: TypeAlias = "str | os.PathLike[str]"
 
 
 class Motion:
-    """A running motion. `Robot.pause`, `Robot.resume` and `Robot.speed` also act on it.
+    """A running motion. `Robot.pause`, `Robot.resume` and `Robot.speed` also act on this motion.
 
     Several threads may use one motion. A motion keeps its robot open. The end of the program stops the motion.
     """
@@ -41,13 +41,13 @@ class Motion:
 
     @property
     def progress(self) -> tuple[str, float, float]:
-        """Phase (``waiting``, ``upload``, ``approach``, ``motion``; empty after the end), progress in it and total: s, or segments of an
-        upload."""
+        """Phase (``waiting``, ``upload``, ``approach``, ``motion``; empty after the end), completed part of the phase and total. The unit
+        is s, or segments of an upload."""
         return self._native.progress()
 
     @property
     def is_done(self) -> bool:
-        """True if the motion is over, with or without an error."""
+        """True if the motion has ended, with or without an error."""
         return self._is_over(0.0)
 
     def _is_over(self, seconds: float | None) -> bool:
@@ -56,13 +56,13 @@ class Motion:
         try:
             came = self._native.wait(seconds)
         except UsageError:
-            # The error is raised, because `seconds` is not a valid time.
+            # If `seconds` is not a valid time, the error is raised.
             raise
         except Exception as error:
             self._error = error
             return True
         except BaseException:
-            # Ctrl-C has stopped the motion, so a later `wait` reports the stop without an error.
+            # Ctrl-C has stopped the motion, so a later `wait` must not raise an error for this stop.
             self._stopped = True
             raise
         if came is None:
@@ -71,12 +71,12 @@ class Motion:
         run = Run(samples)
         if isinstance(error_of_run, Error):
             error_of_run.run = run
-        # The run is set last, because other threads check it to see if the motion is over.
+        # `_run` is set last, because other threads read it to check whether the motion has ended.
         self._error, self._run = error_of_run, run
         return True
 
     def stop(self) -> None:
-        """Stops the arm on its path, like `Robot.stop`. A later `wait` then raises no `StoppedError`."""
+        """Stops the arm on its path, like `Robot.stop`. A later `wait` does not raise a `StoppedError` for this stop."""
         self._stopped = True
         self._robot.stop()
 
@@ -87,20 +87,21 @@ class Motion:
             timeout: Longest wait, s; None: without limit.
 
         Returns:
-            The run. Its outcome is ``stopped`` after `stop` of this motion, or after `Robot.stop` or `Robot.close` in the waiting thread.
+            The run. The outcome of the run is ``stopped`` after `stop` of this motion, or after `Robot.stop` or `Robot.close` in the
+            waiting thread.
 
         Raises:
-            TimeoutError: The motion is not over and continues.
+            TimeoutError: The motion has not ended yet, and continues.
             RefusedError: The check refused the trajectory. No frame was sent.
             StoppedError: Another thread or program stopped the motion.
-            FaultError, DeviceError, NoLinkError: The motion ended in an error; ``run`` of the error has the samples until then.
+            FaultError, DeviceError, NoLinkError: The motion ended in an error. ``run`` of the error has the samples until then.
         """
         if not self._is_over(timeout):
             raise TimeoutError(f"the motion has not ended after {timeout} s")
         return self._ended(self._stopped or self._robot._stopped_since(self._asked))
 
     def _ended(self, own: bool) -> Run:
-        """Returns the run or raises its error. `own` is true if the caller itself stopped the motion."""
+        """Returns the run, or raises the error of the run. `own` is true if the caller itself stopped the motion."""
         if self._error is not None:
             raise self._error
         assert self._run is not None
@@ -116,7 +117,7 @@ class Motion:
 
 
 class Teaching:
-    """An arm that is led by hand. The controller holds the arm again when the context ends or after a Stop."""
+    """An arm that is guided by hand. The controller holds the arm again when the context ends or after a Stop."""
 
     def __init__(self, link: _native.Link) -> None:
         self._link = link
@@ -124,9 +125,9 @@ class Teaching:
         self._rows = np.empty((0, 6))
 
     def record(self, seconds: float) -> None:
-        """Records the positions of the arm for this time (s, up to 3600) and appends them to the earlier ones.
+        """Records the positions of the arm for this time (s, up to 3600), and appends them to the positions recorded earlier.
 
-        After an error or Ctrl-C, the positions until then are kept.
+        After an error or Ctrl-C, the positions recorded until then are kept.
 
         Raises:
             FaultError: Teaching has ended, or the controller reports an error.
@@ -151,8 +152,8 @@ class Teaching:
         return self._rows.copy()
 
     def waypoints(self, tolerance: float = 0.01) -> Array:
-        """Reduces the recorded positions to waypoints. Every dropped position is within a tolerance of the straight lines
-        between the waypoints.
+        """Reduces the recorded positions to waypoints. Every removed position is within `tolerance` of the straight lines between the
+        waypoints.
 
         Args:
             tolerance: Largest deviation of any joint, rad.
@@ -193,14 +194,15 @@ def options_of(
 
 
 def followed(robot: Robot, begin: Callable[[], Motion], progress: bool | None) -> Run:
-    """Begins a motion and waits for it with a progress bar, first for the upload, then for the motion."""
+    """Begins a motion and waits for its end. A progress bar shows first the upload and then the motion."""
     motion: Motion | None = None
     try:
         motion = begin()
         _show(motion, progress)
     except BaseException as error:
-        # If Ctrl-C in Python code, or a bar that cannot be drawn, interrupts the wait, the arm is stopped, because no caller waits for
-        # it any more. After an `Exception` before the start, no motion must be stopped.
+        # Ctrl-C in Python code, or an error of the progress bar, may interrupt the wait. The arm is then stopped,
+        # because no caller waits for the motion any more. After an `Exception` before the start, there is no
+        # motion to stop.
         if motion is not None or not isinstance(error, Exception):
             robot._link.rest()
         raise

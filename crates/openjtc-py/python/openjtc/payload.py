@@ -25,7 +25,7 @@ class Payload:
     inertia: Sequence[float] = (0.0,) * 6
 
     def _numbers(self) -> tuple[float, list[float], list[float]]:
-        """Returns mass, centre of mass and inertia in the form of the compiled module."""
+        """Returns mass, centre of mass and inertia in the form that the compiled module uses."""
         if len(self.com) != 3 or len(self.inertia) != 6:
             raise UsageError("payload: expected 3 numbers for the centre of mass and 6 for the inertia", "payload")
         return (float(self.mass), [float(x) for x in self.com], [float(x) for x in self.inertia])

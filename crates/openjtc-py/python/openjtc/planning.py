@@ -26,16 +26,16 @@ class Planner:
     """Plans motions of an arm.
 
     Args:
-        arm: The arm; None: the built-in one.
+        arm: The arm; None: the built-in arm.
         speed: Percent of the limits, 1 to 100.
-        blend: Distance from a waypoint within which its corner may be rounded, rad of the joint that is furthest away, 0.5 at most; 0: the
-            arm stops at each waypoint. `through` also takes a blend in degrees.
+        blend: Distance from a waypoint within which the corner at the waypoint may be rounded, at most 0.5. The distance is in rad of the
+            joint that is furthest away. 0: the arm stops at each waypoint. `through` also takes a blend in degrees.
         blend_m: Like `blend`, for corners between lines and arcs of the flange, m, 0.5 at most.
-        line: Moves the flange along a straight line to each waypoint that does not set this itself.
-        jerk: Also limits the jerk.
-        temperature: Lowest bearing temperature for which friction torque is planned, °C; None: 20, for a cold hall.
+        line: Moves the flange along a straight line to each waypoint that does not itself contain this option.
+        jerk: Also keeps the jerk within its limit.
+        temperature: Lowest bearing temperature for which the planner includes friction torque, °C; None: 20, for a cold hall.
         payload: Payload at the flange.
-        margin: Torque to leave for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
+        margin: Torque reserve for masses and friction that the model does not know, percent of each limit, 0 to 50; None: 15.
     """
 
     def __init__(
@@ -65,16 +65,16 @@ class Planner:
         flange: ArrayLike | None = None,
         degrees: bool = False,
     ) -> Plan:
-        """Plans a motion from one position at rest to another one, or to a pose of the flange.
+        """Plans a motion from one position at rest to another position at rest, or to a pose of the flange.
 
         Args:
             start: Joint positions (6,), rad, or the name of a pose of the arm.
-            to: Target, in the form of `start`.
+            to: Target position (6,), rad, or the name of a pose of the arm.
             flange: Flange pose instead of `to`: x, y, z (m) and roll, pitch, yaw (rad) in the base frame.
-            degrees: True if all given angles are degrees.
+            degrees: True if all angles of the arguments are degrees.
 
         Raises:
-            RefusedError: The target is outside the limits, cannot be reached, or no torque holds it.
+            RefusedError: The target is outside the limits, cannot be reached, or no torque can hold the arm there.
         """
         begin = joints_of(self.arm, start, degrees)
         if (to is None) == (flange is None):
@@ -95,16 +95,16 @@ class Planner:
 
         Args:
             waypoints: An array (N, 6) of joint positions (rad), a file, or a list of pose names and dicts.
-            times: Time of each waypoint of an array, s from the first one; NaN: as soon as the limits allow.
-            blend: Replaces the planner's blend; in degrees if `degrees` is true, else in rad.
-            degrees: True if angles are degrees, including `blend`. Data with its own units is not affected.
+            times: Time of each waypoint of an array, s, counted from the first waypoint; NaN: as soon as the limits allow.
+            blend: Replaces the planner's blend. The unit is degrees if `degrees` is true, otherwise rad.
+            degrees: True if angles are degrees, including `blend`. The option does not affect data with its own units.
 
         Returns:
-            The plan. Its `notes` list the waypoints that rounded corners miss by more than 0.05 rad.
+            The plan. The `notes` of the plan list the waypoints that rounded corners miss by more than 0.05 rad.
 
         Raises:
             UsageError: The blend is above 0.5 rad.
-            RefusedError: The motion is not possible; the message contains the waypoint.
+            RefusedError: The motion is not possible; the message contains the affected waypoint.
         """
         blend_rad = None if blend is None else float(np.radians(blend) if degrees else blend)
         if isinstance(waypoints, (str, os.PathLike)):
@@ -120,8 +120,7 @@ class Planner:
         return Plan(self._native.through(positions, blend_rad, given))
 
     def check(self, trajectory: Trajectory | Plan, *, start: ArrayLike | None = None) -> Check:
-        """Checks a trajectory in the same way as a run: limits at and between points, torques, and the distance to
-        stop.
+        """Checks a trajectory in the same way as a run does: limits at and between points, torques, and the distance to stop.
 
         Args:
             trajectory: A trajectory or a plan.
@@ -138,7 +137,7 @@ def _plain(waypoint: Any) -> dict[str, Any]:
 
 
 def joints_of(arm: Arm, place: ArrayLike | str, degrees: bool) -> ArrayLike:
-    """Returns joint positions in rad, from numbers or a named pose."""
+    """Returns joint positions in rad. The argument is numbers or the name of a pose."""
     if isinstance(place, str):
         if degrees:
             raise UsageError("`degrees` does not apply to a named pose: leave out `degrees`", "usage")
@@ -147,7 +146,7 @@ def joints_of(arm: Arm, place: ArrayLike | str, degrees: bool) -> ArrayLike:
 
 
 def radians_of(place: ArrayLike, degrees: bool) -> ArrayLike:
-    """Returns joint positions in rad, from numbers."""
+    """Returns joint positions in rad. The argument is numbers."""
     return np.radians(np.asarray(place, dtype=float)) if degrees else place
 
 

@@ -31,7 +31,7 @@ class JointFigures:
     """Figures of one joint over a motion; an unknown value is None.
 
     Attributes:
-        name: Name in the arm file.
+        name: Name of the joint in the arm file.
         rms_error_mrad: Root mean square of the position error, mrad.
         max_error_mrad: Largest absolute position error, mrad.
         peak_torque_nm: Largest absolute torque, N·m.
@@ -54,8 +54,8 @@ class JointFigures:
 class Samples:
     """Samples of a run, a plan or a flight recorder, with their arm.
 
-    Over a line there is one sample for each status of the controller, 25 per second. The simulator and the flight recorder have one sample
-    each millisecond. Values that a source does not know are NaN.
+    Over a line, the samples have one entry for each status of the controller, 25 per second. The simulator and the flight recorder have one
+    sample each millisecond. Values that a source does not know are NaN.
     """
 
     def __init__(self, native: _native.Samples) -> None:
@@ -104,12 +104,12 @@ class Samples:
         return table
 
     def to_polars(self) -> polars.DataFrame:
-        """Returns the table of `to_pandas` as a Polars frame."""
+        """Returns the table of `to_pandas` as a Polars DataFrame."""
         table: polars.DataFrame = needed("polars").DataFrame(self._columns())
         return table
 
     def plot(self) -> Figure:
-        """Plots commanded and measured positions and their error with Matplotlib.
+        """Plots commanded and measured positions and the position error with Matplotlib.
 
         Raises:
             ImportError: Matplotlib is not installed; the message says how to install it.
@@ -128,14 +128,14 @@ class Samples:
         return figure
 
     def report(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Writes the report: one page with figures and interactive plots that opens offline.
+        """Writes the report: one page with figures and interactive plots that can be opened offline.
 
         Args:
-            path: The file, such as ``run.html``.
+            path: Path of the file, such as ``run.html``.
             overwrite: Overwrites an existing file.
 
         Raises:
-            UsageError: The file exists.
+            UsageError: The report file exists.
         """
         path = Path(path)
         try:
@@ -187,12 +187,12 @@ class Run(Samples):
 
     @property
     def failure(self) -> str | None:
-        """First failure, in one line; None if the motion did not fail."""
+        """First failure of the motion, in one line; None if the motion did not fail."""
         return self._native.failure
 
     @property
     def notes(self) -> list[str]:
-        """Changes that were made for the check, and the speed if the caller gave no speed."""
+        """Changes that openjtc made so that the trajectory passes the check. Also contains the speed if the caller gave no speed."""
         return self._native.notes
 
     def __repr__(self) -> str:
@@ -204,9 +204,9 @@ class Run(Samples):
 
 
 class Check:
-    """Result of the trajectory check that guards each run.
+    """Result of the trajectory check that every run must pass.
 
-    In a condition, the result is true if the trajectory may run.
+    In a condition, the result counts as true if the trajectory may run.
     """
 
     def __init__(self, verdict: dict[str, Any]) -> None:
@@ -222,7 +222,7 @@ class Check:
 
     @property
     def refusals(self) -> list[str]:
-        """Reasons that forbid the run, the worst first: joint, point, value, limit."""
+        """Reasons that forbid the run, with joint, point, value and limit; the worst reason is first."""
         return list(self._verdict["refusals"])
 
     @property
@@ -232,12 +232,12 @@ class Check:
 
     @property
     def problems(self) -> list[dict[str, Any]]:
-        """Refusals and warnings as values: ``kind``, ``joint`` (from 1), ``point``, ``value``, ``limit``."""
+        """Refusals and warnings as dicts: ``kind``, ``joint`` (from 1), ``point``, ``value``, ``limit``."""
         return list(self._verdict["problems"])
 
     @property
     def joints(self) -> list[dict[str, Any]]:
-        """Peaks of each joint: velocity (rad/s), acceleration (rad/s²), torque (N·m) and their shares of the limits."""
+        """Peaks of each joint: velocity (rad/s), acceleration (rad/s²), torque (N·m), and the shares of the limits."""
         return list(self._verdict["joints"])
 
     @property
@@ -249,7 +249,7 @@ class Check:
 
     @property
     def next(self) -> str:
-        """Next step that helps; empty without a problem."""
+        """Next step for the user; empty without a problem."""
         return str(self._verdict["next"])
 
     def raise_if_refused(self) -> None:
@@ -267,7 +267,7 @@ class Check:
 
 
 class Plan(Samples):
-    """A planned motion, within the limits and checked. Its samples are the commanded values, with the torques."""
+    """A planned motion within the limits, which the check has accepted. The samples of a plan are the commanded values with the torques."""
 
     def __init__(self, native: _native.Plan) -> None:
         super().__init__(native.samples())
@@ -295,12 +295,12 @@ class Plan(Samples):
 
     @property
     def notes(self) -> list[str]:
-        """Changes that were made for the check, and waypoints that rounded corners miss."""
+        """Changes that openjtc made so that the motion passes the check, and waypoints that rounded corners miss."""
         return self._plan.notes
 
     @property
     def check(self) -> Check:
-        """Result of the check."""
+        """Result of the trajectory check."""
         return Check(self._plan.check())
 
     def __repr__(self) -> str:
@@ -308,8 +308,8 @@ class Plan(Samples):
 
 
 class FlightLog(Samples):
-    """Every tick of the last seconds before the first error. The log is read from the controller and replayed with the same
-    control code."""
+    """Every tick of the last seconds before the first error. openjtc reads the log from the controller and replays it with the same control
+    code."""
 
     def __init__(self, native: _native.FlightLog) -> None:
         super().__init__(native.samples())
@@ -331,7 +331,7 @@ class FlightLog(Samples):
         return self._log.state
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Writes an MCAP recording that also contains the log itself; ``jtc log replay`` reads it."""
+        """Writes an MCAP recording that also contains the log of the flight recorder; ``jtc log replay`` reads it."""
         self._log.save(path, overwrite)
         return Path(path)
 

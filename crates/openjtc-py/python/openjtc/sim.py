@@ -1,7 +1,7 @@
 """The simulated arm, with the real controller (:class:`Simulator`) or for your own controller (:class:`Plant`).
 
-Time is virtual: only ``step`` advances it, many times faster than real time. The same arguments and calls give the same numbers,
-bit for bit. Arrays are (6,), base to wrist; positions are rad, velocities rad/s, torques N·m, times s.
+Time is virtual: only ``step`` advances the time, many times faster than real time. Equal arguments and calls give equal numbers, bit for
+bit. Arrays are (6,), base to wrist; positions are in rad, velocities in rad/s, torques in N·m, times in s.
 
     >>> from openjtc.sim import Plant
     >>> plant = Plant(seed=3)
@@ -37,10 +37,10 @@ class ModelError:
     """Difference between the true arm and the arm file.
 
     Attributes:
-        mass: Largest relative error of each link's mass and inertia, 0 to 1; the errors are drawn from the seed.
-        friction: Largest relative error of each joint's friction, 0 to 1; the errors are drawn from the seed.
-        mass_factors: Factors (7,) of the masses of the base and the six links, 0 to 10, instead of random ones.
-        friction_factors: Factors (6,) of the friction of the six joints, 0 to 10, instead of random ones.
+        mass: Largest relative error of each link's mass and inertia, 0 to 1. The simulator draws the errors from the seed.
+        friction: Largest relative error of each joint's friction, 0 to 1. The simulator draws the errors from the seed.
+        mass_factors: Factors (7,) of the masses of the base and the six links, 0 to 10, instead of random factors.
+        friction_factors: Factors (6,) of the friction of the six joints, 0 to 10, instead of random factors.
     """
 
     mass: float = 0.10
@@ -50,7 +50,7 @@ class ModelError:
 
 
 def _natural(value: SupportsIndex, what: str) -> int:
-    """Returns a whole number within 0 to 2^64-1, else raises `UsageError`."""
+    """Returns a whole number within 0 to 2^64-1, or raises `UsageError`."""
     number = operator.index(value)
     if not 0 <= number < 1 << 64:
         raise UsageError(f"{what}: {number} is out of range (0 to 2^64-1)", "usage")
@@ -58,7 +58,7 @@ def _natural(value: SupportsIndex, what: str) -> int:
 
 
 def _floats(value: ArrayLike, count: int, what: str) -> list[float]:
-    """Returns `count` numbers as floats, else raises `UsageError`."""
+    """Returns `count` numbers as floats, or raises `UsageError`."""
     array = np.asarray(value, dtype=np.float64)
     if array.shape != (count,):
         raise UsageError(f"{what}: shape {array.shape}, expected ({count},)", "usage")
@@ -75,7 +75,7 @@ def _plain(value: object) -> object:
 
 
 def _of_joints(value: ArrayLike | None, what: str) -> list[float] | None:
-    """Returns six numbers, from one number for all joints or one for each."""
+    """Returns six numbers. The argument is one number for all joints or one number for each joint."""
     if value is None:
         return None
     return _floats(np.full(6, value) if np.ndim(value) == 0 else value, 6, what)
@@ -116,21 +116,21 @@ class Simulator:
     """Simulated system of host line, real controller, joint bus, drives and arm, starting at power-on.
 
     Args:
-        arm: The arm; the controller has it stored if its file is complete. None: the built-in arm, and a new controller.
+        arm: The arm; None: the built-in arm, and a new controller. The controller has stored the arm if the arm file is complete.
         seed: Seed of all random numbers.
-        payload: True payload of the arm. The controller does not know it until :func:`openjtc.control.encode.payload` sends it.
+        payload: True payload of the arm. The controller does not know the payload until :func:`openjtc.control.encode.payload` sends it.
         model_error: Difference between the true arm and its file; None: no difference.
-        start: Positions at the start, rad; None: 0, or near its limit for a joint that cannot reach 0.
-        friction: Gives the joints the friction of the arm's file.
-        gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the
-            motor.
+        start: Positions at the start, rad; None: 0, or a position near the limit for a joint that cannot reach 0.
+        friction: True gives the joints the friction of the arm file.
+        gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid gears. Drives measure
+            the position at the motor.
         over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
-        support: Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until they are first enabled, or
+        support: Support of the arm while its drives are not enabled: ``"brakes"``, a ``"stand"`` until the drives are first enabled, or
             ``"none"``.
-        baud: Rate of the serial line, bit/s; None: bytes take no time.
+        baud: Rate of the serial line, bit/s; None: transmission takes no time.
         answer_jitter_ms: Largest random delay of the drives' answers, ms.
         faults: Faults and their times, as the text of a fault file (``jtc help faults``).
-        watch: Keeps the inputs and outputs of the controller for :attr:`inputs` and :attr:`outputs`.
+        watch: True keeps the inputs and outputs of the controller for :attr:`inputs` and :attr:`outputs`.
 
     Raises:
         UsageError: An argument is not valid.
@@ -161,7 +161,7 @@ class Simulator:
         self._status: Status | None = None
 
     def step(self, ms: int = 1) -> None:
-        """Advances the simulation by ``ms`` milliseconds. Ctrl-C is checked after each simulated second.
+        """Advances the simulation by ``ms`` milliseconds. The method checks for Ctrl-C after each simulated second.
 
         Raises:
             UsageError: ``ms`` is negative.
@@ -170,7 +170,7 @@ class Simulator:
 
     @property
     def time(self) -> float:
-        """Time since the start, s."""
+        """Time since the start of the simulation, s."""
         return self._native.time_ms / 1000
 
     @property
@@ -205,12 +205,13 @@ class Simulator:
 
     @property
     def inputs(self) -> Inputs:
-        """Inputs of the controller in the last millisecond, for :meth:`openjtc.control.Controller.tick`. Needs ``watch=True``."""
+        """Inputs of the controller in the last millisecond, for :meth:`openjtc.control.Controller.tick`. The property needs
+        ``watch=True``."""
         return Inputs(*self._exchange()[0])
 
     @property
     def outputs(self) -> Outputs:
-        """Outputs of the controller in the last millisecond; for a missing tick only the safety output is valid. Needs
+        """Outputs of the controller in the last millisecond. For a missing tick, only the safety output is valid. The property needs
         ``watch=True``."""
         return Outputs(*self._exchange()[1], self._native.telemetry)
 
@@ -223,16 +224,16 @@ class Simulator:
         return exchange
 
     def write(self, data: bytes) -> None:
-        """Sends bytes from the host; they reach the controller at the rate of the line."""
+        """Sends bytes from the host. The bytes reach the controller at the rate of the serial line."""
         self._native.write(data)
 
     def read(self) -> bytes:
-        """Returns the bytes that have reached the host since the last call. :meth:`command` also consumes them."""
+        """Returns the bytes that have reached the host since the last call. :meth:`command` also removes these bytes."""
         return self._native.read()
 
     @property
     def status(self) -> Status | None:
-        """Newest status that reached the host. Reading it consumes the bytes that :meth:`read` would return."""
+        """Newest status that reached the host. Reading the property removes the bytes that :meth:`read` would return."""
         self._responses()
         return self._status
 
@@ -246,12 +247,12 @@ class Simulator:
         """Sends frames one after the other, and steps until the controller has answered each frame.
 
         Args:
-            frames: Frames of :mod:`openjtc.control.encode`.
+            frames: Frames that :mod:`openjtc.control.encode` makes.
             limit: Longest time for a frame, s.
 
         Raises:
             DeviceError: The controller did not accept a frame.
-            NoLinkError: The controller did not answer a frame within the limit.
+            NoLinkError: The controller did not answer a frame within ``limit``.
         """
         for frame in frames:
             self.write(frame)
@@ -304,7 +305,7 @@ class Simulator:
     def inject(self, fault: Mapping[str, object]) -> None:
         """Adds a fault, with the keys of a fault file (``jtc help faults``): ``{"kind": "encoder-jump", "joint": 3, "rad": 0.1}``.
 
-        Without ``at_s``, ``in_state`` or ``at_point`` the fault begins now; ``at_s`` counts from the start.
+        Without ``at_s``, ``in_state`` or ``at_point`` the fault begins now. ``at_s`` counts from the start of the simulation.
 
         Raises:
             UsageError: The fault is not valid.
@@ -312,16 +313,16 @@ class Simulator:
         entry = dict(fault)
         if not {"at_s", "in_state", "at_point"} & entry.keys():
             entry["at_s"] = self.time
-        # Strings and numbers have the same form in TOML and JSON.
+        # Strings and numbers are written in the same way in TOML and JSON.
         lines = "\n".join(f"{key} = {json.dumps(value, ensure_ascii=False, default=_plain)}" for key, value in entry.items())
         self._native.inject(f"format = 2\n[[fault]]\n{lines}\n")
 
     def push(self, joint: int, torque: float, seconds: float) -> None:
-        """Pushes a joint (from 1) with a torque (N·m) for ``seconds`` (s), from now on."""
+        """Pushes a joint (counted from 1) with a torque (N·m) for ``seconds`` (s), beginning now."""
         self.inject({"kind": "push", "joint": joint, "torque_nm": float(torque), "for_s": float(seconds)})
 
     def lead(self, path: ArrayLike, step: float = 0.01) -> None:
-        """Simulates a hand that leads the arm along a path (N, 6), rad, when teaching begins. The time from row to row is
+        """Simulates a hand that guides the arm along a path (N, 6), rad, when teaching begins. The time between two rows of the path is
         ``step`` seconds."""
         self._native.lead(path, step)
 
@@ -336,30 +337,31 @@ class Simulator:
 
     @property
     def bus_frames(self) -> list[Frame]:
-        """All frames on the joint bus in the last millisecond, in order."""
+        """All frames on the joint bus in the last millisecond, in the order of the bus."""
         return self._native.bus_frames()
 
     @property
     def events(self) -> list[tuple[float, str]]:
-        """Events, oldest first: time (s) and text."""
+        """Events of the simulation, oldest first. Each event has a time (s) and a text."""
         return self._native.events()
 
     @property
     def statistics(self) -> dict[str, float]:
-        """Counts since the start: bytes, frames, resets, and the load of the joint bus."""
+        """Counters since the start of the simulation: bytes, frames, resets, and the load of the joint bus."""
         return self._native.statistics()
 
 
 @dataclass(frozen=True, eq=False)
 class PlantState:
-    """Measurements for a controller. Arrays are (6,).
+    """Measurements of the drives, for a controller. Arrays are (6,).
 
     Attributes:
-        time: Time since the start, s.
-        position: Positions read by the drives, rad, in steps of 0.1 mrad; a torque computed from them acts 2 ms after the reading.
-        velocity: Velocities, rad/s, a mean over 10 ms.
+        time: Time since the start of the plant, s.
+        position: Positions read by the drives, rad, in steps of 0.1 mrad. A torque that is computed from a position acts 2 ms after the
+            drive read the position.
+        velocity: Velocities, rad/s; each is a mean over 10 ms.
         temperature: Temperatures of the bearings, °C.
-        enabled: True if the drive carries its joint. After a trip the brake holds the joint.
+        enabled: True if the drive holds its joint. After a trip, the brake holds the joint.
         errors: Error bits of the drives.
     """
 
@@ -372,28 +374,28 @@ class PlantState:
 
     @property
     def faulted(self) -> bool:
-        """True if a drive has tripped; the arm then stays at rest until :meth:`Plant.reset`."""
+        """True if a drive has tripped. The arm then stays at rest until :meth:`Plant.reset`."""
         return not all(self.enabled)
 
 
 class Plant:
-    """Arm and drives without a controller: each millisecond takes a torque and returns a measurement.
+    """Arm and drives without a controller. In each millisecond the plant takes a torque and returns a measurement.
 
-    This is the plant of :class:`Simulator`, with the same bodies, friction and end stops. The plant also has the same drives with
-    their encoders, over-speed trip, working area and torque limit, and the same delay over the joint bus. The drives are enabled. If
-    drives trip, brakes hold the arm.
+    The plant is the same as in :class:`Simulator`, with the same bodies, friction and end stops. The plant also has the same drives with
+    their encoders, over-speed trip, working area and torque limit, and the same delay over the joint bus. The drives are enabled from the
+    start. If drives trip, brakes hold the arm.
 
     Args:
-        arm: The arm; None: the built-in one.
+        arm: The arm; None: the built-in arm.
         seed: Seed of all random numbers. With the same ``model_error`` and seed, the true arm is the same as in a :class:`Simulator`.
         payload: Payload of the arm.
         model_error: Difference between the true arm and its file; None: no difference.
-        start: Positions at the start, rad; None: 0, or near its limit for a joint that cannot reach 0.
-        friction: Gives the joints the friction of the arm's file; False: no friction.
-        gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid. Drives measure at the
-            motor.
+        start: Positions at the start, rad; None: 0, or a position near the limit for a joint that cannot reach 0.
+        friction: True gives the joints the friction of the arm file; False: no friction.
+        gear_stiffness: Stiffness of the gears between motor and link, N·m/rad, for all joints or (6,); None: rigid gears. Drives measure
+            the position at the motor.
         over_speed: Speed at which the drives trip, rad/s, for all joints or (6,); None: 1.2 times the velocity limit.
-        drives: False: the arm alone. Torques act at once, states are exact, and no drive trips.
+        drives: False simulates the arm without drives. Torques then act at once, measurements are exact, and no drive trips.
 
     Raises:
         UsageError: An argument is not valid.
@@ -416,7 +418,8 @@ class Plant:
         self._native = _native.Plant(simulated, drives=drives)
 
     def step(self, torque: ArrayLike, ms: int = 1) -> PlantState:
-        """Applies torques (6,), N·m, for ``ms`` milliseconds. The drives round them to 0.011 N·m and limit them to :attr:`torque_max`.
+        """Applies torques (6,), N·m, for ``ms`` milliseconds. The drives round the torques to 0.011 N·m and limit them to
+        :attr:`torque_max`.
 
         Raises:
             UsageError: The torques are not six finite numbers, or ``ms`` is negative.
@@ -425,7 +428,7 @@ class Plant:
         return self.state
 
     def reset(self, position: ArrayLike) -> PlantState:
-        """Restarts the arm at time 0: cold and at rest at these positions (6,), rad, with its drives enabled.
+        """Restarts the arm at time 0, cold and at rest at these positions (6,), rad, with its drives enabled.
 
         Raises:
             UsageError: A position is beyond an end stop.
@@ -435,7 +438,7 @@ class Plant:
 
     @property
     def state(self) -> PlantState:
-        """Last measurement."""
+        """Last measurement of the drives."""
         native = self._native
         return PlantState(
             native.time_ms / 1000, native.position, native.velocity, native.temperature, native.enabled, native.errors
@@ -443,7 +446,7 @@ class Plant:
 
     @property
     def time(self) -> float:
-        """Time since the start, s."""
+        """Time since the start of the plant, s."""
         return self._native.time_ms / 1000
 
     @property

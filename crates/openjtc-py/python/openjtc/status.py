@@ -19,8 +19,8 @@ class HeldStop:
     Attributes:
         kind: Kind of the cause: ``push``, ``overload``, ``position-error``, ``unstable``, ``encoder-jump`` …
         number: Number of the kind, as in Modbus.
-        code: Name of its page: ``jtc explain CODE``.
-        joint: Joint (from 1) at which the cause was found first; None: at no particular joint.
+        code: Code of the page that explains the cause: ``jtc explain CODE``.
+        joint: Joint (from 1) at which the controller found the cause first; None: the cause does not belong to a joint.
         value: Value that was found; None if the kind has no value.
         limit: Limit of the value; None if the kind has no limit.
         unit: Unit of value and limit; empty if they have no unit.
@@ -43,11 +43,11 @@ class HeldStop:
 
 @dataclass(frozen=True)
 class Status:
-    """Status of the controller and the arm. A joint that is silent or not ready has NaN for values that it does not measure.
+    """Status of the controller and the arm. Values that a silent or unready joint does not measure are NaN.
 
     Attributes:
         state: State of the controller: ``Init``, ``HoldPos``, ``Operate``, ``Teaching``, ``Error`` …
-        trajectory: State of its trajectory: ``Null``, ``Stop``, ``Pause``, ``Execute``, ``Finish`` …
+        trajectory: State of the trajectory: ``Null``, ``Stop``, ``Pause``, ``Execute``, ``Finish`` …
         point: Time on the path, ms.
         position: Measured positions (6,), rad.
         velocity: Measured velocities (6,), rad/s.
@@ -56,9 +56,9 @@ class Status:
         joint_states: State of each drive.
         errors: Present errors, in words.
         warnings: Warnings of the drives.
-        waiting_for: Present action or wait of the controller, in one line.
-        next: Next step that helps.
-        held_stop: Present held stop with its cause; None: the arm is not in a held stop, or the controller does not report it.
+        waiting_for: Present activity of the controller, or the event for which the controller waits, in one line.
+        next: Next step for the user.
+        held_stop: Present held stop with its cause; None: the arm is not in a held stop, or the controller does not report held stops.
     """
 
     state: str
@@ -78,13 +78,13 @@ class Status:
 
 @dataclass(frozen=True)
 class Finding:
-    """Finding about link, bus or set-up.
+    """Finding about the link, the bus or the set-up.
 
     Attributes:
         severity: ``problem``, ``warning`` or ``good``.
-        what: The finding.
+        what: Description of the finding.
         why: Likely cause.
-        next: Next step that helps.
+        next: Next step for the user.
     """
 
     severity: str

@@ -27,11 +27,12 @@ pub(super) fn stopped(what: &str) -> Failure {
 }
 
 impl WorkerState {
-    /// Stops the arm and waits for standstill. If the arm is already at rest, this is not an error. Also ends Teaching, even if
-    /// another program has enabled it, because the caller expects that the controller holds the arm.
+    /// Stops the arm and waits for standstill. If the arm is already at rest, `stop` returns no error. A Stop also ends
+    /// Teaching, even if another program has enabled it, because the caller expects that the controller holds the arm.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
-        // The Stop is sent before any query: it may reach the controller even if the line delivers no bytes to this program.
+        // The Stop is sent before any query. The Stop may reach the controller even if the line delivers no bytes to this
+        // program.
         let stopped = match self.session.stop() {
             // The controller refuses a Stop if no motion is in progress.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
@@ -76,7 +77,7 @@ impl WorkerState {
         let frames: [&[u8]; 2] = [&fixed::STOP, &fixed::TEACHING_MODE_DISABLE];
         let due = [self.shared.moves(), self.teaching];
         for (frame, _) in frames.into_iter().zip(due).filter(|(_, due)| *due) {
-            // An error is ignored, because no caller can receive it.
+            // An error is ignored, because no caller can receive it here.
             let _ = port.write_all(frame);
         }
     }
@@ -92,7 +93,7 @@ impl WorkerState {
         }
     }
 
-    /// Jogs at these velocities (rad/s) for this time, then waits for standstill. Returns the final position (rad).
+    /// Jogs at these velocities (rad/s) for this time, and then waits for standstill. Returns the final positions (rad).
     pub(crate) fn jog(
         &mut self,
         velocity: &[f64; JOINTS],
@@ -104,7 +105,7 @@ impl WorkerState {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // When the jog ends for any reason, the arm is brought to rest at once, without waiting for the jog timeout of
+        // When the jog ends for any reason, the function brings the arm to rest at once, without waiting for the jog timeout of
         // the controller.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
@@ -115,7 +116,7 @@ impl WorkerState {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
-            // If the controller is in a held stop, the held stop is the reason why it refused the jog.
+            // If the controller refused the jog because of a held stop, the error must report the held stop.
             Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
             jogged => jogged?,
         }
@@ -128,7 +129,7 @@ impl WorkerState {
         self.same_arm()?;
         self.session.ask_to_move()?;
         let before = self.teaching;
-        // The flag is set before the attempt, so that closing the connection ends Teaching in any case.
+        // `teaching` is set before the controller enables Teaching, so that closing the connection always ends Teaching.
         self.teaching = true;
         let begun = self.session.teach_until(|| asked.is_halted());
         if let Err(Error::Link(
@@ -140,7 +141,7 @@ impl WorkerState {
         Ok(begun?)
     }
 
-    /// Records the joint positions while the arm is guided by hand, for this time or until a Stop.
+    /// Records the joint positions for this time or until a Stop, while the operator guides the arm by hand.
     pub(crate) fn record_teaching(&mut self, time: Duration, asked: &Asked) -> Result<(), Failure> {
         let shared = &self.shared;
         let ended = |so_far| asked.is_halted() || so_far >= time;

@@ -1,4 +1,4 @@
-//! Run that Python requested: its progress, its samples, and requests during the run.
+//! Run that a Python program requested: progress and samples of the run, and requests during the run.
 
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -30,19 +30,19 @@ use crate::threads::lock;
 /// Order for a run: the motion and its options.
 pub(crate) struct Order {
     pub course: Course,
-    /// Name in recordings.
+    /// Name of the motion in recordings.
     pub name: String,
     /// `true` to move the arm to the first point if the arm is at another position.
     pub approach: bool,
     /// Speed, in % of the speed of the trajectory itself, or in % of the limits for a move or an approach. `None` selects the speed
     /// of the trajectory itself, or the default speed of a move or an approach.
     pub speed: Option<f64>,
-    /// Number of executions.
+    /// Number of times that the trajectory is executed.
     pub repeat: u32,
     /// `true` if the caller confirms that the limits, gravity and rotor inertia of the controller are safe for the
     /// arm, although the values of the arm differ.
     pub accept_device_limits: bool,
-    /// Path of a recording, and `true` to overwrite an existing file.
+    /// Path of a recording. The second field is `true` if an existing recording may be overwritten.
     pub record: Option<(PathBuf, bool)>,
     /// Progress of the run, which other threads can read.
     pub progress: Arc<Mutex<Progress>>,
@@ -52,7 +52,7 @@ pub(crate) struct Order {
 pub(crate) struct Ran {
     /// `true` if Execute was sent to the controller.
     moved: bool,
-    /// Outcome: "finished" or "stopped", or "fault" if there is a failure.
+    /// Outcome of the run: "finished" or "stopped", or "fault" if there is a failure.
     pub outcome: &'static str,
     pub failure: Option<Failure>,
     pub broken: Option<RunFailure>,
@@ -72,7 +72,8 @@ impl Order {
 }
 
 impl WorkerState {
-    /// Executes an order. An error before the motion is returned as an error. An error during or after the motion is part of the result.
+    /// Executes an order. An error before the motion is returned as an error. An error during or after the motion is part of the
+    /// returned result.
     pub(crate) fn run(&mut self, order: &Order, asked: &Asked) -> Result<Ran, Failure> {
         let recording = order.record.as_ref();
         let mut recording =
@@ -174,7 +175,7 @@ impl WorkerState {
     }
 }
 
-/// Observer of a run that Python requested.
+/// Observer of a run that a Python program requested.
 struct Follower<'a> {
     order: &'a Order,
     asked: &'a Asked,
@@ -262,7 +263,7 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         if let Some(waits) = self.waits.take() {
             let came = result.as_ref().copied().map_err(Failure::of);
-            // The thread may have stopped waiting.
+            // The thread may have stopped waiting for the result.
             let _ = waits.send(came);
         }
     }
@@ -270,8 +271,8 @@ impl Observer<AnyPort> for Follower<'_> {
     fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
         observe(session, &self.shared);
         self.tape.pause();
-        // A request that was made at the last status has no effect. The thread that made the request receives the
-        // information that the motion has ended.
+        // A request that was made at the last status has no effect. The thread that made this request receives the information that the
+        // motion has ended.
         self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
             // The motion was stopped before it began.
@@ -285,8 +286,8 @@ impl Observer<AnyPort> for Follower<'_> {
             Ok(Outcome::Stopped(_)) => {
                 self.ran.outcome = "stopped";
                 if !self.asked.is_halted() {
-                    // Another program has stopped the arm. Waiting requests of this program are older than that Stop, so the run
-                    // discards them as well.
+                    // Another program has stopped the arm. Waiting requests of this program are older than that Stop, so the run also
+                    // discards these requests.
                     self.shared.halt();
                 }
             }
@@ -309,8 +310,8 @@ impl Follower<'_> {
     }
 }
 
-/// Returns `true` if the arm may still move after this error: the arm is on its path, or it is paused and another
-/// program may resume the motion.
+/// Returns `true` if the arm may still move after this error. The arm is then on its path, or it is paused and another program may
+/// resume the motion.
 fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
     let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
     matches!(error, Error::Motion(MotionError::LinkLost { .. }))
@@ -345,7 +346,7 @@ fn trajectory(
     Ok((planned.trajectory, planned.notes))
 }
 
-/// Returns a default speed as text.
+/// Returns a default speed as text for a note.
 fn of_speed(what: &str, speed: MoveSpeed) -> Option<String> {
     speed.note("`speed=`").map(|words| format!("{what} {words}"))
 }

@@ -1,4 +1,4 @@
-//! Handle of a running motion; Python threads can wait for the motion with it.
+//! Handle of a running motion. Python threads use the handle to wait for the motion.
 
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
@@ -15,11 +15,11 @@ use crate::number;
 use crate::run::Samples;
 use crate::threads::lock;
 
-/// Check interval and number of checks after another thread has received the result.
+/// Interval and number of checks after another thread has received the result.
 const LOOK: Duration = Duration::from_millis(2);
 const LOOKS: u32 = 50;
 
-/// Samples, and the error that ended the run.
+/// Samples of the run, and the error that ended the run.
 type Came = (Py<Samples>, Option<Py<PyAny>>);
 /// Samples and error of the run, or the error that prevented the motion.
 type Over = Result<Came, Py<PyAny>>;
@@ -41,7 +41,7 @@ impl Motion {
         *lock(&progress) = Progress { phase: "waiting", ..Progress::default() };
         let pending = Pending::begin(&worker.shared);
         let of_run = Arc::clone(&progress);
-        // The guard moves with the job, so that a job that never begins does not count as pending.
+        // The guard moves into the job. A job that never begins therefore does not count as pending.
         let came = worker.ask(asked, move |state, asked| {
             let _pending = pending;
             let ran = state.run(&order, asked);
@@ -67,8 +67,8 @@ fn raised(py: Python<'_>, failure: Failure) -> Py<PyAny> {
 
 #[pymethods]
 impl Motion {
-    /// Returns the samples and the error that ended the motion; `None` if the motion does not end within this time (s). Every waiting
-    /// thread gets the result.
+    /// Returns the samples and the error that ended the motion. Returns `None` if the motion does not end within `timeout` (s). Every
+    /// waiting thread gets the result.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Came>> {
         let longest = timeout.map(|seconds| number::timeout(seconds, "timeout")).transpose()?;
@@ -101,7 +101,7 @@ impl Motion {
         }
     }
 
-    /// Returns the phase, the progress and the total.
+    /// Returns the phase, the completed part of the phase, and the total.
     fn progress(&self) -> (&'static str, f64, f64) {
         let progress = *lock(&self.progress);
         (progress.phase, progress.done, progress.total)

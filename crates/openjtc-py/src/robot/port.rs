@@ -1,7 +1,9 @@
-//! Line to the controller with a filter: frames that are older than a Stop are not sent, and the Stop itself is sent at once.
+//! Line to the controller with a filter. The filter does not send frames that are older than a Stop. The filter sends the Stop itself
+//! at once.
 //!
-//! This module writes the frames of all jobs, and every wait for the controller reads through this module. Therefore only this module
-//! decides whether a frame may still move the arm. A Stop is written as soon as a caller requests it, even in the middle of a job.
+//! This module writes the frames of all jobs, and every wait for the controller reads through this module. Only the module `port`
+//! therefore decides whether a frame may still move the arm. The module writes a Stop as soon as a caller requests the Stop, even in
+//! the middle of a job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,20 +16,21 @@ use jtc_wire::{FrameType, fixed};
 use super::shared::Shared;
 use crate::threads::lock;
 
-/// Maximum duration of a read before it checks for a requested Stop.
+/// Maximum duration of a read before the port checks whether a Stop was requested.
 const LOOK: Duration = Duration::from_millis(10);
 /// Maximum time between two pieces of a frame. After a longer pause, the port does not expect the missing bytes of the frame any more.
 const PIECE: Duration = Duration::from_millis(50);
-/// Maximum time until the response record of a Stop arrives. Only the status that is being sent can delay the record.
+/// Maximum time until the response record of a Stop arrives. Only a status that is already being sent can delay the response record.
 const RECORD: Duration = Duration::from_millis(200);
-/// Time and number of statuses after which the statuses show a motion that was started.
+/// Time and number of statuses after the start of a motion, until the statuses show this motion.
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
-/// Underlying line.
+/// Line without the filter.
 pub(crate) enum Line {
-    /// A simulator. This variant is separate, so that disturbances can be applied to the simulated arm during any job.
+    /// Line to a simulator. The variant for the simulator is separate, so that disturbances can be applied to the simulated arm during
+    /// any job.
     Simulated(Box<SimPort>),
-    /// A serial port or an agent.
+    /// Line to a serial port or an agent.
     Other(Box<dyn Port>),
 }
 
@@ -46,21 +49,21 @@ macro_rules! each_line {
     };
 }
 
-/// Line with its filter.
+/// Line with the filter.
 pub(crate) struct AnyPort {
     line: Line,
     shared: Arc<Shared>,
     /// Number of Stops at the time when the current request was made.
     at: u64,
-    /// Numbers of handled Stops, in the form of [`Shared::stops`].
+    /// Numbers of handled Stops, in the form that [`Shared::stops`] returns.
     done: (u64, u64),
-    /// Stops and Pauses of other programs that were already handled.
+    /// Number of Stops and Pauses of other programs that were already handled.
     foreign: Halts,
-    /// Number of missing bytes of the frame that is being written, and the time of its last piece.
+    /// Number of missing bytes of the frame that is being written, and the time of the last written piece.
     rest: (usize, Duration),
     /// Time of the last written Stop.
     stopped: Option<Duration>,
-    /// Time of the last written frame that moves the arm, and the number of statuses before it.
+    /// Time of the last written frame that moves the arm, and the number of statuses before this frame.
     begun: (Duration, u64),
 }
 
@@ -94,14 +97,14 @@ impl AnyPort {
         self.done = self.shared.stops();
     }
 
-    /// Returns the remaining time in which the record of the last Stop may still arrive. The record must not be mistaken for the answer
-    /// to a later frame.
+    /// Returns the remaining time in which the record of the last Stop may still arrive. The session must not mistake this record for
+    /// the answer to a later frame.
     pub(crate) fn unsettled(&self) -> Option<Duration> {
         let left = (self.stopped? + RECORD).saturating_sub(self.now());
         (!left.is_zero()).then_some(left)
     }
 
-    /// Returns `true` if the statuses already show the last started motion.
+    /// Returns `true` if the statuses already show the motion that was started last.
     pub(crate) fn is_shown(&self) -> bool {
         let (time, statuses) = BEGUN;
         self.now() >= self.begun.0 + time && self.shared.seen() >= self.begun.1 + statuses
@@ -109,7 +112,7 @@ impl AnyPort {
 
     /// Handles Stops and Pauses of other programs. A Stop cancels all earlier requests of this connection, including waiting requests. A
     /// Pause during a motion does not cancel waiting requests, because they are executed only after the motion is resumed. At rest, a
-    /// Pause cancels requests in the same way as a Stop.
+    /// Pause cancels requests like a Stop.
     fn take_foreign_halts(&mut self) {
         let now = each_line!(port, self => port.halts());
         if now == self.foreign {
@@ -123,7 +126,8 @@ impl AnyPort {
     }
 
     /// Handles a frame that the line withheld because of another program's Stop or Pause. Waiting requests are older than that Stop or
-    /// Pause, so they are cancelled. If an Execute is withheld while a motion remains paused, the waiting requests are not cancelled.
+    /// Pause, so they are cancelled. If the line withholds an Execute while a motion remains paused, the waiting requests are not
+    /// cancelled.
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();
         let stays_paused = moved && frame == fixed::EXECUTE;
@@ -132,8 +136,8 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop frame after a new Stop that must stop every motion. After other Stops, a frame is written only
-    /// while this connection moves the arm.
+    /// Writes a Stop frame after a new Stop that must stop every motion. After other Stops, writes a frame only while this connection
+    /// moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         let now = self.shared.stops();
@@ -154,13 +158,13 @@ impl AnyPort {
         Ok(())
     }
 
-    /// Refuses a frame that moves the arm or starts Teaching, if a Stop came after the request for this frame.
+    /// Refuses a frame that moves the arm or starts Teaching, if a Stop was requested after this frame was requested.
     fn pass(&mut self, frame: &[u8]) -> Result<(), PortError> {
         let moves = frame == fixed::EXECUTE || is_jog(frame);
         if !moves && frame != fixed::TEACHING_MODE_ENABLE {
             return Ok(());
         }
-        // `moves` is set before the check, so that a Stop between these two steps detects a motion.
+        // `moves` is set before the check. A Stop between these two steps therefore detects a motion.
         let moved_before = self.shared.moves();
         if moves {
             self.shared.set_moves(true);
@@ -182,7 +186,7 @@ impl AnyPort {
     }
 }
 
-/// Returns `true` for a jog with a velocity other than 0; a jog with velocity 0 brings the joints to rest.
+/// Returns `true` for a jog with a velocity other than 0. A jog with velocity 0 brings the joints to rest.
 fn is_jog(frame: &[u8]) -> bool {
     match frame {
         [_, kind, _, _, velocities @ .., _, _] => {
@@ -221,7 +225,7 @@ impl Port for AnyPort {
         let whole = if self.rest.0 > 0 && self.now() < self.rest.1 + PIECE {
             self.rest.0
         } else {
-            // The length can be read, because the first piece always contains the complete header.
+            // The length of the frame can be read, because the first piece always contains the complete header.
             length(bytes)
         };
         let written = each_line!(mut port, self => port.write_all(bytes));
@@ -249,7 +253,7 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
-    /// Requests permission to move. The line compares Stops with the time of the request, not with the start time of the job.
+    /// Requests permission to move the arm. The line compares Stops with the time of the request, not with the start time of the job.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         if self.shared.queue.stops() != self.at {

@@ -1,5 +1,5 @@
-//! Queries and changes other than motions: arm, settings, payload, errors and flight recorder. This file also contains the
-//! disturbances of a simulated arm.
+//! Queries, and changes other than motions: arm, settings, payload, errors and flight recorder. The module also applies disturbances
+//! to a simulated arm.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -28,7 +28,7 @@ use crate::{array, json};
 /// Time for which the doctor observes the controller.
 const LOOK: Duration = Duration::from_millis(1500);
 
-/// Returns the measured joint positions (rad); returns an error if a joint has no measurement.
+/// Returns the measured joint positions (rad). Returns an error if a joint has no measurement.
 fn measured(status: &Status) -> Result<[f64; JOINTS], StateError> {
     match Joint::ALL.into_iter().find(|joint| !is_measured(status, joint.index())) {
         Some(joint) => Err(StateError::NotMeasured { joint }),
@@ -68,12 +68,13 @@ pub(super) fn status<'py>(
 
 #[pymethods]
 impl Link {
-    /// Returns the arm of the controller. If the controller cannot report its arm, returns the arm of the caller or the built-in arm.
+    /// Returns the arm of the controller. If the controller cannot report its arm, returns the arm that the caller passed, or the
+    /// built-in arm.
     fn arm(&self, py: Python<'_>) -> PyResult<Arm> {
         Ok(Arm::of(self.call(py, |state, _| state.device_arm())?))
     }
 
-    /// Sends a complete arm to the controller; with `store`, the controller also stores the arm in non-volatile memory.
+    /// Sends a complete arm to the controller. With `store`, the controller also stores the arm in its non-volatile memory.
     fn push_arm(&self, py: Python<'_>, arm: &Arm, store: bool) -> PyResult<()> {
         let arm = Arc::clone(&arm.inner);
         self.call(py, move |state, asked| {
@@ -102,7 +103,7 @@ impl Link {
         self.call(py, |state, _| Ok(state.session.use_defaults()?))
     }
 
-    /// Returns the payload: mass (kg), centre of mass (m), inertia (kg·m²).
+    /// Returns the payload that the controller uses: mass (kg), centre of mass (m), inertia (kg·m²).
     fn payload(&self, py: Python<'_>) -> PyResult<PayloadNumbers> {
         let payload = self.call(py, |state, _| Ok(state.session.payload()?))?;
         Ok((payload.mass, payload.com, payload.inertia))
@@ -113,7 +114,7 @@ impl Link {
         self.call(py, move |state, _| Ok(state.session.set_payload(&payload)?))
     }
 
-    /// Recovers to HoldPos. Returns the steps as text.
+    /// Recovers the controller to HoldPos. Returns the steps as text.
     #[pyo3(signature = (arm=None, defaults=false, accept_device_limits=false))]
     fn recover(
         &self,
@@ -191,8 +192,8 @@ impl Link {
         Ok(all)
     }
 
-    /// Writes settings that are passed as (name, joint, value): either all of them, or none. Joints are counted from
-    /// 1; 0 selects a setting of the whole arm.
+    /// Writes settings that are passed as (name, joint, value). Either all settings are written, or no setting is written. Joints are
+    /// counted from 1; 0 selects a setting of the whole arm.
     fn set_settings(&self, py: Python<'_>, values: Vec<(String, u8, f64)>) -> PyResult<()> {
         let mut given = Vec::new();
         for (name, joint, value) in values {
@@ -202,11 +203,11 @@ impl Link {
             })?;
             given.push(SettingValue { setting: setting.number, joint, value });
         }
-        // All settings are checked before the first one is sent.
+        // All settings are checked before the first setting is sent.
         self.call(py, move |state, _| Ok(state.session.change_settings(&given)?))
     }
 
-    /// Returns the findings of `jtc doctor`, the worst first.
+    /// Returns the findings of `jtc doctor`. The worst finding is first.
     fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.call(py, |state, asked| {
             let mut seen = state.session.examine_until(LOOK, || asked.is_halted())?;
@@ -228,7 +229,7 @@ impl Link {
         Ok(all.into_any())
     }
 
-    /// Reads the log of the flight recorder and replays it.
+    /// Reads the log of the flight recorder and replays the log.
     fn fetch_log(&self, py: Python<'_>) -> PyResult<FlightLog> {
         let account = self.call(py, |state, asked| {
             let log = state.session.fetch_log_until(|| asked.is_halted(), |_, _| {})?;
@@ -280,7 +281,7 @@ impl Link {
         Ok(())
     }
 
-    /// Guides the simulated arm along a trajectory during Teaching, as an operator would do by hand.
+    /// Guides the simulated arm along a trajectory during Teaching, like the hand of an operator.
     fn lead(&self, trajectory: &Trajectory) -> Result<(), Failure> {
         let trajectory = &trajectory.inner;
         let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -289,7 +290,7 @@ impl Link {
         self.worker.touch(move |world| world.lead(path))
     }
 
-    /// Injects the faults of a fault file; the fault times are counted from the start of the simulation.
+    /// Injects the faults of a fault file. The fault times are counted from the start of the simulation.
     fn inject(&self, faults: &str) -> Result<(), Failure> {
         let plan =
             jtc_sim::FaultPlan::from_toml(faults).map_err(|error| Failure::usage(error.to_string()))?;
@@ -297,7 +298,7 @@ impl Link {
     }
 }
 
-/// Returns the samples of all ticks, with the first failure.
+/// Returns the samples of all ticks in the log, and the first failure.
 pub(crate) fn samples(account: &Account) -> Samples {
     Samples::of_log(account.info.clone(), account.replayed.samples(), account.failure.clone())
 }

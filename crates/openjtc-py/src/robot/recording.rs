@@ -1,4 +1,5 @@
-//! Recording of a run: the file is opened before the arm moves and written during the motion.
+//! Recording of a run. The recording file is opened before the arm moves, and is written during the
+//! motion.
 
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions};
@@ -12,7 +13,7 @@ use crate::error::Failure;
 /// Recording of one run.
 pub(super) struct Recording {
     path: PathBuf,
-    /// Temporary file that replaces `path` only at the end, so that an existing file remains until the new file is complete.
+    /// Temporary file that replaces `path` only at the end. An existing file therefore remains until the new file is complete.
     aside: Option<PathBuf>,
     file: Option<File>,
     live: Option<LiveRecorder>,
@@ -56,8 +57,8 @@ impl Recording {
         Ok(self.live.as_ref().map(LiveRecorder::sink))
     }
 
-    /// Completes the file if the arm moved along its trajectory. Otherwise removes the file. A file error is added as a note to the
-    /// finished run.
+    /// Completes the file if the arm moved along its trajectory. If the arm did not move, removes the file. If the file cannot be
+    /// written, adds a note to the finished run.
     pub(super) fn end(self, ran: Result<Ran, Failure>) -> Result<Ran, Failure> {
         let Self { path, aside, file, live } = self;
         let written = aside.as_ref().unwrap_or(&path);

@@ -18,7 +18,7 @@ use crate::threads::lock;
 /// Disturbance of a simulated arm.
 pub(super) type Touch = Box<dyn FnOnce(&mut World) + Send>;
 
-/// Request to a running motion, with the channel for its result.
+/// Request to a running motion, with the channel that returns the result.
 pub(crate) struct Wish {
     pub flow: Flow,
     pub done: Sender<Result<(), Failure>>,
@@ -27,11 +27,11 @@ pub(crate) struct Wish {
 /// Progress of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Progress {
-    /// Phase: "waiting", "approach", "upload", "motion"; empty after the end.
+    /// Phase of the run: "waiting", "approach", "upload", "motion"; empty after the end.
     pub phase: &'static str,
-    /// Completed part of the path in s, or number of uploaded segments.
+    /// Completed part of the phase: time on the path in s, or number of uploaded segments.
     pub done: f64,
-    /// Total of `done`.
+    /// Total of the phase, in the unit of `done`.
     pub total: f64,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Progress {
 pub(crate) struct Shared {
     /// Requests to the thread, and the number of Stops.
     pub queue: Queue<WorkerState, ()>,
-    /// Number of Stops that also stop the arm if another program moves it.
+    /// Number of Stops that also stop the arm if another program moves the arm.
     stops_of_all: AtomicU64,
     /// Number of requested runs that have not ended.
     pending: AtomicUsize,
@@ -48,18 +48,18 @@ pub(crate) struct Shared {
     moves: AtomicBool,
     /// `true` if the thread must end.
     ended: AtomicBool,
-    /// `true` if the thread has ended without a request.
+    /// `true` if the thread has ended without a request to end.
     gone: AtomicBool,
-    /// Number of statuses.
+    /// Number of received statuses.
     seen: AtomicU64,
     /// Requests to the current or next run. The run reads these requests while the arm moves.
     pub wishes: Mutex<VecDeque<Wish>>,
     pub status: Mutex<Option<Status>>,
     /// Disturbances of a simulated arm, applied during any job.
     pub touches: Mutex<Vec<Touch>>,
-    /// Latest speed override that was read or set.
+    /// Latest value of the speed override that was read or set.
     pub speed: Mutex<Option<f64>>,
-    /// Times (s) and positions (rad) of the arm while it was guided by hand.
+    /// Times (s) and joint positions (rad) that were recorded while the arm was guided by hand.
     pub taught: Mutex<Vec<(f64, [f64; JOINTS])>>,
 }
 
@@ -69,12 +69,14 @@ impl Shared {
         self.queue.count_stop();
     }
 
-    /// Announces a Stop that also stops the arm if another program moves it. The Stop itself must follow this call.
+    /// Announces a Stop that also stops the arm if another program moves the arm. The caller must request the Stop
+    /// itself after this call.
     pub(crate) fn will_stop_all(&self) {
         self.stops_of_all.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Returns the number of all Stops, and the number of Stops that also stop the arm if another program moves it.
+    /// Returns the number of all Stops, and the number of Stops that also stop the arm if another program moves the
+    /// arm.
     pub(crate) fn stops(&self) -> (u64, u64) {
         let all = self.queue.stops();
         (all, self.stops_of_all.load(Ordering::SeqCst))
@@ -85,7 +87,7 @@ impl Shared {
         self.ended.load(Ordering::SeqCst)
     }
 
-    /// Ends the thread after its current request. Returns `true` for the first call.
+    /// Makes the thread end after its current request. Returns `true` for the first call.
     pub(crate) fn end(&self) -> bool {
         !self.ended.swap(true, Ordering::SeqCst)
     }
@@ -98,7 +100,7 @@ impl Shared {
         self.moves.store(moves, Ordering::SeqCst);
     }
 
-    /// Returns `true` until every requested run has ended; meanwhile the thread does not answer queries.
+    /// Returns `true` until every requested run has ended. Until then, the thread does not answer queries.
     pub(crate) fn is_running(&self) -> bool {
         self.pending.load(Ordering::SeqCst) > 0
     }
@@ -121,7 +123,7 @@ impl Shared {
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Passes a request to the current run. Without a run, the result channel is dropped.
+    /// Passes a request to the current run. Without a run, the result channel of the request is dropped.
     pub(crate) fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {
@@ -144,13 +146,13 @@ impl Pending {
 impl Drop for Pending {
     fn drop(&mut self) {
         if self.0.pending.fetch_sub(1, Ordering::SeqCst) == 1 {
-            // Dropping the senders tells the waiting threads that the run is over.
+            // When the senders are dropped, the waiting threads detect that the run has ended.
             lock(&self.0.wishes).clear();
         }
     }
 }
 
-/// View of the Stops for one request.
+/// Number of Stops at the time of a request, which shows whether a later Stop cancels the request.
 #[derive(Clone)]
 pub(crate) struct Asked {
     shared: Arc<Shared>,
@@ -158,12 +160,12 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
-    /// Returns the view for a request that is made now.
+    /// Creates the value for a request that is made now.
     pub(crate) fn now(shared: &Arc<Shared>) -> Self {
         Self::after(shared, shared.queue.stops())
     }
 
-    /// Returns the view for a request that was made after `at` Stops.
+    /// Creates the value for a request that was made after `at` Stops.
     pub(crate) fn after(shared: &Arc<Shared>, at: u64) -> Self {
         Self { shared: Arc::clone(shared), at }
     }
@@ -173,7 +175,7 @@ impl Asked {
         self.at
     }
 
-    /// Returns `true` if a Stop came after the request.
+    /// Returns `true` if a Stop was requested after this request.
     pub(crate) fn is_halted(&self) -> bool {
         self.shared.queue.stops() != self.at
     }

@@ -15,15 +15,15 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Starts recording. If a sink exists, the samples are also passed to the sink. Samples that were recorded earlier are kept.
+    /// Starts recording. If a sink exists, the samples are also passed to the sink. Earlier samples are kept.
     pub(crate) fn record(&self, sink: Option<SampleSink>) {
         self.on.set(true);
         self.zero.set(None);
         *self.sink.borrow_mut() = sink;
     }
 
-    /// Records a sample and shifts its time, so that the time of the recording begins at 0. Another motion continues 1 ms
-    /// after the last sample.
+    /// Records a sample. The function shifts the time of the sample, so that the recording begins at time 0. The samples of
+    /// a second motion continue 1 ms after the last sample.
     pub(crate) fn push(&self, sample: &Sample) {
         if !self.on.get() {
             return;
@@ -41,7 +41,7 @@ impl Tape {
         self.samples.borrow_mut().push(sample);
     }
 
-    /// Appends a sample; does not change its time and does not pass it to the sink.
+    /// Appends a sample without changing its time and without passing it to the sink.
     pub(crate) fn keep(&self, sample: &Sample) {
         self.samples.borrow_mut().push(*sample);
     }
@@ -52,7 +52,7 @@ impl Tape {
         self.sink.borrow_mut().take();
     }
 
-    /// Stops recording and returns the samples.
+    /// Stops recording and returns the recorded samples.
     pub(crate) fn take(&self) -> Vec<Sample> {
         self.pause();
         self.samples.take()

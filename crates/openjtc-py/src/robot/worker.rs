@@ -27,13 +27,13 @@ const STANDSTILL: Duration = Duration::from_secs(15);
 /// Result of a wait.
 pub(super) enum Waited<T> {
     Came(T),
-    /// A result can no longer arrive.
+    /// The result of the request can no longer arrive.
     Gone,
-    /// The time has passed without a result.
+    /// The result of the request has not arrived within the waiting time.
     NotYet,
 }
 
-/// The connection's thread.
+/// Thread of a connection.
 pub(super) struct Worker {
     simulated: bool,
     process: Process,
@@ -43,14 +43,14 @@ pub(super) struct Worker {
     thread: Mutex<Option<JoinHandle<()>>>,
 }
 
-/// Returns the error for a closed connection.
+/// Returns the error that a call on a closed connection raises.
 pub(super) fn closed() -> Failure {
     Failure::new(ErrorKind::NoLink, "closed", "the connection is closed")
         .next("connect again: `openjtc.connect(…)`")
 }
 
 impl Worker {
-    /// Starts the thread, which then connects.
+    /// Starts the thread. The thread then connects to the controller.
     pub(super) fn begin(py: Python<'_>, target: Target) -> PyResult<Self> {
         let shared = Arc::<Shared>::default();
         let simulated = matches!(target.way, Way::Simulated(_));
@@ -79,8 +79,8 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Puts a request that was made after `at` Stops into the queue, and returns the channel for its result. If a later Stop comes
-    /// before the request begins, the request is refused.
+    /// Puts a request that was made after `at` Stops into the queue, and returns the channel for the result. If a later Stop is requested
+    /// before this request begins, the request is refused.
     pub(super) fn ask<T: Send + 'static>(
         &self,
         at: u64,
@@ -89,7 +89,7 @@ impl Worker {
         let asked = Asked::after(&self.shared, at);
         self.put(at, move |state| {
             state.begin(&asked)?;
-            // The call of `begin` may have waited, and a Stop may have come meanwhile.
+            // The call of `begin` may have waited, and a Stop may have been requested during this time.
             if asked.is_halted() {
                 return Err(jtc_host::Error::Cancelled.into());
             }
@@ -112,7 +112,7 @@ impl Worker {
         Ok(came)
     }
 
-    /// Requests a Stop. `job` is executed before all other requests.
+    /// Requests a Stop. The thread executes `job` before all other requests.
     fn overtake<T: Send + 'static>(
         &self,
         job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
@@ -132,8 +132,8 @@ impl Worker {
         }
     }
 
-    /// Checks that the thread belongs to this process, not to its parent before a fork. In a forked process, the locks
-    /// may never be released.
+    /// Checks that the thread belongs to this process. After a fork, the thread belongs to the parent process, and locks in the child
+    /// process may never be released.
     fn is_here(&self) -> Result<(), Failure> {
         if self.is_foreign() {
             return Err(closed()
@@ -142,7 +142,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Returns the number of Stops so far. The next Stop refuses every earlier request.
+    /// Returns the number of Stops so far. The next Stop cancels every request that was made before it.
     pub(super) fn now(&self) -> Result<u64, Failure> {
         self.is_here()?;
         Ok(self.shared.queue.stops())
@@ -155,14 +155,14 @@ impl Worker {
         }
     }
 
-    /// Stops the arm, even if another program moves it, and waits for standstill. All earlier requests are cancelled.
+    /// Stops the arm, even if another program moves the arm, and waits for standstill. All earlier requests are cancelled.
     pub(super) fn stop(&self, py: Python<'_>) -> PyResult<()> {
         self.shared.will_stop_all();
         let came = self.overtake(WorkerState::stop)?;
         Ok(self.wait(py, came)??)
     }
 
-    /// Puts a request into the queue and waits for its result.
+    /// Puts a request into the queue and waits for the result.
     pub(super) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -172,7 +172,7 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// Like [`Self::call`], for requests that a Stop does not cancel, because they only read data or end Teaching.
+    /// Like [`Self::call`], for requests that a Stop does not cancel. Requests of this kind only read data or end Teaching.
     pub(super) fn call_always<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -182,11 +182,11 @@ impl Worker {
         Ok(self.wait(py, came)??)
     }
 
-    /// Waits for a result without the GIL. Ctrl-C stops the arm, and the exception is raised after standstill.
+    /// Waits for a result without the GIL. Ctrl-C stops the arm, and the exception is raised when the arm is at rest.
     pub(super) fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
-                // Handles a Ctrl-C that arrived together with the result, because Python itself would not stop the arm.
+                // Handles a Ctrl-C that arrived together with the result. After such a Ctrl-C, Python itself would not stop the arm.
                 self.look_for_signals(py)?;
                 Ok(result)
             }
@@ -194,7 +194,8 @@ impl Worker {
         }
     }
 
-    /// Like [`Self::wait`], but waits at most for this time. If several threads wait for one result, exactly one thread receives it.
+    /// Like [`Self::wait`], but waits at most for this time. If several threads wait for one result, exactly one thread receives the
+    /// result.
     pub(super) fn wait_for<T: Send>(
         &self,
         py: Python<'_>,
@@ -226,7 +227,7 @@ impl Worker {
         }
     }
 
-    /// Sleeps for `time`; other threads can run meanwhile.
+    /// Sleeps for `time`. Other Python threads can run during the sleep.
     pub(super) fn pass(&self, py: Python<'_>, time: Duration) -> PyResult<()> {
         py.detach(|| std::thread::sleep(time));
         self.look_for_signals(py)
@@ -237,7 +238,7 @@ impl Worker {
         py.check_signals().inspect_err(|_| self.rest(py))
     }
 
-    /// Stops the motion of this connection, cancels all earlier requests, and waits for standstill. If a signal arrives, the wait ends.
+    /// Stops the motion of this connection, cancels all earlier requests, and waits for standstill. A signal ends the wait.
     pub(super) fn rest(&self, py: Python<'_>) {
         let Ok(came) = self.overtake(WorkerState::rest).map(Mutex::new) else { return };
         let end = Instant::now() + STANDSTILL;
@@ -249,7 +250,7 @@ impl Worker {
         }
     }
 
-    /// Applies a disturbance to the simulated arm, during any job.
+    /// Applies a disturbance to the simulated arm. The thread applies disturbances during any job.
     pub(super) fn touch(&self, touch: impl FnOnce(&mut World) + Send + 'static) -> Result<(), Failure> {
         if self.is_closed() {
             return Err(closed());
@@ -262,13 +263,13 @@ impl Worker {
         Ok(())
     }
 
-    /// Takes no further requests, stops the motion and the teaching of this connection, waits for standstill, and ends the connection.
-    /// Requests that wait are refused, except Stops. A signal ends the wait. A second caller only waits.
+    /// Refuses further requests, stops the motion and the teaching of this connection, waits for standstill, and ends the connection.
+    /// Waiting requests are refused, except Stops. A signal ends the wait. A second caller only waits for the end.
     pub(super) fn end(&self, py: Python<'_>) -> PyResult<()> {
         if self.is_foreign() || self.shared.is_gone() {
             return Ok(());
         }
-        // The flag is set before the Stop, so that a request cannot begin after the Stop.
+        // The end of the connection is marked before the Stop, so that no request can begin after the Stop.
         let rested = match self.shared.end() {
             true => {
                 self.overtake(WorkerState::rest).map_err(PyErr::from).and_then(|came| self.wait(py, came))
@@ -292,7 +293,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // The motion is stopped, because no caller supervises it any more. The thread ends after the motion.
+        // The motion is stopped, because no caller supervises the motion any more. The thread ends after the motion.
         self.halt();
         self.shared.end();
         if !self.is_foreign() {
@@ -301,7 +302,7 @@ impl Drop for Worker {
     }
 }
 
-/// Returns the function of a request for the queue, and the channel for its result.
+/// Returns the function that the queue runs for a request, and the channel for the result.
 fn act<T: Send + 'static>(
     job: impl FnOnce(&mut WorkerState) -> Result<T, Failure> + Send + 'static,
 ) -> (Act<WorkerState>, Receiver<Result<T, Failure>>) {
@@ -316,13 +317,13 @@ fn act<T: Send + 'static>(
             state.shared.queue.done();
             result
         });
-        // The caller may have stopped waiting.
+        // The caller may have stopped waiting for the result.
         let _ = done.send(result);
     };
     (Box::new(act), came)
 }
 
-/// Closes the queue when the thread ends, for any reason, so that a caller does not wait forever for an answer.
+/// Guard that closes the queue when the thread ends for any reason. A caller therefore does not wait forever for an answer.
 struct Closing(Arc<Shared>);
 
 impl Drop for Closing {
@@ -331,8 +332,8 @@ impl Drop for Closing {
     }
 }
 
-/// Executes the requests in order. Reads statuses between requests, so that the last status is always recent. At the end, executes
-/// the waiting Stops and stops a motion of this connection.
+/// Executes the requests in order. Reads statuses between requests, so that the last status is always recent. At the end, executes the
+/// waiting Stops, and stops a motion of this connection.
 fn serve(state: &mut WorkerState) {
     let shared = Arc::clone(&state.shared);
     while !shared.has_ended() || shared.queue.stop_waits() {
@@ -356,6 +357,6 @@ fn serve(state: &mut WorkerState) {
         }
     }
     shared.queue.close();
-    // An error is ignored, because no caller can receive it.
+    // An error is ignored, because no caller can receive it here.
     let _ = state.rest();
 }

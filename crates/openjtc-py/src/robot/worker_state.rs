@@ -22,13 +22,13 @@ use crate::error::Failure;
 
 /// Maximum wait for a status between jobs.
 const IDLE: Duration = Duration::from_millis(10);
-/// Maximum delay that a simulator catches up. After a larger delay, the simulator skips the missed time.
+/// Maximum delay for which a simulator catches up with real time. After a larger delay, the simulator skips the missed time.
 const BEHIND: Duration = Duration::from_millis(100);
 
 /// A simulated controller with its arm.
 pub(crate) struct Simulated {
     pub seed: u64,
-    /// Speed as a factor of real time. `None` means as fast as possible; simulated time then passes only while a caller waits.
+    /// Speed as a factor of real time. `None` means as fast as possible. Simulated time then passes only while a caller waits.
     pub speed: Option<f64>,
     pub faults: FaultPlan,
     /// Payload of the simulated arm that the controller does not know.
@@ -38,12 +38,12 @@ pub(crate) struct Simulated {
 /// Kind of connection.
 pub(crate) enum Way {
     Simulated(Box<Simulated>),
-    /// Serial port and its bit rate, or the agent that owns this port.
+    /// Serial port and its bit rate. If an agent owns the port, the connection uses the agent.
     Serial {
         path: String,
         baud: u32,
     },
-    /// `http://…` or `https://…`.
+    /// Agent at `http://…` or `https://…`.
     Agent {
         url: String,
     },
@@ -52,9 +52,9 @@ pub(crate) enum Way {
 /// Target and credentials of a connection.
 pub(crate) struct Target {
     pub way: Way,
-    /// Arm that the caller passed.
+    /// Arm that the caller passed to `connect`.
     pub arm: Option<Arc<Arm>>,
-    /// Name that agents show to other clients.
+    /// Name of this program that agents show to other clients.
     pub name: String,
     pub token: Option<String>,
     pub certificates: Option<PathBuf>,
@@ -63,20 +63,20 @@ pub(crate) struct Target {
 /// State of the worker.
 pub(crate) struct WorkerState {
     pub session: Session<AnyPort>,
-    /// Arm that the caller passed, or else the built-in arm. If the controller has extensions, its own arm is used instead.
+    /// Arm that the caller passed, or the built-in arm. If the controller has extensions, the arm of the controller is used instead.
     pub arm: Arc<Arm>,
     /// `true` if the caller passed an arm.
     pub named: bool,
     pub shared: Arc<Shared>,
     pub tape: Rc<Tape>,
-    /// `true` if time passes without calls, as on a real controller.
+    /// `true` if time passes between calls, as on a real controller.
     time_passes: bool,
     /// `true` if this connection has enabled Teaching, or may have enabled it.
     pub teaching: bool,
 }
 
 impl WorkerState {
-    /// Connects. A simulated controller receives its parameters and then holds its arm.
+    /// Connects to the controller. A simulated controller receives its parameters and then holds its arm.
     pub(crate) fn open(target: Target, shared: Arc<Shared>, asked: &Asked) -> Result<Self, Failure> {
         let arm = target.arm.clone().unwrap_or_else(|| Arc::new(Arm::avena()));
         let (tape, pace) = (Rc::<Tape>::default(), Rc::<Cell<Option<f64>>>::default());
@@ -98,7 +98,7 @@ impl WorkerState {
             state.bring_up(stored, asked)?;
             pace.set(speed);
         } else {
-            // A controller that does not answer is reported here, not at the first motion.
+            // If the controller does not answer, the error is reported here and not at the first motion.
             state.session.fresh_status()?;
         }
         Ok(state)
@@ -122,8 +122,8 @@ impl WorkerState {
         self.session.port().name()
     }
 
-    /// Begins a job. Frames that move the arm are sent until a Stop comes. A late answer to an earlier Stop is not mistaken for
-    /// an answer to this job.
+    /// Begins a job. The port sends frames that move the arm until a Stop is requested. The job does not mistake a late answer to an
+    /// earlier Stop for its own answer.
     pub(crate) fn begin(&mut self, asked: &Asked) -> Result<(), Failure> {
         self.session.port_mut().begin(asked.at());
         if let Some(time) = self.session.port().unsettled() {
@@ -132,12 +132,12 @@ impl WorkerState {
         Ok(())
     }
 
-    /// Returns `true` if time passes without calls, so that statuses also arrive without a job.
+    /// Returns `true` if time passes between calls. Statuses then also arrive without a job.
     pub(crate) fn time_passes(&self) -> bool {
         self.time_passes
     }
 
-    /// Reads statuses between jobs. If the line is lost, the next job reports this.
+    /// Reads statuses between jobs. If the line is lost, the next job reports the loss.
     pub(crate) fn idle(&mut self) {
         match self.session.poll(IDLE) {
             Ok(_) => {}
@@ -145,19 +145,21 @@ impl WorkerState {
         }
     }
 
-    /// Returns the arm of the controller. If the controller cannot report its arm, returns the arm of the caller or the built-in arm.
+    /// Returns the arm of the controller. If the controller cannot report its arm, returns the arm that the caller passed, or the
+    /// built-in arm.
     pub(crate) fn device_arm(&mut self) -> Result<Arm, Failure> {
         let mut arm = match self.session.info()? {
             None => return Ok((*self.arm).clone()),
             Some(info) if self.arm.hash().ok().flatten() == Some(info.hash) => return Ok((*self.arm).clone()),
             Some(_) => self.session.device_arm()?,
         };
-        // A controller does not store poses.
+        // A controller does not store poses, so the poses are copied from the arm of this connection.
         arm.poses = self.arm.poses.clone();
         Ok(arm)
     }
 
-    /// Like [`Self::device_arm`], for motions: returns an error if the arm of the caller differs from the arm of the controller.
+    /// Like [`Self::device_arm`], for motions. Returns an error if the arm that the caller passed differs from the arm of the
+    /// controller.
     pub(crate) fn arm_to_move(&mut self) -> Result<Arm, Failure> {
         let arm = self.device_arm()?;
         let differences = if self.named { self.arm.differences(&arm) } else { Vec::new() };
@@ -175,13 +177,13 @@ impl WorkerState {
         ))
     }
 
-    /// Returns an error if the arm of the caller differs from the arm of the controller.
+    /// Returns an error if the arm that the caller passed differs from the arm of the controller.
     pub(crate) fn same_arm(&mut self) -> Result<(), Failure> {
         if self.named { self.arm_to_move().map(drop) } else { Ok(()) }
     }
 }
 
-/// Opens a port to a simulated controller. The flag is `true` if the arm is stored in the memory of the controller.
+/// Opens a port to a simulated controller. The returned flag is `true` if the arm is stored in the memory of the controller.
 fn simulator(
     simulated: Simulated,
     arm: &Arm,
@@ -234,7 +236,7 @@ fn agent(url: &str, target: &Target) -> Result<Box<dyn Port>, Failure> {
     Ok(Box::new(AgentPort::open(url, &options)?))
 }
 
-/// Reads the token of the operator from the token file of the local agent. Without a token, the agent itself reports the refusal.
+/// Reads the token of the operator from the token file of the local agent. Without a token, the agent itself refuses the connection.
 fn operator(file: &std::path::Path) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Tokens {
@@ -252,7 +254,7 @@ fn serial(path: &str, baud: u32, target: &Target) -> Result<Box<dyn Port>, Failu
     }
 }
 
-/// From now on, publishes every status that the session receives in any procedure.
+/// Publishes every status that the session receives from now on, in any procedure.
 pub(crate) fn observe(session: &mut Session<AnyPort>, shared: &Arc<Shared>) {
     let shared = Arc::clone(shared);
     session.observe(move |_, status| shared.publish(status));

@@ -1,4 +1,4 @@
-//! Alarms that report problems of running boards. Each alarm is raised once, as an exception.
+//! Alarms that report problems of running boards. Each alarm is raised once, as a Python exception.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use ucom_host::session::{Change, SessionError};
 use crate::error::Failure;
 use crate::threads::lock;
 
-/// Alarms that were not raised yet: boards that were lost or have left their control loops, and other failures.
+/// Alarms that were not raised yet. The alarms report boards that were lost or have left their control loops, and other failures.
 #[derive(Default)]
 pub(super) struct Alarms(Mutex<Waiting>);
 
@@ -36,7 +36,7 @@ impl Alarms {
         }
     }
 
-    /// Records that another board has the number of a running board, so that a command moves both boards.
+    /// Records that another board has the number of a running board. A command to this number moves both boards.
     pub(super) fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
         let mut own = Failure::from(SessionError::from(Error::from(error)));
@@ -50,8 +50,8 @@ impl Alarms {
         lock(&self.0).others.push_back(failure);
     }
 
-    /// Reports lost boards, and boards that have left their control loops; each of them once. Later calls report the
-    /// other failures, one per call.
+    /// Reports lost boards, and boards that have left their control loops. Each board is reported once. Later calls report the other
+    /// failures, one failure per call.
     pub(super) fn check(&self) -> Result<(), Failure> {
         let (lost, rebooted, left) = {
             let mut waiting = lock(&self.0);

@@ -29,7 +29,7 @@ type Object<'py> = PyResult<Bound<'py, PyAny>>;
 /// Board number, name and value as Python passes them.
 type Given = (Option<u8>, String, String);
 
-/// Year, month and day.
+/// Date as year, month and day.
 type Day = (u16, u8, u8);
 
 /// Chain of boards on a bus.
@@ -55,7 +55,7 @@ fn assignments(values: Vec<Given>) -> Result<Vec<Assignment>, Failure> {
 }
 
 impl Chain {
-    /// Reads a parameter file in the calling thread, because the thread of the session must not wait for a disk.
+    /// Reads a parameter file. The calling thread does this, because the thread of the session must not wait for a disk.
     fn parameter_file(&self, py: Python<'_>, path: &Path) -> Result<ParameterFile, Failure> {
         let inventory = self.inventory_file.clone().unwrap_or_default();
         Ok(py.detach(|| ParameterFile::read(path, &inventory, |_| true)).map_err(SessionError::from)?)
@@ -120,7 +120,7 @@ impl Chain {
         &self.url
     }
 
-    /// Returns the load, the frame counts and the time of the bus.
+    /// Returns the load of the bus, the frame counts and the time of this state.
     fn bus<'py>(&self, py: Python<'py>) -> Object<'py> {
         plain(py, self.owner.shared.bus())
     }
@@ -144,7 +144,7 @@ impl Chain {
     fn init<'py>(&self, py: Python<'py>, renew: bool, force: bool, check: bool) -> Object<'py> {
         let after = self.owner.now()?;
         let file = self.inventory_file.as_deref();
-        // The file is read here, because the thread of the session must not wait for a disk.
+        // The calling thread reads the file, because the thread of the session must not wait for a disk.
         let read = py.detach(|| file.filter(|file| file.exists()).map(Inventory::read).transpose());
         let listed = read.map_err(|e| Failure::usage(e.to_string()))?;
         let init = move |state: &mut _| procedures::init(state, listed, (renew, force, check));
@@ -326,7 +326,7 @@ impl Chain {
         let (second, profile) = (source(second), &self.profile);
         let any_date = date.0.is_none();
         let read = Read { raw, addresses, fill_gaps, name_target, date: date.0, today: date.1 };
-        // The file is read here, because the thread of the session must not wait for a disk.
+        // The calling thread reads the file, because the thread of the session must not wait for a disk.
         let (image, second, date) = py.detach(|| read.read(&first, second.as_ref(), profile))?;
         let update = Update {
             boards: self::boards(boards)?,

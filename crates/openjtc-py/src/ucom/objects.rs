@@ -37,7 +37,7 @@ pub(super) fn boards(seen: &[BoardSeen], profile: &Profile, inventory: Option<&I
     seen.iter().map(|one| board(one, profile, inventory)).collect()
 }
 
-/// Returns the findings as text. Commands in the text are written as a user types them.
+/// Returns the findings as text. Commands in the text have the form in which a user types them.
 pub(super) fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
@@ -79,7 +79,8 @@ fn signal(index: usize, text: &str, signal: &Signal) -> Value {
     })
 }
 
-/// Converts the words of a buffer to pairs of name and value, in the order of the buffer. A value is null if it is unknown.
+/// Converts the words of a buffer to pairs of name and value, in the order of the buffer. The value of an unknown word is
+/// null.
 pub(super) fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     let pair = |(index, key): (usize, String)| {
         let word = words.get(index).copied().flatten();
@@ -89,13 +90,13 @@ pub(super) fn named(known: &Known, kind: Kind, words: &[Option<u16>]) -> Value {
     known.keys(kind).into_iter().enumerate().map(pair).collect()
 }
 
-/// Like [`named`], for outputs: all words are known.
+/// Like [`named`], for outputs. All words of the outputs are known.
 pub(super) fn outputs(known: &Known, words: &[u16]) -> Value {
     named(known, Kind::So, &words.iter().copied().map(Some).collect::<Vec<_>>())
 }
 
-/// Returns the inputs that were set last, or else the initial inputs of the board, and the parameters that this session
-/// has written.
+/// Returns the inputs of a board and the parameters that this session has written. The inputs are the inputs that were set
+/// last, or else the initial inputs of the board.
 pub(super) fn settings(known: &Known, master: &Master) -> (Value, Value) {
     let parameter = |value: &ParValue| match value {
         ParValue::Assumed(word) => Some(*word),

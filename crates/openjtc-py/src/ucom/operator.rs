@@ -10,7 +10,7 @@ use ucom_host::session::{Held, Link, Notice, Operator};
 
 use super::shared::{Halt, Shared};
 
-/// State that the owner's thread keeps between turns.
+/// State that the thread of the session keeps between turns.
 #[derive(Default)]
 struct Local {
     /// `true` after the Stop at the end of the session was sent.
@@ -31,7 +31,8 @@ impl Hand {
         Self { shared, held, local: RefCell::default() }
     }
 
-    /// Reports a change of a running board as an event. Raises an alarm if the board was lost or left its loop without a command.
+    /// Reports a change of a running board as an event. Raises an alarm if the board was lost, or if it left its control loop
+    /// without a command.
     pub(super) fn noticed(shared: &Shared, held: &Held, notice: &Notice, text: Option<&String>) {
         let Notice { board, change, time_s, .. } = *notice;
         let text = notice.text().or_else(|| text.cloned());
@@ -65,7 +66,7 @@ impl Operator for Hand {
                 }
                 return;
             }
-            // For running boards, another event already reports this.
+            // For running boards, another event already reports the reboot.
             Event::Supervision { change: Supervision::UnknownRebooted { .. }, .. } => ("rebooted", None),
             Event::Supervision { .. } => return,
             Event::BoardError { board, .. } => ("error", Some(*board)),
@@ -94,8 +95,8 @@ impl Operator for Hand {
         let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
-            // The running request must undo its changes, possibly on boards that do not answer. Therefore the Stop is sent
-            // first, so that no board continues to run during this time.
+            // The running request must undo its changes, possibly on boards that do not answer. The Stop is therefore sent first,
+            // so that no board continues to run during this time.
             local.end_sent = true;
             halts.push(Halt::Started);
         }

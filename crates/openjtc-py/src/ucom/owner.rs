@@ -19,7 +19,7 @@ use crate::threads::{Process, join, lock};
 /// Interval of the checks for signals (Ctrl-C) while Python waits.
 pub(super) const LOOK: Duration = Duration::from_millis(50);
 
-/// Message to a waiting call.
+/// Message to a call that waits.
 enum Message<T> {
     Progress(Value),
     Done(Result<T, Failure>),
@@ -41,7 +41,7 @@ impl Owner {
         let shared = Arc::new(Shared::default());
         let own = shared.clone();
         let thread = std::thread::spawn(move || {
-            // This guard ensures that callers do not wait forever after a fault of this thread.
+            // With this guard, callers do not wait forever after a fault of this thread.
             let gone = Gone(&own);
             let mut state = WorkerState::new(own.clone(), config, link);
             match state.serve() {
@@ -70,7 +70,7 @@ impl Owner {
         self.call_after(py, after, act)
     }
 
-    /// Like [`Self::call`], for a request that was made after the Stop with this number: see [`Self::now`].
+    /// Like [`Self::call`], for a request that was made after the Stop with the number `after`: see [`Self::now`].
     pub(super) fn call_after<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -80,15 +80,15 @@ impl Owner {
         self.call_with(py, (Kind::Command, after), None, |state, _| act(state))
     }
 
-    /// Returns the number of the last Stop. A method that reads files before its request must call this function first, so that a Stop
-    /// during the reading is detected.
+    /// Returns the number of the last Stop. A method that reads files before its request must call this function first. A Stop while
+    /// the method reads the files is then detected.
     pub(super) fn now(&self) -> Result<u64, Failure> {
         // In a forked process, the lock of the queue may never be released.
         self.is_here()?;
         Ok(self.shared.queue.stops())
     }
 
-    /// Like [`Self::call_after`]; `progress` is called with each report.
+    /// Like [`Self::call_after`], but calls `progress` with each progress report.
     pub(super) fn call_with<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -109,7 +109,7 @@ impl Owner {
                 }),
                 Received::Nothing => Ok(()),
             };
-            // Signals are checked here as well, because reports may arrive without a pause.
+            // The loop also checks signals here, because reports may arrive without a pause.
             let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
                 self.shared.queue.cancel(|request| *request == id);
@@ -120,16 +120,16 @@ impl Owner {
         }
     }
 
-    /// Adds the result of each board to the exception that ended an update, because the update returns no report.
+    /// Adds the result of each board to the exception that ended an update. An update that ends with an exception returns no report.
     fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
         for text in self.shared.outcomes(after) {
-            // Errors are ignored: exceptions have notes only since Python 3.11, and the events contain these texts, too.
+            // Errors are ignored, because exceptions have notes only since Python 3.11 and the events contain these texts, too.
             let _ = error.value(py).call_method1("add_note", (text,));
         }
     }
 
-    /// After a Ctrl-C, stops all boards that this session has started, and waits for the end of the stop. Another Ctrl-C
-    /// only ends the wait.
+    /// After a Ctrl-C, stops all boards that this session has started, and waits for the end of the stop. A second Ctrl-C only ends
+    /// the wait.
     pub(super) fn interrupted(&self, py: Python<'_>) {
         if !self.process.is_this() {
             return;
@@ -145,7 +145,7 @@ impl Owner {
         }
     }
 
-    /// Stops boards at once, even in the middle of a request, then runs `act`.
+    /// Stops boards at once, even in the middle of a request, and then runs `act`.
     pub(super) fn stop<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -157,13 +157,13 @@ impl Owner {
         loop {
             match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
-                // If a signal arrives, another stop is not needed here.
+                // After a signal, another stop is not needed here.
                 _ => py.check_signals()?,
             }
         }
     }
 
-    /// Checks that the thread belongs to this process, not to its parent before a fork.
+    /// Checks that the thread belongs to this process. After a fork, the thread belongs to the parent process.
     fn is_here(&self) -> Result<(), Failure> {
         match self.process.is_this() {
             true => Ok(()),
@@ -176,7 +176,7 @@ impl Owner {
         }
     }
 
-    /// Requests a Stop: the stop frames of `halt` are sent at once, and `act` runs before all other requests.
+    /// Requests a Stop. The thread sends the stop frames of `halt` at once, and runs `act` before all other requests.
     fn overtake<T: Send + 'static>(
         &self,
         halt: Halt,
@@ -184,13 +184,13 @@ impl Owner {
     ) -> Answers<T> {
         let (id, act, answers) = self.request(|state, _| act(state));
         self.shared.queue.stop(id, act);
-        // The current request is cancelled first, so that it sends nothing after these frames.
+        // The current request is cancelled first, so that it sends no frame after the stop frames.
         self.shared.halt(halt);
         self.shared.queue.refuse_late();
         answers
     }
 
-    /// Returns the number of a new request, its function for the queue, and the channel for its answers.
+    /// Returns the number of a new request, the function that the queue runs for it, and the channel for the answers.
     fn request<T: Send + 'static>(
         &self,
         act: impl FnOnce(&mut WorkerState, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
@@ -221,7 +221,7 @@ impl Owner {
         })
     }
 
-    /// Stops all boards that this session has started, and releases the bus. Returns the boards for which the stop is not certain.
+    /// Stops all boards that this session has started, and releases the bus. Returns the boards that may not be stopped.
     pub(super) fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         if !self.process.is_this() {
             // A forked process does not have the thread, and the boards belong to the parent process.
@@ -235,7 +235,7 @@ impl Owner {
 
 impl Drop for Owner {
     fn drop(&mut self) {
-        // The thread stops the started boards. The destructor does not wait, because the caller may hold the GIL.
+        // The thread stops the started boards. The destructor does not wait for the thread, because the caller may hold the GIL.
         self.shared.end();
     }
 }

@@ -1,4 +1,4 @@
-//! Procedures of a chain of boards. The functions call `ucom-host` in the same order as the `ucom` command does.
+//! Procedures of a chain of boards. The functions call `ucom-host` in the same order as the command `ucom` does.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::error::Failure;
 /// Time for which the doctor listens to the bus before it sends queries.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Returns the profile that a file contains, or the default profile. `on_lost` replaces the reaction to a lost board.
+/// Returns the profile in a file, or the default profile. `on_lost` replaces the reaction to a lost board.
 pub(super) fn profile(path: Option<&Path>, on_lost: Option<&str>) -> Result<Profile, Failure> {
     let mut profile = match path {
         None => Profile::default(),
@@ -71,14 +71,14 @@ pub(super) fn scan(state: &mut WorkerState) -> Result<Value, Failure> {
     }))
 }
 
-/// Resets and numbers the whole chain. `listed` is the current content of the inventory file. Returns the new inventory; the caller writes
-/// it, because a slow disk would delay the heartbeats here.
+/// Resets and numbers the whole chain. `listed` is the current content of the inventory file. Returns the new inventory. The caller writes
+/// the new inventory to the file, because a slow disk would delay the heartbeats here.
 pub(super) fn init(
     state: &mut WorkerState,
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
 ) -> Result<(Value, Option<Inventory>), Failure> {
-    // The comparison includes changes that another program has written to the file.
+    // The comparison includes changes that another program has made in the inventory file.
     state.inventory = listed.or_else(|| state.inventory.take().map(Inventory::without_records));
     let compared = state.inventory.as_ref().filter(|_| state.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());
@@ -182,8 +182,8 @@ pub(super) fn xreset(state: &mut WorkerState, boards: &Boards, force: bool) -> R
     Ok(numbered(state, &all))
 }
 
-/// Resets boards (PC_RESET), either all at once or one after the other. Returns the low byte of the flash number of
-/// each board that sent a report.
+/// Resets boards (PC_RESET), either all boards at once or one board after the other. Returns the low byte of the flash number of each
+/// board that sent a report.
 pub(super) fn reset(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Vec<u8>, Failure> {
     let targets: Vec<Option<u8>> = match boards {
         Boards::All => vec![None],
@@ -232,7 +232,7 @@ pub(super) fn repair(
     }
 }
 
-/// Listens to the bus, sends queries if they cannot disturb it, and reports the findings.
+/// Listens to the bus, queries the boards if queries cannot disturb the bus, and reports the findings.
 pub(super) fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
     let seen = state.driver.examine(LISTEN)?;
     let profile = state.driver.master.profile();
@@ -243,7 +243,7 @@ pub(super) fn doctor(state: &mut WorkerState) -> Result<Value, Failure> {
     }))
 }
 
-/// Reads the image file of the board application, as the bytes that are sent to the board.
+/// Reads the image file of a board's application. Returns the bytes that would be sent to the board.
 pub(super) fn probed_image(path: &Path) -> Result<Arc<[u8]>, Failure> {
     let image = Image::read(path, &ImageOptions::default()).map_err(|e| Failure::usage(e.to_string()))?;
     Ok(image.into_bytes().into())

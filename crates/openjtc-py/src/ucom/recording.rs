@@ -1,4 +1,4 @@
-//! Recording of the bus to a file: the bus of the session passes its frames to a separate thread, which may wait for a disk.
+//! Recording of the bus to a file. The bus of the session passes its frames to a separate thread, which may wait for a disk.
 
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -15,13 +15,13 @@ use ucom_host::session::{Prompt, Recorder};
 use crate::error::Failure;
 use crate::threads::{Process, lock};
 
-/// Interval at which the recorded frames are written to the file.
+/// Interval at which the thread writes the recorded frames to the file.
 const FLUSH: Duration = Duration::from_secs(1);
 
 /// Session time in µs, time since 1970 in ns, and the frame.
 struct Taken(u64, u64, CanFrame);
 
-/// Destination of frames during a recording.
+/// Channel to the current recording, if a recording is in progress.
 #[derive(Clone, Default)]
 pub(super) struct Sink(Arc<Mutex<Option<Sender<Taken>>>>);
 
@@ -35,12 +35,12 @@ impl Sink {
     }
 }
 
-/// Wrapper of a bus that copies frames to a recording. The waits of this wrapper are short.
+/// Wrapper of a bus that copies frames to a recording. The wrapper never waits long.
 pub(super) struct Tap {
     bus: Prompt,
     sink: Sink,
     start: Instant,
-    /// Wall-clock time of the start. Later times are computed from this time, so that the times in a file never decrease
+    /// Wall-clock time of the start. Later times are computed from this time. The times in a file therefore never decrease
     /// when the clock is changed.
     began_at: Duration,
 }
@@ -55,7 +55,7 @@ impl Tap {
         if let Some(sender) = &*lock(&self.sink.0) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // An error is ignored: if the disk is full, the writer has ended and reports the error itself.
+            // An error is ignored. If the disk is full, the writer has ended and reports the error itself.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }
     }
@@ -85,7 +85,8 @@ impl CanBus for Tap {
     }
 }
 
-/// Result of a recording: number of written frames, and number of omitted frames, whose protocol the format cannot store.
+/// Result of a recording: number of written frames, and number of omitted frames. A frame is omitted if the file format
+/// cannot store its protocol.
 type Written = Result<(u64, u64), RecordingError>;
 
 /// A recording that is being written.
@@ -97,7 +98,7 @@ pub(super) struct ChainRecording {
 }
 
 impl ChainRecording {
-    /// Begins a recording. The file extension selects the format.
+    /// Begins a recording. The file extension selects the file format.
     pub(super) fn begin(sink: Sink, path: &Path, profile: Profile, channel: &str) -> Result<Self, Failure> {
         let ending = path.extension().map(|e| e.to_string_lossy().into_owned());
         let known = ["log", "candump", "fzi", "fzican", "mcap"];
@@ -148,7 +149,7 @@ impl ChainRecording {
 
 impl Drop for ChainRecording {
     fn drop(&mut self) {
-        // An error is ignored, because no caller can receive it.
+        // An error is ignored, because no caller can receive it here.
         let _ = self.finish();
     }
 }

@@ -1,4 +1,4 @@
-//! Starts applications and control loops with their initial values, and stops them.
+//! Starts applications and control loops of boards with their initial values, and stops them.
 
 use serde_json::{Value, json};
 use ucom_host::master::{AdminChange, Outcome, Request, RunOptions, RunReport, StopLevel};
@@ -10,18 +10,19 @@ use super::procedures::numbered;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
 
-/// Starts applications, without any movement.
+/// Starts the applications of boards, without any movement.
 pub(super) fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let all = state.starting(&numbers, |state| {
         state.driver.change_each(&numbers, |board| Request::Start { board, force })
     })?;
-    // The signal names of the boards are read. If this fails, the start is not undone.
+    // The session reads the signal names of the boards. If the names cannot be read, the applications still stay
+    // started.
     numbers.iter().for_each(|board| drop(state.known(*board)));
     Ok(numbered(state, &all))
 }
 
-/// Boards to run, with their values and options.
+/// Boards that are run, with their values and options.
 pub(super) struct Run {
     pub boards: Boards,
     pub active: bool,
@@ -37,10 +38,10 @@ pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failur
     let numbers = state.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
     only(&numbers, &run.parameters, "run").map_err(SessionError::from)?;
-    // If `all` boards are selected, every board of the parameter file must be present.
+    // If `all` boards are selected, every board of the parameter file must be in the chain.
     let meant = |n: u8| run.boards == Boards::All || numbers.contains(&n);
     let file = run.file.take().map(|file| file.of_boards(meant));
-    // The identities of the boards are checked first, because this check does not need a started application.
+    // The identities of the boards are checked first, because this check does not need started applications.
     if let Some(file) = &file {
         file.identities(&mut state.driver)?;
     }
@@ -58,8 +59,8 @@ pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failur
     state.runs(&numbers);
     for board in numbers.iter().filter(|_| run.texts) {
         let change = AdminChange { debug: Some(true), ..Default::default() };
-        // The boards already run, perhaps with enabled outputs. If an error were returned here, the caller would
-        // assume that the boards are stopped.
+        // The boards already run, perhaps with enabled outputs. If the function returned an error here, the caller
+        // would assume that the boards are stopped.
         if let Err(error) = state.driver.run(Request::Admin { board: *board, change, force: true }) {
             state.driver.note(format!("board {board} possibly sends no texts: {error}"));
         }
@@ -96,7 +97,7 @@ fn begin(
     }
 }
 
-/// Enables the outputs of running boards, or switches them to the safe state. The command for the safe state is sent to
+/// Enables the outputs of running boards, or makes the outputs safe. The command that makes outputs safe is sent to
 /// each board, even if another board fails.
 pub(super) fn outputs(state: &mut WorkerState, boards: &Boards, active: bool) -> Result<(), Failure> {
     let numbers = match boards {
@@ -154,7 +155,7 @@ pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -
         }
     }
     if !was_master && state.started().is_empty() {
-        // The session ends its role as master, because a stop must not make it the master of the bus.
+        // The session ends its role as master of the bus, because a stop must not make it the master.
         state.driver.master.end_session();
     }
     all_certain("not stopped for certain", failed)?;

@@ -14,10 +14,10 @@ use super::shared::Listener;
 use crate::error::Failure;
 use crate::json;
 
-/// Time without outputs after which no control loop can be running on the bus.
+/// Time without outputs on the bus after which no control loop can be running.
 const SILENCE: Duration = Duration::from_secs(3);
 
-/// Reader that returns the outputs of boards, one set per call.
+/// Reader of the outputs of boards. Each call returns one set of outputs.
 #[pyclass(frozen, module = "openjtc._native")]
 pub(super) struct ChainSamples {
     pub chain: Py<Chain>,
@@ -32,7 +32,7 @@ impl ChainSamples {
         let since = Instant::now();
         let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         loop {
-            // While a reader waits, the deadline is restarted as by a call.
+            // A waiting reader restarts the deadline, like a call.
             chain.owner.shared.asked();
             let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
             let sample = py.detach(|| self.listener.next(left.min(LOOK)));

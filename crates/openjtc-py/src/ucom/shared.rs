@@ -16,19 +16,19 @@ use super::worker_state::WorkerState;
 use crate::error::Failure;
 use crate::threads::lock;
 
-/// Maximum number of stored events; the newest event is the last one.
+/// Maximum number of stored events. The newest event is the last event in the list.
 const EVENTS_MAX: usize = 4096;
-/// Maximum number of samples that wait for their reader.
+/// Maximum number of samples that a reader has not read yet.
 const SAMPLES_MAX: usize = 65_536;
 
 /// Kind of the events that contain the update result of a board.
 pub(super) const UPDATED: &str = "updated";
 
-/// Control loops that must end before any other frame is sent.
+/// Control loops that the thread must stop before it sends any other frame.
 pub(super) enum Halt {
     All,
     Boards(Vec<u8>),
-    /// Control loops of the boards that this session has started.
+    /// The control loops of all boards that this session has started.
     Started,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Sample {
 pub(super) struct Listener {
     /// Boards whose samples are read.
     pub boards: BTreeSet<u8>,
-    /// Samples that wait for the reader, and number of dropped samples.
+    /// Samples that the reader has not read yet, and number of dropped samples.
     waiting: Mutex<(VecDeque<Sample>, u64)>,
     arrived: Condvar,
 }
@@ -52,7 +52,7 @@ impl Listener {
         Self { boards, waiting: Mutex::default(), arrived: Condvar::new() }
     }
 
-    /// Returns the next sample; waits at most `patience`.
+    /// Returns the next sample. Waits at most `patience` for it.
     pub(super) fn next(&self, patience: Duration) -> Option<Sample> {
         let waiting = lock(&self.waiting);
         let waited = self.arrived.wait_timeout_while(waiting, patience, |(samples, _)| samples.is_empty());
@@ -65,12 +65,12 @@ impl Listener {
     }
 }
 
-/// State that the thread shares with its callers.
+/// State that the thread of the session shares with its callers.
 #[derive(Default)]
 pub(super) struct Shared {
     /// Requests to the thread; each request has a number.
     pub queue: Queue<WorkerState, u64>,
-    /// Reason why the queue is closed.
+    /// Reason why the request queue is closed.
     closed: Mutex<Option<Failure>>,
     halts: Mutex<Vec<Halt>>,
     ended: AtomicBool,
@@ -79,9 +79,9 @@ pub(super) struct Shared {
     pub alarms: Alarms,
     listeners: Mutex<Vec<Weak<Listener>>>,
     asked_at: Mutex<Option<Instant>>,
-    /// Boards that the session has started. The list can be read even after the thread of the session has ended.
+    /// Boards that the session has started. The list of boards can be read even after the thread of the session has ended.
     started: Mutex<Vec<u8>>,
-    /// Boards for which the stop is not certain.
+    /// Boards that may not be stopped.
     not_stopped: Mutex<Vec<u8>>,
     seen: Mutex<Value>,
 }
@@ -101,7 +101,7 @@ pub(super) fn fault() -> Failure {
 }
 
 impl Shared {
-    /// Returns `true` if the running request is cancelled or the session ends.
+    /// Returns `true` if the running request is cancelled, or if the session ends.
     pub(super) fn is_cancelled(&self) -> bool {
         self.has_ended() || self.queue.is_cancelled()
     }
@@ -116,7 +116,7 @@ impl Shared {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// Requests that these control loops end before any other frame is sent.
+    /// Requests that the thread stops these control loops before it sends any other frame.
     pub(super) fn halt(&self, halt: Halt) {
         lock(&self.halts).push(halt);
     }
@@ -126,17 +126,17 @@ impl Shared {
         *lock(&self.started) = boards;
     }
 
-    /// Reports all started boards as possibly not stopped, after a fault of the thread.
+    /// Marks all started boards as possibly not stopped, after a fault of the thread.
     pub(super) fn all_left(&self) {
         self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
-    /// Sets the boards for which the stop is not certain at the end of the session.
+    /// Sets the boards that may not be stopped at the end of the session.
     pub(super) fn left(&self, boards: Vec<u8>) {
         *lock(&self.not_stopped) = boards;
     }
 
-    /// Removes and returns the boards for which the stop is not certain.
+    /// Removes and returns the boards that may not be stopped.
     pub(super) fn take_left(&self) -> Vec<u8> {
         std::mem::take(&mut *lock(&self.not_stopped))
     }
@@ -146,7 +146,7 @@ impl Shared {
         self.ended.load(Ordering::Relaxed)
     }
 
-    /// Removes and returns the control loops that must end now.
+    /// Removes and returns the control loops that the thread must stop now.
     pub(super) fn halts(&self) -> Vec<Halt> {
         std::mem::take(&mut *lock(&self.halts))
     }
@@ -177,7 +177,7 @@ impl Shared {
         events.1.iter().filter(|event| event["number"].as_u64() > Some(after)).cloned().collect()
     }
 
-    /// Returns the results of updates that came after this event.
+    /// Returns the results of updates that were reported after this event.
     pub(super) fn outcomes(&self, after: u64) -> Vec<String> {
         let events = self.events(after);
         let of_updates = events.as_array().into_iter().flatten().filter(|event| event["kind"] == UPDATED);
@@ -195,8 +195,8 @@ impl Shared {
         lock(&self.seen).clone()
     }
 
-    /// Reports that running boards were stopped because no call came within the deadline. `not_stopped` contains the boards for which
-    /// the stop is not certain.
+    /// Reports that running boards were stopped because the program made no call within the deadline. `not_stopped` contains the
+    /// boards that may not be stopped.
     pub(super) fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
         let mut text =
             format!("no call was made to the chain for {} s: its boards are stopped", deadline.as_secs_f64());
@@ -209,7 +209,7 @@ impl Shared {
         self.alarms.add(failure(ErrorKind::Fault, "deadline", &text, next));
     }
 
-    /// Restarts the deadline. This function is called when a request arrives and after a request ends.
+    /// Restarts the deadline. The thread calls this function when a request arrives and after a request ends.
     pub(super) fn asked(&self) {
         *lock(&self.asked_at) = Some(Instant::now());
     }
@@ -219,13 +219,13 @@ impl Shared {
         lock(&self.asked_at).map_or(Duration::ZERO, |at| at.elapsed())
     }
 
-    /// Returns each waiting alarm once, as an error.
+    /// Returns each waiting alarm once. The alarm is returned as an error.
     pub(super) fn check(&self) -> Result<(), Failure> {
         self.asked();
         self.alarms.check()
     }
 
-    /// Passes a snapshot to its readers.
+    /// Passes a snapshot of outputs to its readers.
     pub(super) fn sampled(&self, known: &Arc<Known>, snapshot: &Snapshot) {
         lock(&self.listeners).retain(|listener| {
             let Some(listener) = listener.upgrade() else { return false };
@@ -257,12 +257,12 @@ impl Shared {
         true
     }
 
-    /// Returns the reason why the queue is closed. `None` means that the queue is open.
+    /// Returns the reason why the request queue is closed. `None` means that the queue is open.
     pub(super) fn gone(&self) -> Option<Failure> {
         lock(&self.closed).clone()
     }
 
-    /// Closes the queue.
+    /// Closes the request queue.
     pub(super) fn close(&self, why: Failure) {
         lock(&self.closed).get_or_insert(why);
         self.queue.close();

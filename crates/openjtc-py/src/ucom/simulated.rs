@@ -1,4 +1,5 @@
-//! Simulated chain of boards in this process. Other programs can join its bus through a socketcand server on this computer.
+//! Simulated chain of boards in this process. Other programs can join the bus of the chain through a socketcand server on
+//! this computer.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,7 +28,7 @@ pub(super) struct Simulation {
     pub seed: u64,
 }
 
-/// Simulated chain that runs in a separate thread until its last owner is dropped.
+/// Simulated chain in a separate thread. The thread runs until the last owner of the chain is dropped.
 pub(super) struct Simulated {
     url: String,
     boards: usize,
@@ -73,7 +74,7 @@ impl Simulated {
                 Ok(server) => server,
                 Err(error) => return drop(ready.send(Err(error.to_string()))),
             };
-            // The receiver still exists, so sending cannot fail.
+            // The receiver still exists, so sending the URL cannot fail.
             let _ = ready.send(Ok(server.url()));
             while !end.load(Ordering::Relaxed) {
                 lines.try_iter().for_each(|line| server.fault(&line));

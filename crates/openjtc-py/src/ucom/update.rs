@@ -19,13 +19,13 @@ use super::shared::UPDATED;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
 
-/// Source of an image.
+/// Source of an update image.
 pub(super) enum Source {
     File(PathBuf),
     Bytes(Vec<u8>),
 }
 
-/// Options for reading images.
+/// Options for reading image files.
 pub(super) struct Read {
     pub raw: bool,
     pub addresses: Option<String>,
@@ -58,7 +58,7 @@ pub(super) struct Update {
 }
 
 impl Read {
-    /// Reads the image, or both images if each cycle has its own. Also returns the flash date in the format of the profile.
+    /// Reads the image. If each cycle has its own image, reads both images. Also returns the flash date in the format of the profile.
     pub(super) fn read(
         &self,
         first: &Source,
@@ -86,7 +86,7 @@ impl Read {
         Ok((image(first, &options)?, second, self.day(profile)?))
     }
 
-    /// Returns the flash date in the format of the profile. The result is 0 if the headers contain no date.
+    /// Returns the flash date in the format of the profile. The flash date is 0 if the headers contain no date.
     fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
             let text = "date: the date is part of the header, but the profile sends no header";
@@ -119,7 +119,7 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, Failure
     Ok(image.into())
 }
 
-/// Returns the advice for an invalid image file. The advice never suggests to skip a check of the file content.
+/// Returns the advice for an invalid image file. The advice never suggests that a check of the file content can be omitted.
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
@@ -141,7 +141,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash number that each board must have. The flash number comes from the caller, or else from the inventory.
+/// Returns the flash number that each board must have. The caller passes this flash number, or it is read from the inventory.
 fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
@@ -153,7 +153,7 @@ fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<U
             }
         };
     }
-    // A single board can be selected by its board number alone. To update several boards, an inventory is required.
+    // The board number alone can select a single board. An update of several boards requires an inventory.
     if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &state.inventory) {
         return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }
@@ -177,7 +177,8 @@ fn not_listed(state: &WorkerState, board: u8) -> Failure {
     own
 }
 
-/// Returns the selected boards. `all` selects the boards that answer and the boards of the inventory, so that a missing board is reported.
+/// Returns the selected boards. `all` selects the boards that answer and the boards of the inventory. A missing board is therefore
+/// reported.
 fn numbers(state: &mut WorkerState, boards: &Boards) -> Result<Vec<u8>, Failure> {
     let mut numbers = state.driver.numbers(boards)?;
     if let (Boards::All, Some(inventory)) = (boards, &state.inventory) {
@@ -188,7 +189,7 @@ fn numbers(state: &mut WorkerState, boards: &Boards) -> Result<Vec<u8>, Failure>
     Ok(numbers)
 }
 
-/// Programs the selected boards; `report` receives the progress.
+/// Programs the selected boards. `report` receives the progress.
 pub(super) fn update(
     state: &mut WorkerState,
     update: Update,
@@ -209,7 +210,7 @@ pub(super) fn update(
         second: update.second,
         expect_program_id: update.expect_program_id,
         name_target: update.name_target,
-        // A board that fails does not affect the other boards of the update.
+        // If a board fails, the update of the other boards continues.
         keep_going: several,
         ..UpdateOptions::new(targets, update.image, update.date)
     };
@@ -227,7 +228,7 @@ pub(super) fn update(
     }
 }
 
-/// Adds an event with the result of each board, in case the report does not reach a caller.
+/// Adds an event with the result of each board, because the report may not reach a caller.
 fn note_outcomes(state: &WorkerState, report: &UpdateReport) {
     let time_s = state.driver.now_us() as f64 * 1e-6;
     for one in report.boards.iter().filter(|_| !report.dry_run) {

@@ -29,8 +29,8 @@ pub(super) fn signals(state: &mut WorkerState, boards: &Boards) -> Result<Value,
     Ok(all.into())
 }
 
-/// Sets an input. Sets a parameter if no input has this name or if `buffer` selects the parameters. Returns the value
-/// that was sent, in the unit of the signal.
+/// Sets an input. If no input has this name, or if `buffer` selects the parameters, sets a parameter. Returns the value that was
+/// sent, in the unit of the signal.
 pub(super) fn set(
     state: &mut WorkerState,
     board: u8,
@@ -52,7 +52,7 @@ pub(super) fn set(
     note_rounded(&state.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = state.driver.now_us();
     let boards = state.driver.master.boards();
-    // The inputs of a running board are sent repeatedly, so a lost frame has no effect. If a board has no power, its
+    // The session sends the inputs of a running board repeatedly, so a lost frame has no effect. If a board has no power, its
     // control loop does not run.
     let runs = state.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
@@ -77,15 +77,15 @@ pub(super) fn set(
     Ok(signal.map_or(Value::Null, |signal| signal.json(word.word)))
 }
 
-/// Returns the outputs with their age, the inputs and the parameters of boards. Signal names that are not known are queried.
+/// Returns the outputs with their age, the inputs and the parameters of boards. Queries signal names that are not known.
 pub(super) fn values(state: &mut WorkerState, boards: &Boards) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(boards)?;
     let numbers = with_names(state, &numbers, *boards == Boards::All)?;
     numbers.into_iter().map(|board| of_board(state, board)).collect()
 }
 
-/// Returns the boards whose signal names are known, and stores the names in the cache. If `all` boards are selected, boards whose
-/// applications are not started are skipped. Returns an error if no board remains.
+/// Returns the boards whose signal names are known, and stores the names in the cache. If `all` boards are selected, the function
+/// skips boards whose applications are not started. Returns an error if no board remains.
 pub(super) fn with_names(
     state: &mut WorkerState,
     boards: &[u8],
@@ -117,7 +117,7 @@ pub(super) fn running(state: &mut WorkerState) -> Result<Value, Failure> {
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
-        // The reason is reported first, if it is known.
+        // If the reason for missing outputs is known, the reason is reported first.
         state.shared.check()?;
         return Err(no_value(board, "outputs", one["age_s"].as_f64()));
     }
@@ -148,8 +148,8 @@ fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     }))
 }
 
-/// Returns a value by its name. The value is an output if the board sends outputs, else an input, else a parameter. Returns an
-/// error for an outdated output.
+/// Returns a value by its name. If the board sends outputs, an output with this name is returned, else an input, else a
+/// parameter. Returns an error for an outdated output.
 pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Value, Failure> {
     let known = state.known(board)?;
     let of_buffer = [Buffer::So, Buffer::Ci, Buffer::Par]
@@ -167,7 +167,7 @@ pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Va
         Buffer::Par => "parameters",
     }];
     if buffer == Buffer::So && all["stale"] == json!(true) {
-        // The reason is reported first, if it is known.
+        // If the reason for missing outputs is known, the reason is reported first.
         state.shared.check()?;
         return Err(no_value(board, name, all["age_s"].as_f64()));
     }
@@ -185,7 +185,8 @@ fn no_value(board: u8, what: &str, age_s: Option<f64>) -> Failure {
         .with(Facts::default().at_board(board))
 }
 
-/// Returns the text of a parameter file: the values that were written last, and the other names as comments.
+/// Returns the text of a parameter file. The parameter file contains the values that were written last, and the other names as
+/// comments.
 pub(super) fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Result<String, Failure> {
     let mut saved = Vec::new();
     for board in state.driver.numbers(boards)? {
@@ -215,7 +216,7 @@ pub(super) fn parameters_text(state: &mut WorkerState, boards: &Boards) -> Resul
     Ok(params_text(&saved))
 }
 
-/// Checks a complete parameter file against the boards, then writes its parameters. Returns their number.
+/// Checks a complete parameter file against the boards, then writes its parameters. Returns the number of parameters.
 pub(super) fn apply_parameters(
     state: &mut WorkerState,
     file: &ParameterFile,
@@ -223,7 +224,7 @@ pub(super) fn apply_parameters(
     force: bool,
 ) -> Result<usize, Failure> {
     file.identities(&mut state.driver)?;
-    // Parameters can only be written to a started application. A dry run needs only the signal names.
+    // Parameters can only be written to a board whose application is started. A dry run needs only the signal names.
     let session = &mut state.session;
     let known = session.cache.all(&mut session.driver, &session.signals, &file.numbers(), |_| !dry_run)?;
     let checked =

@@ -1,4 +1,4 @@
-//! Session in its own thread, which executes the requests from Python.
+//! Session that runs in its own thread and executes the requests from Python.
 
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
@@ -15,24 +15,24 @@ use super::operator::Hand;
 use super::shared::Shared;
 use super::simulated::Simulated;
 
-/// Maximum duration of a turn. Waits for the bus itself are shorter.
+/// Maximum duration of a turn of the session. Waits for the bus itself are shorter.
 const TURN: Duration = Duration::from_millis(25);
 
-/// Maximum wait for the first outputs of a board, which arrive every few milliseconds, in µs.
+/// Maximum wait for the first outputs of a board, µs. Boards send outputs every few milliseconds.
 const FIRST_US: u64 = 500_000;
 
 /// Configuration of a session.
 pub(super) struct Config {
-    /// Profile of how boards interpret the protocol.
+    /// Profile that describes how boards interpret the protocol.
     pub profile: Profile,
     /// Signal table: the meaning of the words of inputs, outputs and parameters.
     pub signals: SignalTable,
     /// Cache of signal names.
     pub cache: Cache,
-    /// Inventory of the chain and its file path.
+    /// Inventory of the chain, and the path of the inventory file.
     pub inventory: Option<Inventory>,
     pub inventory_file: Option<PathBuf>,
-    /// Time without a call after which the session stops the boards that it has started; `None` means that the boards continue to run.
+    /// Time without a call after which the session stops the boards that it has started. `None` means that the boards continue to run.
     pub deadline: Option<Duration>,
     /// Simulated chain that ends with the session.
     pub simulated: Option<Arc<Simulated>>,
@@ -47,7 +47,7 @@ pub(super) struct WorkerState {
     pub records: FlashRecords,
     pub shared: Arc<Shared>,
     deadline: Option<Duration>,
-    /// This field is declared after the session, so that the simulated chain is dropped after the bus is closed.
+    /// The field `_simulated` is declared after the session, so that the simulated chain is dropped after the bus is closed.
     _simulated: Option<Arc<Simulated>>,
 }
 
@@ -66,7 +66,7 @@ impl DerefMut for WorkerState {
 }
 
 impl WorkerState {
-    /// Opens a session on this link.
+    /// Creates a session on this link.
     pub(super) fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
         let Config { profile, signals, cache, inventory, inventory_file, deadline, simulated } = config;
         let held: Rc<RefCell<Held>> = Rc::default();
@@ -93,8 +93,8 @@ impl WorkerState {
         Ok(())
     }
 
-    /// Stops the boards if the Python program makes no call before the deadline. Heartbeats prove only that this computer works,
-    /// not that the Python program works.
+    /// Stops the boards if the Python program makes no call before the deadline. Heartbeats prove only that this computer works, not
+    /// that the Python program works.
     fn keep_deadline(&mut self) {
         if let Some(deadline) = self.deadline
             && self.shared.silence() >= deadline
@@ -121,12 +121,12 @@ impl WorkerState {
 
     /// Sends all frames of a request before the caller receives the result.
     pub(super) fn settle(&mut self) {
-        // If the bus is lost, the next turn reports this.
+        // If the bus is lost, the next turn reports the loss.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }
 
-    /// Waits at most 0.5 s for the first outputs of boards that were just started, so that their values are known.
+    /// Waits at most 0.5 s for the first outputs of boards that were just started, so that the values of the outputs are known.
     pub(super) fn first_outputs(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let end_us = self.driver.now_us() + FIRST_US;
         let missing =

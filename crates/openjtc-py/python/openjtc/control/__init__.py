@@ -1,7 +1,7 @@
 """The real control code, one tick per call. The same code runs on the board and in the simulator.
 
-A tick is a millisecond. The call takes everything that the controller received and returns everything that it sends. The code has neither
-a clock nor a thread::
+A tick is a millisecond. A call takes everything that the controller received and returns everything that the controller sends. The code has
+neither a clock nor a thread::
 
     controller = Controller()
     answers, host = [], b"".join(encode.use_defaults())
@@ -47,13 +47,13 @@ class Inputs:
 
     Attributes:
         bus: Frames of the joint bus that were received since the last tick, oldest first.
-        host: Bytes that the host sent since the last tick; frames may be split anywhere.
+        host: Bytes that the host sent since the last tick. Frames may be split at any byte.
         acknowledged: True if the frame of the last tick was acknowledged on the bus.
         bus_off: True if the CAN controller is bus-off.
         safety_input: Level of the safety input; True means no error.
         status_free: True if the serial transmitter can take a status.
-        ticked: True if the tick occurs. False: the timer is late by a whole tick, so the controller only reads the bytes of the
-            host. After ten missing ticks in a row the watchdog resets the controller.
+        ticked: True if the tick occurs. If `ticked` is False, the timer is late by a whole tick, and the controller only reads the bytes of
+            the host. After ten missing ticks in a row, the watchdog resets the controller.
     """
 
     bus: Sequence[Frame] = ()
@@ -67,13 +67,14 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Outputs:
-    """Outputs of a tick; two outputs are equal if every bit is equal.
+    """Outputs of a tick. Two outputs are equal if every bit is equal.
 
     Attributes:
         bus: Frame for the joint bus; None in the first tick, and for a missing tick.
         host: Bytes for the host: a status (25 times a second), an answer, or no bytes.
-        safety_output: Level of the safety output; True means no error. A missing tick keeps the level; after a reset it is False.
-        telemetry: Values that the tick computed: set values, measured values, the torque in its parts.
+        safety_output: Level of the safety output; True means no error. The level stays unchanged in a missing tick. After a reset it is
+            False.
+        telemetry: Values that the tick computed: set values, measured values, and the parts of the torque.
         reset: True if the watchdog has reset the controller.
     """
 
@@ -88,18 +89,18 @@ class Controller:
     """A controller on its board, immediately after power-on.
 
     Args:
-        arm: Stored arm of the controller, which :func:`openjtc.control.encode.use_defaults` selects. If the file of the arm is
-            incomplete, only the limits are set. None: a new controller, with the built-in arm.
+        arm: Stored arm of the controller, which :func:`openjtc.control.encode.use_defaults` selects. If the file of the arm is incomplete,
+            only the limits are set. If `arm` is None, the controller is new and has the built-in arm.
     """
 
     def __init__(self, arm: Arm | None = None) -> None:
         self._native = _native.Controller(arm)
 
     def tick(self, inputs: Inputs = Inputs()) -> Outputs:
-        """Runs one tick, 1 ms.
+        """Runs one tick, which is 1 ms.
 
         Raises:
-            UsageError: A frame is not possible on the joint bus.
+            UsageError: A frame is not valid on the joint bus.
         """
         frames = [(id, bytes(data)) for id, data in inputs.bus]
         sent, host, safety_output, reset = self._native.tick(
@@ -120,5 +121,5 @@ class Controller:
 
     @property
     def time(self) -> float:
-        """Time since the start, s: number of ticks / 1000."""
+        """Time since the start of the controller, s: number of ticks / 1000."""
         return self._native.time

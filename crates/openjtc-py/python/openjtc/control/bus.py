@@ -1,8 +1,8 @@
-"""The joint bus from the side of the drives: reads requests of the controller and makes answers.
+"""The joint bus from the side of the drives. The functions read requests of the controller and make answers.
 
 On the bus, nodes are numbered from 0. Node 2 is the drive of joint 3, and node 6 is the gripper. A drive answers each
 :class:`Move` with :func:`joint_answer`, each :class:`ChangeState` with :func:`state_answer`, and each :class:`Configure` with
-:func:`configured_answer`. The gripper answers a :class:`Move` with :func:`gripper_answer`. Resets are not answered.
+:func:`configured_answer`. The gripper answers a :class:`Move` with :func:`gripper_answer`. Nodes do not answer resets.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ __all__ = [
 
 #: Node of the gripper.
 GRIPPER = 6
-#: State of a node: motor off, waiting for its configuration.
+#: State of a node in which the motor is off and the node waits for its configuration.
 INIT = 1
-#: State of a node: configured, motor off.
+#: State of a node in which the node is configured and the motor is off.
 READY = 2
-#: State of a node: follows its command.
+#: State of a node in which the node follows its command.
 ENABLED = 3
-#: State of a node: fault.
+#: State of a node after a fault.
 FAULT = 255
 
 
@@ -55,14 +55,14 @@ class Move:
 
 @dataclass(frozen=True)
 class ChangeState:
-    """Request for a state of each of the seven nodes; 0: no change."""
+    """Request for a state of each of the seven nodes; 0 means no change."""
 
     target: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Configure:
-    """Mode (1: torque) and configuration bits of each joint, and the bits of the gripper."""
+    """Request with the mode (1: torque) and configuration bits of each joint, and the configuration bits of the gripper."""
 
     mode: tuple[int, ...]
     config: tuple[int, ...]
@@ -71,7 +71,7 @@ class Configure:
 
 @dataclass(frozen=True)
 class Reset:
-    """Restart of one node, or of all nodes (None)."""
+    """Request for a restart of one node, or of all nodes (None)."""
 
     node: int | None
 
@@ -107,17 +107,17 @@ def joint_answer(
     errors: int = 0,
     warnings: int = 0,
 ) -> tuple[int, bytes]:
-    """Makes a drive's answer to a :class:`Move`. Values outside the range of the bus are limited to the range.
+    """Makes a drive's answer to a :class:`Move`. Values outside the range of the bus are limited to this range.
 
     Args:
-        node: Node, 0 to 5.
+        node: Number of the node, 0 to 5.
         position: Position, rad.
         velocity: Velocity, rad/s.
         torque: Torque that the drive applies, N·m.
         state: :data:`INIT`, :data:`READY`, :data:`ENABLED` or :data:`FAULT`.
         temperature: Bearing temperature, °C.
-        errors: Error bits.
-        warnings: Warning bits.
+        errors: Error bits of the drive.
+        warnings: Warning bits of the drive.
     """
     return _native.bus_joint_answer(node, position, velocity, torque, temperature, state, errors, warnings)
 
@@ -128,7 +128,7 @@ def gripper_answer(*, pump: bool = False, part: bool = False, state: int = READY
 
 
 def state_answer(node: int, state: int) -> tuple[int, bytes]:
-    """Makes a node's answer to a :class:`ChangeState`: the state of the node when it receives the request."""
+    """Makes a node's answer to a :class:`ChangeState`. The answer contains the state of the node when it receives the request."""
     return _native.bus_state_answer(node, state)
 
 

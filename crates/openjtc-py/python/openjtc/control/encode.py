@@ -1,4 +1,4 @@
-"""Frames from the host to the controller, as bytes of the serial line.
+"""Frames that the host sends to the controller, as bytes of the serial line.
 
 The controller answers each frame with a response in its next status (:class:`openjtc.control.StatusReader`).
 """
@@ -29,8 +29,8 @@ __all__ = [
 
 
 def use_defaults() -> list[bytes]:
-    """Makes three frames that select the friction, model and gains of the controller's stored arm. Without a stored
-    arm, the values of ``Arm.avena()`` are used.
+    """Makes three frames that select the friction, model and gains of the controller's stored arm. If no arm is stored, they select the
+    values of ``Arm.avena()``.
 
     Without parameters the controller does not power an arm.
     """
@@ -38,7 +38,7 @@ def use_defaults() -> list[bytes]:
 
 
 def parameters(arm: Arm) -> list[bytes]:
-    """Makes the frames of an arm's friction, model and gains. A part that the arm file lacks is left out.
+    """Makes the frames of an arm's friction, model and gains. Parameters that the arm file lacks are omitted.
 
     Raises:
         UsageError: A number does not fit into a frame.
@@ -47,10 +47,10 @@ def parameters(arm: Arm) -> list[bytes]:
 
 
 def trajectory(trajectory: Trajectory, *, number: int = 1, points_a_frame: int = 100) -> list[bytes]:
-    """Makes the frames of a trajectory, in the order in which they must be sent. Only the number ranges of the frames are checked.
+    """Makes the frames of a trajectory, in the order in which they must be sent. `trajectory` checks only the number ranges of the frames.
 
     Args:
-        trajectory: The points.
+        trajectory: Points of the trajectory.
         number: Number of the trajectory, 0 to 65535.
         points_a_frame: Points per frame, 1 to 1500; a trajectory has at most 100 frames.
 
@@ -66,33 +66,32 @@ def execute() -> bytes:
 
 
 def pause() -> bytes:
-    """Makes the frame that pauses on the path."""
+    """Makes the frame that pauses the arm on the path."""
     return _native.encode_command("pause")
 
 
 def stop() -> bytes:
-    """Makes the frame that stops on the path and discards the place on it."""
+    """Makes the frame that stops the arm on the path. The controller forgets the reached point of the path."""
     return _native.encode_command("stop")
 
 
 def teach() -> bytes:
-    """Makes the frame that starts teaching: the arm can be led by hand. :func:`hold` ends teaching."""
+    """Makes the frame that starts teaching, in which the arm can be guided by hand. :func:`hold` ends teaching."""
     return _native.encode_command("teach")
 
 
 def hold() -> bytes:
-    """Makes the frame that ends teaching and holds the position."""
+    """Makes the frame that ends teaching. The controller then holds the position."""
     return _native.encode_command("hold")
 
 
 def jog(velocity: ArrayLike) -> bytes:
-    """Makes the frame that moves the joints with these velocities (6,), rad/s. The motion continues while such frames
-    are sent repeatedly."""
+    """Makes the frame that moves the joints with these velocities (6,), rad/s. The motion continues while the host repeats this frame."""
     return _native.encode_jog(velocity)
 
 
 def pump(on: bool) -> bytes:
-    """Makes the frame that switches the gripper's pump."""
+    """Makes the frame that switches the gripper's pump on or off."""
     return _native.encode_command("pump on" if on else "pump off")
 
 
@@ -111,5 +110,5 @@ def clear_errors() -> bytes:
 
 
 def disable() -> bytes:
-    """Makes the frame that switches the drive torque off: an arm without brakes falls."""
+    """Makes the frame that switches the drive torque off. **An arm without brakes falls.**"""
     return _native.encode_command("disable")

@@ -35,17 +35,17 @@ class Status:
 
     Attributes:
         state: ``Start``, ``Init``, ``HoldPos``, ``Operate``, ``Teaching`` or ``Error``.
-        trajectory: ``Null``, ``Stop`` (complete, at its start), ``Pause``, ``Execute`` or ``Finish``.
-        point: Place on the trajectory, ms.
-        errors: Error word; 0 means no error.
+        trajectory: ``Null``, ``Stop`` (complete, arm at the start of the path), ``Pause``, ``Execute`` or ``Finish``.
+        point: Point reached on the trajectory, ms.
+        errors: Error word of the controller; 0 means no error.
         occurred: Error word of all errors since they were last cleared.
         causes: Errors in words.
-        position: Positions, rad.
-        velocity: Velocities, rad/s.
-        torque: Torques, N·m.
-        temperature: Temperatures, °C.
+        position: Positions of the joints, rad.
+        velocity: Velocities of the joints, rad/s.
+        torque: Torques of the joints, N·m.
+        temperature: Temperatures of the bearings, °C.
         drives: States of the drives, in words.
-        response: Response to a frame, if this status has one.
+        response: Response to a frame, if this status contains a response.
     """
 
     state: str
@@ -63,13 +63,13 @@ class Status:
 
 
 class StatusReader:
-    """Finds the statuses in the bytes of a controller. The bytes can be passed in pieces of any size."""
+    """Finds the statuses in the bytes that a controller sends. The caller may pass the bytes in pieces of any size."""
 
     def __init__(self) -> None:
         self._native = _native.StatusReader()
 
     def feed(self, data: bytes) -> list[Status]:
-        """Returns the statuses that these bytes complete, oldest first."""
+        """Returns the statuses that the bytes in `data` complete, oldest first."""
         found = []
         for values in self._native.feed(data):
             response = values.pop("response")

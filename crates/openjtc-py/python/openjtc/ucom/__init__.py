@@ -1,4 +1,4 @@
-"""Chains of UCoM boards on a CAN bus: number, examine, drive by name under supervision, and update them.
+"""Chains of UCoM boards on a CAN bus: number the boards, examine them, drive them by name under supervision, and update them.
 
 >>> from openjtc import ucom
 >>> with ucom.connect("sim:") as chain:
@@ -6,9 +6,9 @@
 ...     chain.run(1, active=True, inputs={"set_position": 1500})
 ...     print(chain["1.position"])
 
-The procedures are the same as in the command ``ucom``. Only ``ucom`` decodes and replays recordings, makes signal databases, runs
-conformance tests that program a board, and has ``ucom serve``. An agent that owns a bus is reached over HTTP. This package has no HTTP
-client yet.
+The procedures are the same as in the command ``ucom``. Some functions exist only in ``ucom``: decoding and replaying recordings, signal
+databases, conformance tests that program a board, and ``ucom serve``. An agent that owns a bus is reached over HTTP. The package
+openjtc.ucom has no HTTP client yet.
 """
 
 from __future__ import annotations
@@ -87,18 +87,18 @@ def sim(
 ) -> SimulatedChain:
     """Starts a simulated chain in this process, in real time, like ``ucom sim``.
 
-    The ``.url`` of the chain is a socketcand bus on this computer, which other programs can join. ``.fault("silent board=3 for_s=1")``
-    injects a fault (``ucom help faults``), ``.end()`` ends the chain.
+    ``.url`` of the chain is the URL of a socketcand bus on this computer, which other programs can join. ``.fault("silent board=3
+    for_s=1")`` injects a fault (``ucom help faults``), and ``.end()`` ends the chain.
 
     Args:
         chain: Chain file, TOML (``ucom help sim``); None: a head with ten boards.
         boards: Number of boards, 0 to 31.
         faults: Fault file, TOML (``ucom help faults``).
         seed: Seed of all random numbers.
-        profile: Profile of how the boards read the protocol, TOML (``ucom help profile``).
+        profile: Profile that describes how the boards interpret the protocol, TOML (``ucom help profile``).
 
     Raises:
-        UsageError: A file cannot be understood.
+        UsageError: A file is not valid.
     """
     paths = (None if path is None else os.fspath(path) for path in (chain, faults, profile))
     chain_file, fault_file, profile_file = paths
@@ -119,20 +119,21 @@ def connect(
     """Opens a chain of boards on a bus, without sending a frame.
 
     Args:
-        bus: ``"socketcan:can0"``, ``"slcan:/dev/ttyACM0@1000000"``, ``"socketcand:localhost:29536/can0"``, ``"multicast:…"``,
-            ``"sim:"`` or ``"sim:FILE"`` for a simulated chain that ends with this one, or the result of `sim`.
+        bus: ``"socketcan:can0"``, ``"slcan:/dev/ttyACM0@1000000"``, ``"socketcand:localhost:29536/can0"``, ``"multicast:…"``, ``"sim:"`` or
+            ``"sim:FILE"`` for a simulated chain that ends with this connection, or the result of `sim`.
         names: Names of boards in addition to the inventory: ``{"gripper": 2}``.
         signals: Signal table, TOML: types, scales and units of signals (``ucom help edges``).
-        inventory: Inventory file, TOML: the place of each board. `Chain.init` writes the file or compares with it.
-        profile: Profile of how the boards read the protocol, TOML (``ucom help profile``).
-        on_lost: Reaction to a lost board; None: the reaction of the profile, by default stopping all boards.
-        cache: Folder that keeps the names of signals; True or None: the user's folder; False (and None for a simulated chain):
-            no folder.
-        deadline_s: Boards that run are stopped after this many seconds without a call, and the next `Chain.check` raises a
-            `FaultError` (``deadline``). None: boards run as long as this process lives, even if the program hangs.
+        inventory: Inventory file, TOML: the position of each board in the chain. `Chain.init` writes the file or compares the chain with
+            it.
+        profile: Profile that describes how the boards interpret the protocol, TOML (``ucom help profile``).
+        on_lost: Reaction to a lost board; None: the reaction of the profile, which by default stops all boards.
+        cache: Folder in which the names of signals are stored. True or None: the user's folder. False (and None for a simulated chain): no
+            folder.
+        deadline_s: Time without a call after which running boards are stopped, s. The next `Chain.check` then raises a `FaultError`
+            (``deadline``). Without a deadline, boards run as long as this process lives, even if the program hangs.
 
     Raises:
-        UsageError: The URL is not valid, or a file cannot be understood.
+        UsageError: The URL or a file is not valid.
         NoLinkError: The bus cannot be opened (``bus``).
     """
     simulated = bus if isinstance(bus, SimulatedChain) else None

@@ -13,25 +13,25 @@ if TYPE_CHECKING:
 
 __all__ = ["Board", "BoardValues", "Signal", "Signals", "Value"]
 
-#: Value of a signal in its unit. A switch is a bool. None: the value is not known.
+#: Value of a signal in the unit of the signal. A switch is a bool. An unknown value is None.
 Value = bool | int | float | None
 
 
 @dataclass(frozen=True)
 class Signal:
-    """An input, an output or a parameter of a board: the meaning of its word of 16 bits.
+    """An input, an output or a parameter of a board. The signal defines the meaning of a word of 16 bits.
 
     Attributes:
-        name: Name, without the unit in brackets.
-        text: Name as the board sends it.
-        index: Place in the buffer, from 0.
+        name: Name of the signal, without the unit in brackets.
+        text: Name of the signal as the board sends it.
+        index: Position of the word in the buffer, counted from 0.
         type: ``int16``, ``uint16``, ``hex`` or ``bool``.
         unit: Unit, such as ``deg``; empty if no signal table has a unit.
         scale: Units for each step of the word.
-        offset: Value of the word 0, in units.
+        offset: Value in units that the word 0 represents.
         minimum: Smallest value that may be written, in units.
         maximum: Largest value that may be written, in units.
-        known: True if the signal comes from a signal table. Otherwise values are raw words.
+        known: True if a signal table contains the signal. The values of any other signal are raw words.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Signals:
 
     Attributes:
         board: Number of the board.
-        description: Description that its application reports.
+        description: Description that the board's application reports.
         inputs: Controller inputs, in the order of the buffer.
         outputs: Sensor outputs, in the order of the buffer.
         parameters: Parameters, in the order of the buffer.
@@ -77,18 +77,18 @@ class Signals:
 
 @dataclass(frozen=True)
 class BoardValues:
-    """Values of a board at one time, by the names of its signals, in units if a signal table has them.
+    """Values of a board at one time, by the names of the signals. Values are in units if a signal table contains the signals.
 
     Attributes:
         board: Number of the board.
-        time_s: Time at which its outputs arrived, s since the chain was opened; None: no outputs have arrived.
-        age_s: Age of its outputs, s; None: no outputs have arrived.
-        stale: True if its outputs are outdated, because no outputs arrive or its heartbeats are missing.
+        time_s: Time at which the outputs arrived, s since the chain was opened; None: no outputs have arrived.
+        age_s: Age of the outputs, s; None: no outputs have arrived.
+        stale: True if the outputs are outdated, because no outputs arrive or the heartbeats of the board are missing.
         outputs: Sensor outputs, in the order of the buffer.
-        inputs: Inputs that were set last, or the initial inputs of the board; None if neither is known.
-        parameters: Parameters that this chain has written, because a board cannot return its parameters. None: not written since the
-            application started.
-        units: Units by name, for signals whose unit is in a signal table.
+        inputs: Inputs that were set last, or the initial inputs of the board; None if both are unknown.
+        parameters: Parameters that this chain has written, because a board cannot return its parameters. A value is None if the
+            parameter was not written since the application started.
+        units: Units by signal name, for signals whose unit is in a signal table.
     """
 
     board: int
@@ -102,7 +102,7 @@ class BoardValues:
 
     @property
     def array(self) -> NDArray[np.float64]:
-        """Outputs as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
+        """Outputs of the board as an array of shape (M,), in the order of the buffer; a switch is 0 or 1."""
         return _array(self.outputs)
 
     @classmethod
@@ -122,12 +122,12 @@ class Board:
     the board.
 
     Attributes:
-        number: Address of the board, which is its place in the chain, 1 to 31.
+        number: Address of the board, which is its position in the chain, 1 to 31.
         name: Name of the board in the inventory; empty if the inventory has no name.
-        flash_number: Number of its bootloader: its identity.
+        flash_number: Number of the board's bootloader, which identifies the board.
         state: ``exloader``, ``programming``, ``started`` or ``running``.
         status: Names of the status bits that are set.
-        program_id: Checksum of its application, which is its software version; None: no valid application.
+        program_id: Checksum of the board's application, which identifies the software version; None: no valid application.
         flash_date: Date at which the application was written, ``YYYY-MM-DD``; None: no valid application.
         description: Description that the board reports; empty if it was not requested or never arrived complete.
     """
@@ -147,7 +147,7 @@ class Board:
         """Inputs, outputs and parameters of the board.
 
         Raises:
-            RefusedError: The application is not started, and its signal names are not known from before (``no-application``).
+            RefusedError: The application is not started, and the chain does not know its signal names (``no-application``).
             NoLinkError: The board does not answer.
         """
         return self._of_chain().signals(self.number)

@@ -38,48 +38,49 @@ def _image(image: _Path | bytes | None) -> tuple[str | None, bytes | None]:
 class Chain(ValuesByName):
     """A chain of UCoM boards, made by `connect`.
 
-    A separate thread owns the session. The thread sends heartbeats for boards that this chain has started, supervises the boards, and
-    executes one call after the other. Any thread may make calls. Other Python threads run meanwhile.
+    A separate thread owns the session. The thread of the session sends heartbeats for boards that the chain has started, supervises the
+    boards, and executes one call after the other. Any Python thread may make calls. Other Python threads can run during a call.
 
-    The end of the context stops the control loops, then the applications that this chain has started, like ``ucom``. Ctrl-C during a
-    call does the same before `KeyboardInterrupt` is raised, and so does the end of a program that has not closed its chain. A killed
-    program sends no more heartbeats, and the boards make their outputs safe by themselves after 1.5 s.
+    The end of the context stops the control loops, then the applications that this chain has started, like ``ucom``. Ctrl-C during a call
+    stops them before `KeyboardInterrupt` is raised. The end of a program that has not closed its chain also stops them. A killed program
+    sends no more heartbeats, and the boards make their outputs safe by themselves after 1.5 s.
 
-    Inputs and outputs have names ``BOARD.SIGNAL``, with the board's number or name (``"2.position"``, ``"gripper.position"``). The
-    name of the signal alone is enough if only one board has this signal.
+    Inputs and outputs have names ``BOARD.SIGNAL``, with the board's number or name (``"2.position"``, ``"gripper.position"``). If only one
+    board has the signal, the name of the signal alone is enough.
 
     Every method may raise:
         NoLinkError: The bus is lost, or a board does not answer (``.board``).
-        RefusedError: Another PC is master of the bus (``foreign-master``), or a check refused the call; no board was changed.
+        RefusedError: Another PC is master of the bus (``foreign-master``), or a check refused the call. No board was changed.
         DeviceError: A board reports an error.
         FaultError: The call failed while it ran, or was cancelled.
-    ``.next`` of an error suggests commands of ``ucom``. Methods with the same names have the same effect here.
+    ``.next`` of an error suggests commands of ``ucom``. The methods with the same names as these commands have the same effect.
     """
 
-    # Discovery and numbers.
+    # Discovery and numbers of boards.
 
     def init(self, *, renew: bool = False, force: bool = False, check: bool = True) -> ScanReport:
-        """Resets all boards and numbers them along the init wire. The reset makes their outputs safe.
+        """Resets all boards and numbers them along the init wire. The reset makes the outputs of the boards safe.
 
-        Updates of several boards use the result as inventory. If `connect` was given an inventory file, the result is compared with that
-        file, and written to it if the result has no findings.
+        Updates of several boards use the result as inventory. If an inventory file was passed to `connect`, the result is compared with
+        that file. If the result has no findings, it is written to the file.
 
         Args:
-            renew: Replaces the inventory without comparing.
+            renew: Replaces the inventory without a comparison.
             force: Continues even if another PC is on the bus.
-            check: Raises an error for findings; False: findings are only in the report.
+            check: True raises an error for findings; False: findings are only in the report.
 
         Raises:
-            DeviceError: Boards are missing, in another order, or not reached (``init``).
+            DeviceError: Boards are missing, are in another order, or were not reached (``init``).
             NoLinkError: No board reported (``init``).
         """
-        # Forgets the names in any case, because they belong to the boards that had these numbers before.
+        # The names are forgotten in any case, because they belong to the boards that had these numbers
+        # before.
         self._forget_boards()
         value = self._native.init(renew, force, check)
         return ScanReport(self._keep(value["boards"]), tuple(value["reports"]), tuple(value["findings"]))
 
     def info(self, boards: Boards = "all") -> dict[int, Board]:
-        """Reads the present reports of boards."""
+        """Reads the information that boards report at present."""
         return self._seen(self._native.info(self._list(boards)), whole=True)
 
     def status(
@@ -92,17 +93,17 @@ class Chain(ValuesByName):
         """Restores the number of one board; the other boards keep their numbers.
 
         Args:
-            board: The number.
-            flash_number: Flash number of the board that belongs there; None: the flash number in the inventory.
+            board: Number of the board.
+            flash_number: Flash number of the board that must get the number; None: the flash number in the inventory.
             force: Continues even if another PC is on the bus.
         """
         value = self._native.repair(self._number(board), flash_number, force)
         return self._seen([value])[value["number"]]
 
-    # Applications and control loops.
+    # Applications and control loops of boards.
 
     def start(self, boards: Boards = "all", *, force: bool = False) -> dict[int, Board]:
-        """Starts applications, without any movement. Closing the chain stops the applications again."""
+        """Starts the applications of boards, without any movement. Closing the chain stops these applications again."""
         return self._seen(self._native.start(self._list(boards), force))
 
     def run(
@@ -116,7 +117,7 @@ class Chain(ValuesByName):
         texts: bool = False,
         force: bool = False,
     ) -> RunReport:
-        """Starts applications, writes parameters and inputs, then starts control loops, and supervises them from now on.
+        """Starts applications, writes parameters and inputs, and then starts control loops. From then on the chain supervises the boards.
 
         Args:
             boards: Boards to run.
@@ -124,12 +125,12 @@ class Chain(ValuesByName):
             inputs: Initial inputs, by ``BOARD.NAME``, or by name for all boards.
             parameters: Initial parameters, by ``BOARD.NAME``, or by name for all boards.
             file: Parameter file, YAML, as ``ucom par --save`` and `save_parameters` write it.
-            texts: Lets the boards send the texts of their applications, as events of the kind ``text``.
+            texts: Lets the applications of the boards send texts, which become events of the kind ``text``.
             force: Continues even if the bus would be too busy, or another PC is on the bus.
 
         Raises:
-            RefusedError: A value is out of range (``value``, with ``.value`` and ``.limit``), the bus load is too high
-                (``load``), or another check refused the call. Steps that were already done are undone.
+            RefusedError: A value is out of range (``value``, with ``.value`` and ``.limit``), the bus load is too high (``load``), or
+                another check refused the call. Steps that were already executed are undone.
         """
         path = None if file is None else os.fspath(file)
         first, wanted = self._given(inputs or {}), self._given(parameters or {})
@@ -139,15 +140,15 @@ class Chain(ValuesByName):
         )
 
     def outputs(self, active: bool, boards: Boards = "all") -> None:
-        """Enables the outputs of boards that run, or makes them safe; ``all`` means the boards that this chain runs."""
+        """Enables the outputs of running boards, or makes the outputs safe. ``all`` means the boards that this chain runs."""
         self._native.outputs(self._list(boards), active)
 
     def stop(self, boards: Boards = "all", *, application: bool = True) -> dict[int, Board]:
-        """Stops boards, including boards that another program has started. First stops the control loops at once, then stops each
-        board with its confirmation.
+        """Stops boards, including boards that another program has started. First stops the control loops at once, then stops each board and
+        waits for its confirmation.
 
-        The stop interrupts a call of another thread on this chain, which ends with the error ``cancelled``; an update continues.
-        Stopping is always allowed, even with another PC on the bus.
+        A stop interrupts a call of another thread on this chain, and that call ends with the error ``cancelled``. Updates are not
+        interrupted. Stopping is always allowed, even with another PC on the bus.
 
         Args:
             boards: Boards to stop; ``all`` by broadcast.
@@ -159,10 +160,10 @@ class Chain(ValuesByName):
         return self._seen(self._native.stop(self._list(boards), application))
 
     def reset(self, boards: Boards = "all", *, force: bool = False) -> tuple[int, ...]:
-        """Resets boards. Their outputs become safe, and they have no number until `init` or `repair`.
+        """Resets boards. The outputs of the boards become safe, and the boards have no number until `init` or `repair`.
 
         Returns:
-            Low bytes of the flash numbers of the boards that reported.
+            Low bytes of the flash numbers of the boards that reported after the reset.
         """
         reports = self._native.reset(self._list(boards), force)
         self._boards.clear()
@@ -172,10 +173,10 @@ class Chain(ValuesByName):
         """Resets boards into their exloaders, with programming enabled."""
         return self._seen(self._native.xreset(self._list(boards), force))
 
-    # Diagnosis.
+    # Diagnosis of the chain.
 
     def doctor(self) -> Examination:
-        """Listens to the bus for 1.5 s, queries all boards unless another PC is the master, and reports the findings."""
+        """Listens to the bus for 1.5 s, and queries all boards unless another PC is the master. Returns the findings."""
         value = self._native.doctor()
         findings = tuple(Finding(**finding) for finding in value["findings"])
         return Examination(value["healthy"], findings, tuple(Board._of(one, self) for one in value["boards"]))
@@ -183,23 +184,22 @@ class Chain(ValuesByName):
     def probe(
         self, *, init: bool = False, alive: bool = False, image: _Path | None = None, force: bool = False
     ) -> ProbeReport:
-        """Measures with harmless requests how the boards interpret the open points of the published protocol.
+        """Measures with harmless requests how the boards interpret points that the published protocol leaves open.
 
-        This chain keeps its profile. To use the measured profile, pass it to `connect`.
+        The chain keeps its own profile. To use the measured profile, pass it to `connect`.
 
         Args:
-            init: Also measures points that can be observed only while boards are numbered. This resets and numbers the
-                chain.
-            alive: Starts a control loop with safe outputs to find out which heartbeats a board accepts, and stops it
-                again.
-            image: Image of a board's present application, to find the checksum algorithm of Program IDs.
+            init: Also measures points that can be observed only while boards are numbered. The probe then resets and numbers the chain.
+            alive: Starts a control loop with safe outputs to find out which heartbeats a board accepts. The loop is stopped again.
+            image: Image of a board's present application, from which the probe finds the checksum algorithm of Program IDs.
             force: Continues even if another PC is on the bus, or if ``init`` or ``alive`` ends running control loops.
 
         Raises:
-            RefusedError: Control loops run (``running``), and ``init`` or ``alive`` would end them.
+            RefusedError: Control loops run (``running``), and ``init`` or ``alive`` would end these control loops.
         """
         if init:
-            # Forgets the names in any case, because they belong to the boards that had these numbers before.
+            # The names are forgotten in any case, because they belong to the boards that had these numbers
+            # before.
             self._forget_boards()
         value = self._native.probe(init, alive, None if image is None else os.fspath(image), force)
         rows = tuple(ProbeRow(**row) for row in value["rows"])
@@ -219,13 +219,13 @@ class Chain(ValuesByName):
         Args:
             boards: Boards to test.
             init: Includes tests that reset and renumber the chain.
-            run: Includes tests that start control loops with safe outputs; more than a minute per board.
+            run: Includes tests that start control loops with safe outputs. Tests with control loops take more than a minute per board.
             only: Runs only these tests, such as ``D-T10``.
             force: Continues even if another PC is on the bus.
         """
         return ConformanceReport._of(self._native.conformance(self._list(boards), init, run, list(only), force))
 
-    # Firmware.
+    # Firmware of the boards.
 
     def update(
         self,
@@ -249,38 +249,40 @@ class Chain(ValuesByName):
         check: bool = True,
         progress: Callable[[Progress], None] | bool = True,
     ) -> UpdateReport:
-        """Updates the firmware of boards: checks the image, transfers it twice, and reads back its Program ID and date.
+        """Updates the firmware of boards: checks the image, transfers it twice, and reads back the Program ID and the date.
 
-        A board reports only Program ID and date. The board is skipped as ``up-to-date`` if the inventory file (without a file: this chain)
-        also records that the same bytes were written to the same address. Without that record it is ``program-up-to-date``: no image
-        is sent, and an error is raised unless ``unverified`` is true. After a failure, the same call continues from the point of failure.
+        A board reports only Program ID and date. Two outcomes show that a board already has the program. ``up-to-date``: the inventory file
+        (without a file: this chain) also records that the same bytes were written to the same address, and the board is skipped.
+        ``program-up-to-date``: this record is missing. Without this record, no image is sent, and an error is raised unless ``unverified``
+        is true. After a failure, the same call continues from the point of failure.
 
-        Ctrl-C and an exception of ``progress`` cancel the update. The notes of the exception (Python 3.11) and `events` (``updated``) have
-        the result of each board.
+        Ctrl-C and an exception of ``progress`` cancel the update. The notes of the exception (Python 3.11) and `events` (``updated``)
+        contain the result of each board.
 
         Args:
             image: Intel HEX, S-record or raw bytes of a ``.bin``, as a file; or the content of such a file.
-            boards: A single board by its number, several boards by an inventory (`init`, or a file in `connect`).
-            flash_number: Flash number that the single board must have.
+            boards: A single board by its number. Several boards require an inventory (`init`, or a file in `connect`).
+            flash_number: Required flash number of the single board.
             second: Image of the other cycle, if the profile's ``prog.plan`` sends two images.
-            raw: Reads a file of any name as raw bytes; never records, and text only from a ``.bin``.
+            raw: Reads a file with any name as raw bytes. Files with records are never read as raw bytes, and text is read only from a
+                ``.bin``.
             addresses: Unit of the addresses in records, if the file does not show it.
-            fill_gaps: Fills gaps between records with FF.
+            fill_gaps: Fills gaps between records with bytes FF.
             date: Flash date; None: today, UTC. A board that already has the program keeps its date.
             expect_program_id: Program ID that the boards must show at the end.
-            name_target: Writes the board into the header, so that any other board refuses the image.
+            name_target: Writes the board into the header of the image, so that any other board refuses the image.
             group: Updates all boards with one transfer, by broadcast.
-            start: Starts the application at the end; closing the chain stops the application, as after `start`.
-            dry_run: Only runs the checks; no frame that changes a board is sent.
-            unverified: Accepts boards that cannot be verified, also ``program-up-to-date``.
+            start: Starts the application at the end. Closing the chain stops the application, as after `start`.
+            dry_run: Runs only the checks of the update. No frame that changes a board is sent.
+            unverified: Accepts boards whose image cannot be verified, including ``program-up-to-date``.
             force: Continues even if boards run, another PC is on the bus, or the board already has the program.
             rewrite: Updates a board that already has the program. All checks are still made.
-            check: Raises an error if a board was not updated; False: the failure is only in the report.
-            progress: Function that is called with each `Progress`; True: a line on a terminal's stderr.
+            check: True raises an error if a board was not updated; False: the failure is only in the report.
+            progress: Function that is called with each `Progress`; True: progress is shown in a line on stderr, if it is a terminal.
 
         Raises:
             RefusedError, NoLinkError, DeviceError: No board was erased.
-            FaultError: A board was erased: run the update again.
+            FaultError: A board was erased. Run the update again.
         """
         today = datetime.datetime.now(datetime.timezone.utc).date()
         asked = None if date is None else (date.year, date.month, date.day)

@@ -1,4 +1,4 @@
-"""Results of procedures on a chain."""
+"""Results of procedures on a chain of boards."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ScanReport:
-    """Boards in the chain.
+    """Boards that were found in the chain.
 
     Attributes:
         boards: Boards with a number, in the order of the chain.
         reports: Low bytes of the flash numbers of all boards that reported, including boards without a number.
-        findings: Irregularities, in words; empty for a chain in order.
+        findings: Irregularities, in words; empty if the chain is in order.
     """
 
     boards: tuple[Board, ...]
@@ -45,7 +45,7 @@ class RunReport:
 
     Attributes:
         boards: Numbers of the boards whose control loops were started.
-        active: True if their outputs are enabled: things move.
+        active: True if the outputs of these boards are enabled, so that things move.
         load_percent: Predicted bus load, % of the bit rate.
         load_limit_percent: Bus load that the profile allows, %.
     """
@@ -62,7 +62,7 @@ class Finding:
 
     Attributes:
         severity: ``problem``, ``warning`` or ``good``.
-        what: The finding.
+        what: Description of the finding.
         why: Likely cause; may be empty.
         next: Next command or step; empty if no step is needed.
     """
@@ -99,7 +99,7 @@ class Event:
             ``in-loop``. Board: ``error``, ``text``. Bus: ``competing-master``, ``foreign``, ``number-shared``. Others:
             ``updated``, with the result of an update for a board, and ``note``.
         board: Number of the board; None if the event is not about a board.
-        text: Event in words.
+        text: Description of the event in words.
     """
 
     number: int
@@ -131,13 +131,13 @@ class Progress:
     """Progress of an update.
 
     Attributes:
-        boards: Boards that receive the image now.
+        boards: Numbers of the boards that receive the image now.
         attempt: Number of the attempt, from 1.
         cycle: 1 (the board checks the image) or 2 (the board writes the image).
-        bytes: Bytes of both cycles that the boards accepted in this attempt.
-        total_bytes: Bytes of both cycles.
-        rate: Bytes per second so far.
-        remaining_s: Remaining time at that rate, s.
+        bytes: Number of bytes that the boards have accepted in this attempt, counted over both cycles.
+        total_bytes: Number of bytes of both cycles.
+        rate: Average rate of this attempt, bytes/s.
+        remaining_s: Remaining time at this rate, s.
     """
 
     boards: tuple[int, ...]
@@ -163,10 +163,10 @@ class UpdateResult:
         outcome: ``not-started``, ``cancelled``, ``up-to-date``, ``program-up-to-date``, ``incomplete``, ``unknown``, ``written``,
             ``verified`` or ``running``.
         note: Remark about a board that already had the program; empty for any other board.
-        verified: True if the board shows the Program ID and date of the image, and exactly this image was written to this address:
-            in this update, or in an earlier one that the inventory records.
-        before: Program ID and flash date before the update. Each is None without a valid application or an answer.
-        after: Program ID and flash date now.
+        verified: True if the board reports the Program ID and date of the image, and exactly this image was written to this address. The
+            image was written in this update, or in an earlier update that the inventory records.
+        before: Program ID and flash date before the update. Each value is None without a valid application or an answer.
+        after: Program ID and flash date after the update.
         attempts: Number of attempts.
         time_s: Time from the reset into the exloader to the last answer, s.
         error: Reason of the failure; empty after a success.
@@ -191,8 +191,8 @@ class UpdateReport:
     Attributes:
         dry_run: True if only queries were sent.
         program_id: Program ID that the boards must show; None: the Program ID is not known.
-        flash_date: Flash date of the image, ``YYYY-MM-DD``; None: no header has a date.
-        bytes: Bytes of both cycles.
+        flash_date: Flash date of the image, ``YYYY-MM-DD``; None: no header contains a date.
+        bytes: Number of bytes of both cycles.
         unverifiable: Reason why the written image cannot be verified; None: the image can be verified.
         boards: Results in the order of board numbers.
     """
@@ -224,11 +224,11 @@ class ProbeRow:
 
     Attributes:
         key: Key of the profile.
-        unknown: The open point.
-        published: Statement of the published description about it.
+        unknown: Question about the protocol that the published description leaves open.
+        published: Statement of the published description about the open point.
         observed: Observed behaviour of the boards.
-        decision: Value in the profile.
-        measured: True if the observation decides the value; otherwise the earlier value is kept.
+        decision: Value of the key in the profile.
+        measured: True if the observation decides the value; otherwise the earlier value stays in the profile.
     """
 
     key: str
@@ -245,8 +245,8 @@ class ProbeReport:
 
     Attributes:
         boards: Numbers of the boards that answered.
-        rows: Open points, measured or kept.
-        profile: Profile with the measured values, TOML; as a file it can be passed to `connect`.
+        rows: Open points, with measured values or with values that were kept.
+        profile: Profile with the measured values, TOML. Write it to a file to pass it to `connect`.
     """
 
     boards: tuple[int, ...]
@@ -283,7 +283,7 @@ class ConformanceReport:
 
     Attributes:
         tests: Tests in the order in which they ran.
-        left: Changes of the boards that the tests could not restore; empty if all are restored.
+        left: Changes of the boards that the tests could not undo; empty if all changes were undone.
     """
 
     tests: tuple[ConformanceTest, ...]

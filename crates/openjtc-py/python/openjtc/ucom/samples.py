@@ -1,4 +1,4 @@
-"""Outputs of boards as a stream and as tables."""
+"""Outputs of boards as a stream of samples and as tables."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ class OutputTable:
 
 
 class Monitor(Iterator[Sample]):
-    """Iterator over samples as they arrive, which ends after a time or a number of samples. `Chain.monitor` makes this
-    iterator.
+    """Iterator over samples as they arrive. The iterator ends after a time or a number of samples. `Chain.monitor`
+    makes it.
 
     Raises:
-        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``); raised only
+        FaultError: A board was lost (``lost``), or has left its control loop by itself (``left-loop``). Each of these errors is raised only
             once.
         NoLinkError: No board has sent outputs for 3 s (``no-outputs``), or the bus is lost.
     """
@@ -82,7 +82,7 @@ class Monitor(Iterator[Sample]):
 
     @property
     def dropped(self) -> int:
-        """Number of samples that were dropped because they were not read in time."""
+        """Number of samples that were dropped because the program did not read them in time."""
         return self._native.dropped
 
     def to_numpy(self) -> dict[int, OutputTable]:
@@ -95,7 +95,7 @@ class Monitor(Iterator[Sample]):
 
 
 def to_numpy(samples: Iterable[Sample]) -> dict[int, OutputTable]:
-    """Returns samples as one table per board, by board number."""
+    """Returns the samples as one table per board. The keys are board numbers."""
     by_board: dict[int, list[Sample]] = {}
     for sample in samples:
         by_board.setdefault(sample.board, []).append(sample)
@@ -110,7 +110,7 @@ def to_numpy(samples: Iterable[Sample]) -> dict[int, OutputTable]:
 def to_pandas(samples: Iterable[Sample]) -> Any:
     """Returns samples as a ``pandas.DataFrame``: ``time_s``, ``board``, and a column for each output.
 
-    Boards with different outputs have NaN in the columns of other boards.
+    If boards have different outputs, a row has NaN in the columns of other boards.
 
     Raises:
         ImportError: pandas is not installed; the message says how to install it.

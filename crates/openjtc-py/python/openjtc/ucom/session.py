@@ -1,4 +1,4 @@
-"""Session of a chain: opening and closing, names of boards, events."""
+"""Session of a chain: opening and closing the chain, names of boards, and events."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _Self = TypeVar("_Self", bound="Session")
 
 
 def _close(native: _native.Chain) -> None:
-    """Closes a chain at the end of the program, or when the last reference to an open chain ends."""
+    """Closes a chain at the end of the program, or when the last reference to an open chain is deleted."""
     not_stopped = native.close()
     if not_stopped and sys.stderr is not None:
-        # Exceptions are suppressed, because no caller could catch them here.
+        # Exceptions are suppressed, because no caller could handle them at this point.
         with contextlib.suppress(OSError, ValueError):
             print(f"openjtc: {_not_stopped(not_stopped)}", file=sys.stderr, flush=True)
 
@@ -57,7 +57,7 @@ class Session:
 
     @property
     def simulated(self) -> SimulatedChain | None:
-        """Simulated chain that was passed to `connect` or that `connect` has made; otherwise None."""
+        """Simulated chain that was passed to `connect` or that `connect` has made; None for a real chain."""
         return self._simulated
 
     def __enter__(self: _Self) -> _Self:
@@ -73,10 +73,11 @@ class Session:
             self.check()
 
     def close(self) -> None:
-        """Stops everything that this chain has started, and releases the bus. The context manager does the same, then calls `check`.
+        """Stops everything that this chain has started, and releases the bus. The end of the context also stops everything, and then calls
+        `check`.
 
         Raises:
-            FaultError: Some boards may not be stopped (``not-stopped``). Without heartbeats they become safe by themselves.
+            FaultError: Some boards may not be stopped (``not-stopped``). Without heartbeats, these boards become safe by themselves.
         """
         not_stopped = self._end()
         if not_stopped:
@@ -87,7 +88,8 @@ class Session:
         try:
             return list(self._native.close())
         except BaseException:
-            # Ctrl-C has interrupted the wait. The thread continues, and the end of the program waits for it.
+            # Ctrl-C has interrupted the wait. The thread of the session continues, and the end of the program waits
+            # for it.
             self._finalizer = weakref.finalize(self, _close, self._native)
             raise
 
@@ -102,12 +104,12 @@ class Session:
     def __repr__(self) -> str:
         return f"<openjtc.ucom.Chain {self.url}>"
 
-    # Events and errors.
+    # Events of the chain, and errors.
 
     def check(self) -> None:
-        """Raises an error, once for each event, if a board was lost, left its control loop by itself, or shares its number.
+        """Raises an error if a board was lost, left its control loop by itself, or shares its number. Each event raises only one error.
 
-        Iterating a `monitor`, calling `values`, reading an old output, and the end of the context do the same.
+        Iterating a `monitor`, calling `values`, reading an old output, and the end of the context also raise errors about boards.
 
         Raises:
             FaultError: ``lost``, ``left-loop`` or ``number-shared``, with ``.board``.
@@ -130,8 +132,8 @@ class Session:
         """Records every frame of the bus, including the frames of this chain, until the end of the context or ``.end()``.
 
         Args:
-            path: File: ``.log`` for the format of candump, ``.fzi`` for FZI-CAN, ``.mcap`` for MCAP. The profile is written into the file
-                or next to it.
+            path: Path of the file: ``.log`` for the format of candump, ``.fzi`` for FZI-CAN, ``.mcap`` for MCAP. The profile is written
+                into the file or into a file next to it.
             overwrite: Overwrites an existing file.
         """
         if not overwrite and Path(path).exists():
@@ -164,12 +166,12 @@ class Session:
 
 
 class Recording:
-    """A recording in progress. As a context manager it ends the recording."""
+    """A recording in progress. Used as a context manager, it ends the recording when the block ends."""
 
     def __init__(self, native: ChainRecording) -> None:
         self._native = native
-        #: Number of written frames. The next attribute is the number of frames that were left out, because the format
-        #: cannot hold their protocol. Both are set at the end.
+        #: Number of written frames. The next attribute is the number of omitted frames, whose protocol the format
+        #: cannot store. The chain sets both numbers of frames at the end of the recording.
         self.frames = 0
         self.left_out = 0
 

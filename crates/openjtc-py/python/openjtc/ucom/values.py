@@ -17,13 +17,14 @@ from openjtc.ucom.session import Boards, Session
 
 __all__ = ["Settable", "ValuesByName"]
 
-#: A value to set: a number, a number with its unit (``"15.5 deg"``), a raw word (``"0x05DC"``), or a switch.
+#: A value that a caller sets: a number, a number with its unit (``"15.5 deg"``), a raw word (``"0x05DC"``),
+#: or a switch.
 Settable = bool | int | float | str
 _Path = str | os.PathLike[str]
 
 
 def _text(value: Settable, unit: str = "") -> str:
-    """Returns a value as text in the form of `ucom`."""
+    """Returns a value as text, in the form that `ucom` uses."""
     if isinstance(value, str):
         return f"{value} {unit}".strip()
     if isinstance(value, bool):
@@ -67,13 +68,13 @@ class ValuesByName(Session):
         """Returns the inputs, outputs and parameters of a board.
 
         Raises:
-            RefusedError: The application is not started, and its signal names are not known (``no-application``): call `start`.
+            RefusedError: The application is not started, and the chain does not know its signal names (``no-application``). Call `start`.
         """
         (value,) = self._native.signals(str(self._number(board)))
         return Signals._of(value)
 
     def initial_inputs(self, board: int | str) -> dict[str, Value]:
-        """Reads the initial inputs that a board requests. The application must be started."""
+        """Reads the initial inputs that a board requests. The application of the board must be started."""
         return dict(self._native.initial_inputs(self._number(board)))
 
     def set(
@@ -87,13 +88,13 @@ class ValuesByName(Session):
     ) -> Value:
         """Sets an input, or writes a parameter.
 
-        An input is sent at once, and repeated while its board runs. Parameters cannot be read back from a board, and the board loses
-        them when its application ends.
+        An input is sent at once, and is repeated while the board runs. Parameters cannot be read back from a board, and the board loses its
+        parameters when its application ends.
 
         Args:
-            name: ``BOARD.NAME``, in upper or lower case, or the name alone if only one board has this signal.
+            name: ``BOARD.NAME``, in upper or lower case. The signal name alone is sufficient if only one board has this signal.
             value: A number, ``"15.5 deg"``, a word ``"0x05DC"``, or a switch.
-            unit: Unit of the value. A signal with a unit in the signal table refuses bare numbers.
+            unit: Unit of the value. A signal with a unit in the signal table refuses numbers without a unit.
             kind: Selects the input or the parameter if both have the same name; None: the input.
             force: Continues even if another PC is on the bus.
 
@@ -102,7 +103,7 @@ class ValuesByName(Session):
 
         Raises:
             UsageError: No board has this signal (``no-edge``).
-            RefusedError: The value is out of range or lacks its unit (``value``, with ``.value`` and ``.limit``).
+            RefusedError: The value to set is out of range or lacks its unit (``value``, with ``.value`` and ``.limit``).
         """
         board, signal = self._find(name)
         return _value(self._native.set(board, kind, signal, _text(value, unit), force))
@@ -111,11 +112,11 @@ class ValuesByName(Session):
         self.set(name, value)
 
     def __getitem__(self, name: str) -> Value:
-        """Returns an output by its name. If no output has the name, returns the input that was set last, or the
-        parameter that was written last (None: not known).
+        """Returns an output by its name. If no output has this name, returns the input that was set last, or the parameter that was
+        written last (None: not known).
 
         Raises:
-            NoLinkError: The board has sent no outputs at all (``no-outputs``), or none for 0.5 s (``stale``).
+            NoLinkError: The board has sent no outputs at all (``no-outputs``), or no outputs for 0.5 s (``stale``).
             FaultError: The board was lost, or has left its control loop by itself.
         """
         board, signal = self._find(name)
@@ -126,17 +127,16 @@ class ValuesByName(Session):
 
         Raises:
             FaultError: A board was lost, or has left its control loop by itself.
-            NoLinkError: A board has sent no outputs at all (``no-outputs``), or none for 0.5 s (``stale``), with
-                ``.board``.
+            NoLinkError: A board has sent no outputs at all (``no-outputs``), or no outputs for 0.5 s (``stale``), with ``.board``.
         """
         self.check()
         boards = [BoardValues._of(value) for value in self._native.running()]
         return {f"{one.board}.{name}": value for one in boards for name, value in one.outputs.items()}
 
     def board_values(self, boards: Boards = "all") -> dict[int, BoardValues]:
-        """Returns outputs with their age, inputs and parameters of boards, including boards that another program runs.
+        """Returns the outputs of boards with their age, and the inputs and parameters. Includes boards that another program runs.
 
-        ``all`` leaves out boards without names, because their applications are not started.
+        ``all`` omits boards whose signal names are not known, because their applications are not started.
         """
         all_values = (BoardValues._of(value) for value in self._native.values(self._list(boards)))
         return {one.board: one for one in all_values}
@@ -144,23 +144,24 @@ class ValuesByName(Session):
     def monitor(
         self, boards: Boards | None = None, *, seconds: float | None = None, count: int | None = None
     ) -> Monitor:
-        """Returns an iterator of `Sample` with outputs as they arrive. ``.to_pandas()`` and ``.to_numpy()`` make tables from
-        it.
+        """Returns an iterator over the outputs as they arrive, as `Sample`. ``.to_pandas()`` and ``.to_numpy()`` make tables from the
+        iterator.
 
         Args:
-            boards: Boards to read, including boards that another program runs. None: the boards that this chain runs, or all boards if it
-                runs none. ``all`` leaves out boards without names, because their applications are not started.
+            boards: Boards to read, including boards that another program runs; None: the boards that this chain runs, or all boards if it
+                runs none. ``all`` omits boards whose signal names are not known, because their applications are not started.
             seconds: Time after which the iterator ends, s.
             count: Number of samples after which the iterator ends.
         """
         return Monitor(self._native.samples(None if boards is None else self._list(boards)), seconds, count)
 
     def save_parameters(self, path: _Path, boards: Boards = "all") -> None:
-        """Writes a parameter file, YAML, with the values written last, and all other names as comments."""
+        """Writes a parameter file, YAML. The parameter file contains the values written last, and all other names as comments."""
         Path(path).write_text(self._native.parameters_text(self._list(boards)), encoding="utf-8")
 
     def apply_parameters(self, path: _Path, *, dry_run: bool = False, force: bool = False) -> int:
-        """Checks a whole parameter file against boards, programs, names and ranges, then writes the parameters. Returns their number."""
+        """Checks a whole parameter file against boards, programs, names and ranges, then writes the parameters. Returns the number of
+        parameters."""
         return self._native.apply_parameters(os.fspath(path), dry_run, force)
 
     def _keep(self, boards: list[dict[str, Any]]) -> tuple[Board, ...]:
@@ -171,12 +172,12 @@ class ValuesByName(Session):
         return all_boards
 
     def _forget_boards(self) -> None:
-        """Forgets numbers and names, because they may belong to other boards from now on."""
+        """Forgets board numbers and signal names, because they may belong to other boards from now on."""
         self._boards, self._inventory_names, self._looked = {}, {}, False
 
     def _named(self, name: str) -> int | None:
         number = super()._named(name)
-        # A scan reads the names of the inventory. Lists and ranges are not names.
+        # A scan reads the names of the inventory. Lists and ranges of boards are not names.
         if number is None and not self._looked and any(letter.isalpha() for letter in name):
             self.scan()
             number = super()._named(name)
@@ -192,7 +193,7 @@ class ValuesByName(Session):
         return seen
 
     def _find(self, name: str) -> tuple[int, str]:
-        """Splits a name into board and signal."""
+        """Splits a name into the board and the signal."""
         first, dot, rest = name.partition(".")
         number = self._named(first) if dot else None
         if number is not None and rest:

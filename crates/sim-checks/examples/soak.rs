@@ -1,11 +1,11 @@
-//! Simulates hours of operation with random commands and faults: `soak --hours 24 --seed 1`. The exit code is 1
-//! if an invariant is violated.
+//! Simulates hours of operation with random commands and faults: `soak --hours 24 --seed 1`. If an invariant is
+//! violated, the exit code is 1.
 use std::process::ExitCode;
 use std::time::Instant;
 
 use sim_checks::soak::Soak;
 
-/// Time after which a new world with the next seed is created, in ms.
+/// Time after which the example creates a new world with the next seed, ms.
 const WORLD_MS: u64 = 600_000;
 
 fn main() -> Result<ExitCode, String> {

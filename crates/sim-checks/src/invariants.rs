@@ -1,4 +1,4 @@
-//! Invariants that hold in every millisecond, and a checker that runs together with a simulation.
+//! Invariants that must hold in every millisecond, and a checker that runs together with a simulation.
 use jtc_bus::{Joint, Request, Target};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
@@ -14,7 +14,7 @@ use jtc_sim::{Moment, Worked, World};
 /// Minimum number of ticks between two frames that replace Move.
 const MOVES_BETWEEN: u32 = 3;
 
-/// Checker, including its state from the previous milliseconds.
+/// Checker of the invariants, with its state from the previous milliseconds.
 #[derive(Clone, Debug)]
 pub struct Invariants {
     state: ControllerState,
@@ -62,7 +62,7 @@ impl Invariants {
         self.check_moment(&world.moment())
     }
 
-    /// Checks a millisecond.
+    /// Checks the data of one millisecond.
     pub fn check_moment(&mut self, moment: &Moment<'_>) -> Result<(), Violation> {
         self.look(moment).map_err(|broken| Violation { time_us: moment.time_us, broken })
     }
@@ -73,7 +73,7 @@ impl Invariants {
         }
         let telemetry = moment.telemetry;
         if telemetry.tick <= self.controller_ticks {
-            // After a reset, the controller starts from its initial state.
+            // After a reset, the controller starts from its initial state, so the checker also restarts.
             *self = Self::default();
         }
         self.controller_ticks = telemetry.tick;
@@ -141,7 +141,7 @@ impl Invariants {
             return Err(Broken::LeftErrorAlone { to });
         }
         if to == ControllerState::Error {
-            // A command before the error does not permit an action after the error.
+            // A command that was sent before the error must not permit an action after the error.
             self.execute = false;
             self.teach = false;
         } else {
@@ -172,7 +172,7 @@ impl Invariants {
         Ok(())
     }
 
-    /// Checks J-12, J-13, J-16 and J-21 on the bus.
+    /// Checks J-12, J-13, J-16 and J-21 for the frame on the joint bus.
     fn frame(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let state = moment.telemetry.state;
         let Some(frame) = moment.sent else {

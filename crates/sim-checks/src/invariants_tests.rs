@@ -1,4 +1,4 @@
-//! Tests that the checker finds each violation.
+//! Tests that the checker finds violations of each kind.
 use jtc_core::{Config, Telemetry};
 
 use super::*;
@@ -113,7 +113,7 @@ fn j24_leaving_error_or_moving_without_a_command_is_found() {
         Some(Broken::ExecutionAlone { to: TrajectoryState::Execute })
     );
 
-    // A command before the error does not permit an action after the error.
+    // A command that was sent before the error must not permit an action after the error.
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
     assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
@@ -200,7 +200,7 @@ fn j22_a_wrong_safety_output_is_found() {
     ));
 }
 
-/// Returns a joint that moves on the path at this speed; Stop is executed in the next tick.
+/// Returns a joint that moves on the path at this speed. The Stop is executed in the next tick.
 fn stopped_at(speed: f64) -> Script {
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
@@ -212,7 +212,8 @@ fn stopped_at(speed: f64) -> Script {
 
 #[test]
 fn j33_a_stop_that_takes_too_long_is_found() {
-    // Set values that do not come to rest, and an arm that does not follow the set values.
+    // The test covers set values that do not come to rest, and an arm that does not follow the set
+    // values.
     for (state, trajectory) in [
         (ControllerState::Operate, TrajectoryState::Execute),
         (ControllerState::HoldPos, TrajectoryState::Stop),
@@ -221,7 +222,8 @@ fn j33_a_stop_that_takes_too_long_is_found() {
         let found = (0..600).find_map(|ms| script.tick(state, trajectory).map(|broken| (ms, broken)));
         assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{trajectory:?}");
     }
-    // If a stop was commanded before it could be executed, it begins when the arm brakes.
+    // If a stop was commanded before the controller could execute it, the time of the stop begins
+    // when the arm brakes.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     script.telemetry.braking = true;
@@ -264,7 +266,7 @@ fn j33_a_stop_that_ends_is_none_and_an_error_ends_it() {
 
     let mut script = stopped_at(0.3);
     assert!((0..600).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
-    // Without a command, the arm may move without a time limit.
+    // If no stop was commanded, the arm may move without a time limit.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     assert!((0..600).all(|_| script.tick(ControllerState::Operate, TrajectoryState::Execute).is_none()));
@@ -284,7 +286,7 @@ fn j35_a_joint_that_races_is_found() {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
     assert_eq!(found, Some((6, Broken::Speed { joint: Joint::ALL[3], velocity: -1.01 * limit, ticks: 6 })));
-    // A predicted velocity neither increases nor resets the counted time.
+    // A predicted velocity must neither increase nor reset the counted ticks.
     let mut script = fast();
     assert!((0..5).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = false;
@@ -302,7 +304,7 @@ fn j35_a_joint_that_races_is_found() {
 #[test]
 fn j43_torque_that_stays_at_its_limit_is_found() {
     let limit = Config::avena().joints[0].torque_max;
-    // The torque is at the limit in every ninth tick, and in every tenth tick.
+    // The torque is at the limit in every ninth tick or in every tenth tick.
     for (period, allowed) in [(9, false), (10, true)] {
         let mut script = Script::new();
         let mut good = true;
@@ -324,7 +326,8 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
     assert_eq!(found, Some((11, Broken::Saturated { joint: Joint::ALL[0], ticks: 11 })));
-    // A joint that was just enabled has one second to catch its load, but no time in Teaching.
+    // A joint that was just enabled has one second to catch its load. In Teaching it has no such
+    // time.
     for (state, last) in [(ControllerState::HoldPos, 1_000), (ControllerState::Teaching, 0)] {
         let mut script = Script::new();
         script.telemetry.joints[0].torque = limit;

@@ -1,5 +1,5 @@
-//! Lowering of an arm through a pose in which its shoulder carries much of its torque limit. The arm is stopped in this pose (J-33). The
-//! module is used by tests, and for the tables of docs/safety.md.
+//! Lowering of an arm through a pose in which its shoulder needs much of its torque limit. A command stops the arm in this pose (J-33).
+//! Tests and the tables of docs/safety.md use this module.
 use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
@@ -8,14 +8,14 @@ use jtc_sim::{ModelError, Operator, OperatorError, SimConfig, Support, host};
 
 /// Joint that lowers the arm: the shoulder, which carries the largest load.
 pub const LOADED: usize = 1;
-/// Speed below which a joint counts as being at rest, in rad/s.
+/// Speed below which a joint counts as being at rest, rad/s.
 const STANDS: f64 = 0.01;
-/// Time at rest after which the observation ends, in ms.
+/// Time at rest after which the observation ends, ms.
 const STOOD_MS: u64 = 1_000;
-/// Maximum duration of the observation, in ms.
+/// Maximum duration of the observation, ms.
 const LONGEST_MS: u64 = 10_000;
 
-/// Returns a pose with the arm in front of the shoulder; the shoulder angle may be between upright and nearly horizontal.
+/// Returns a pose with the arm in front of the shoulder. The shoulder angle may be between upright and nearly horizontal.
 fn pose(shoulder: f64) -> JointVec {
     [0.0, shoulder, 0.3, 0.0, 0.0, 0.0]
 }
@@ -33,7 +33,7 @@ pub fn with_payload(mass: f64) -> ArmModel {
     model
 }
 
-/// Returns the angle of the shoulder, in rad, at which its holding torque is `torque` (N·m).
+/// Returns the shoulder angle at which the holding torque of the shoulder is `torque` (N·m), rad.
 pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     let (mut high, mut low) = (0.0, -1.4);
     for _ in 0..60 {
@@ -43,20 +43,20 @@ pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     low
 }
 
-/// Lowering of the arm through the angle `shoulder`, at which the command is sent.
+/// Lowering of the arm through the shoulder angle `shoulder`, at which the host sends the command.
 #[derive(Clone, Debug)]
 pub struct Lowering {
-    /// Arm.
+    /// Model of the simulated arm.
     pub model: ArmModel,
-    /// Model that the controller receives.
+    /// Arm model that the controller receives.
     pub known: ArmModel,
     /// Torque limit of the shoulder, N·m.
     pub torque_max: f64,
-    /// Angle of the shoulder at which the command is sent, rad.
+    /// Angle of the shoulder at which the host sends the command, rad.
     pub shoulder: f64,
-    /// Speed at that angle, rad/s.
+    /// Speed of the shoulder at the angle `shoulder`, rad/s.
     pub speed: f64,
-    /// Pause or Stop.
+    /// Command: Pause or Stop.
     pub command: ExecCommand,
     /// Deviation of the simulated arm from `model`.
     pub model_error: ModelError,
@@ -67,25 +67,25 @@ pub struct Lowering {
 /// Result of a lowering.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Maximum deviation of a joint from the start pose, in rad, within half a second after all joints were enabled.
+    /// Maximum deviation of a joint from the start pose within half a second after all joints were enabled, rad.
     pub sag: f64,
-    /// Time from the last byte of the command until the trajectory state leaves Execute, in ms.
+    /// Time from the last byte of the command until the trajectory state leaves Execute, ms.
     pub commanded_ms: u64,
-    /// Time until all joints are at rest, in ms.
+    /// Time from the last byte of the command until all joints are at rest, ms.
     pub standing_ms: u64,
-    /// State at the end.
+    /// State of the controller at the end.
     pub state: ControllerState,
     /// Trajectory state at the end.
     pub trajectory: TrajectoryState,
-    /// Error word at the end.
+    /// Error word of the controller at the end.
     pub errors: u16,
     /// Internal errors of all joints at the end.
     pub joints: u16,
-    /// Maximum distance of a joint from its position at the time of the command, in rad.
+    /// Maximum distance of a joint from its position at the time of the command, rad.
     pub way: f64,
-    /// Maximum true speed of a joint after the command, in rad/s.
+    /// Maximum true speed of a joint after the command, rad/s.
     pub peak: f64,
-    /// Maximum position error of all joints until the trajectory state leaves Execute, in rad.
+    /// Maximum position error of all joints until the trajectory state leaves Execute, rad.
     pub error: f64,
 }
 
@@ -98,7 +98,7 @@ impl Lowering {
         Self { torque_max: holding_torque(&model, shoulder) / share, ..Self::new(model, shoulder, speed) }
     }
 
-    /// Creates a lowering of an arm whose model the controller knows, with the default torque limit and a Stop as the command.
+    /// Creates a lowering of an arm whose model the controller knows, with the default torque limit and the command Stop.
     pub fn new(model: ArmModel, shoulder: f64, speed: f64) -> Self {
         Self {
             known: model,
@@ -112,7 +112,8 @@ impl Lowering {
         }
     }
 
-    /// Returns the operator of a simulation that was just switched on. The arm rests on its stand or brakes, above the pose of the stop.
+    /// Returns the operator of a simulation that was just switched on. The arm rests on its stand or brakes, above the pose in which it
+    /// is stopped.
     fn operator(&self, from: JointVec) -> Operator {
         let mut controller = Config::avena();
         controller.joints[LOADED].torque_max = self.torque_max;
@@ -128,7 +129,7 @@ impl Lowering {
 
     /// Lowers the arm and stops it.
     pub fn run(&self) -> Result<Outcome, OperatorError> {
-        // In the middle of the quintic, the speed is 15/8 of the mean speed.
+        // In the middle of the quintic polynomial, the speed is 15/8 of the mean speed.
         let reach = 0.3;
         let seconds = 15.0 / 8.0 * 2.0 * reach / self.speed;
         let (from, to) = (pose(self.shoulder + reach), pose(self.shoulder - reach));

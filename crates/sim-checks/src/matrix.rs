@@ -18,12 +18,12 @@ pub use contact::contact_table;
 pub use standstill::standstill_table;
 pub use stopping::stopping_table;
 
-/// Time for which a reaction is expected, in ms.
+/// Time for which the matrix observes the controller after the fault begins, ms.
 const WATCH_MS: u64 = 600;
-/// Pose in which the arm is held, in rad.
+/// Pose in which the controller holds the arm, rad.
 const START: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 
-/// States in which faults are injected. The Start state lasts a single tick.
+/// States in which the matrix injects faults. The state Start lasts only one tick.
 const STATES: [ControllerState; 5] = [
     ControllerState::Init,
     ControllerState::HoldPos,
@@ -35,19 +35,20 @@ const STATES: [ControllerState; 5] = [
 /// Reaction to a fault in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// No reaction occurred within the observed time.
+    /// The controller did not react within the observed time.
     None,
     /// The controller entered another state, or reported more errors in the same state.
     Change {
-        /// New state.
+        /// State after the reaction.
         state: ControllerState,
-        /// New error word.
+        /// Error word after the reaction.
         errors: u16,
-        /// New internal errors of all joints.
+        /// Internal errors of all joints after the reaction.
         joints: u16,
-        /// `true` if the state is unchanged; `errors` and `joints` then contain only the added errors.
+        /// `true` if the state of the controller is unchanged. `errors` and `joints` then contain only the added errors.
         same: bool,
-        /// Number of the tick with the reaction, counted from the fault; the controller can detect the fault in tick 1.
+        /// Number of the tick with the reaction, counted from the fault. The controller can detect the fault in tick 1 at the
+        /// earliest.
         tick: u64,
     },
     /// The watchdog reset the controller.
@@ -108,19 +109,19 @@ pub enum MatrixError {
     Invariant(Violation),
     /// The arm did not come to rest within the time of a Pause or Stop.
     NoStop {
-        /// Time until the arm was at rest, in ms; `None` if the stop ended in an error or the motion did not begin.
+        /// Time until the arm was at rest, ms; `None` if the stop ended in an error or the motion did not begin.
         ms: Option<u64>,
     },
-    /// The arm was released after a fault that permits the controller to hold it.
+    /// The controller released the arm after a fault that permits it to hold the arm.
     Released {
-        /// State before.
+        /// State of the controller before the fault.
         state: ControllerState,
     },
-    /// An expected reaction did not occur.
+    /// The controller did not react as expected.
     NoReaction {
         /// Row of the table.
         row: &'static str,
-        /// State.
+        /// State of the controller before the fault.
         state: ControllerState,
     },
 }
@@ -148,8 +149,8 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// Cell of the matrix: the reaction, and how the arm recovers after ClearCurrentErrors. If the parameters were lost, the host sends
-/// them again.
+/// Cell of the matrix: the reaction, and how the arm recovers after ClearCurrentErrors. If the controller has lost the parameters,
+/// the host sends them again.
 struct Cell {
     reaction: Reaction,
     back: Back,
@@ -240,7 +241,7 @@ fn config_for(support: Support, host_timeout_ms: u16) -> SimConfig {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     config.controller.host_timeout_ms = host_timeout_ms;
     for drive in &mut config.drives {
-        // The motor alignment would take seconds in which nothing else occurs.
+        // With the normal duration, the motor alignment would take seconds in which nothing else occurs.
         drive.first_enable_ms = 60;
     }
     config
@@ -256,7 +257,7 @@ fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, Opera
     }
     operator.bring_up()?;
     operator.run(200);
-    // If the host is supervised, it sends frames until the fault.
+    // If host supervision is enabled, the host sends frames until the fault.
     let run = |operator: &mut Operator, ms: u64| {
         for _ in 0..ms / 50 {
             operator.run(50);
@@ -294,7 +295,7 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     let mut reaction = Reaction::None;
     for tick in 1..=WATCH_MS {
         if tick % 50 == 1 {
-            // This frame has no effect; faults of the line can damage it.
+            // The harmless frame has no effect, but faults of the line can damage it.
             operator.world.host_write(&harmless());
         }
         row.act.before(&mut operator, tick);
@@ -334,7 +335,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -
     Ok(Back::Never)
 }
 
-/// Values that are compared with the values of the next tick.
+/// Values of the last tick, for the comparison with the next tick.
 struct Watch {
     invariants: Invariants,
     state: ControllerState,
@@ -342,7 +343,7 @@ struct Watch {
     resets: u32,
 }
 
-/// Detected change.
+/// Change that the watch has detected.
 #[derive(Clone, Copy)]
 struct Seen {
     state: ControllerState,
@@ -368,7 +369,7 @@ impl Watch {
         Ok(Self { invariants, state: telemetry.state, errors: telemetry.errors, resets: 0 })
     }
 
-    /// Simulates one millisecond and returns the change in this millisecond. The end of a trajectory is not a reaction.
+    /// Simulates one millisecond and returns the change in this millisecond. The end of a trajectory does not count as a reaction.
     fn step(&mut self, operator: &mut Operator) -> Result<Option<Seen>, MatrixError> {
         operator.step();
         self.invariants.check(&operator.world).map_err(MatrixError::Invariant)?;

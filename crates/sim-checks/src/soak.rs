@@ -10,11 +10,11 @@ use jtc_sim::{
     host::{self, Listener},
 };
 
-/// Time step of the trajectories, in ms.
+/// Time between two points of the trajectories, ms.
 pub const PATH_STEP_MS: u16 = 10;
 
-/// Returns a random trajectory of the soak run that depends on the seed: from `from` (rad) to a near position and back. All trajectories
-/// pass the check of the host (`jtc traj check`), so a stop on them must end in time.
+/// Returns a random trajectory of the soak run, which depends on the seed: from `from` (rad) to a near position and back. All
+/// trajectories pass the check of the host (`jtc traj check`), so a stop on them must end in time.
 pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let to = from.map(|q| (q + 1.2 * (rng.f64() - 0.5)).clamp(-1.4, 1.4));
@@ -24,17 +24,17 @@ pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
 /// Report of a soak run.
 #[derive(Clone, Debug, Default)]
 pub struct SoakReport {
-    /// Virtual time, s.
+    /// Simulated time, s.
     pub seconds: f64,
     /// Number of entries into each state.
     pub entered: [u64; 6],
-    /// Time in each state, in ms.
+    /// Time in each state, ms.
     pub spent_ms: [u64; 6],
     /// Number of finished trajectories.
     pub finished: u64,
     /// Number of injected faults.
     pub faults: u64,
-    /// Time with a torque at its limit, in ms.
+    /// Time with a torque at its limit, ms.
     pub limited_ms: u64,
     /// Number of commands that were sent.
     pub commands: u64,
@@ -87,7 +87,7 @@ pub struct Soak {
     report: SoakReport,
     state: ControllerState,
     trajectory: TrajectoryState,
-    /// Time of the next command, in ms; the next field is the time of the next fault.
+    /// Time of the next command, ms. `next_fault` is the time of the next fault.
     next_command: u64,
     next_fault: u64,
     now: u64,
@@ -102,7 +102,7 @@ impl Soak {
         config.baud = [Some(115_200), Some(921_600), Some(3_000_000), None][rng.usize(0..4)];
         config.support = if rng.u8(0..8) == 0 { Support::None } else { Support::Brakes };
         config.gripper = true;
-        // These alignment times are short, so that time remains for other events.
+        // The alignment times are short, so that time remains for other events.
         let quick = rng.bool();
         let mut drive = if rng.u8(0..3) == 0 { DriveConfig::older() } else { DriveConfig::default() };
         drive.first_enable_ms = if quick { 300 } else { 4000 };
@@ -122,7 +122,7 @@ impl Soak {
         }
     }
 
-    /// Simulates `ms` milliseconds; returns false if an invariant was violated.
+    /// Simulates `ms` milliseconds. Returns false if an invariant was violated.
     pub fn run(&mut self, ms: u64) -> bool {
         for _ in 0..ms {
             if self.report.violation.is_some() {
@@ -181,7 +181,7 @@ impl Soak {
         }
     }
 
-    /// Sends a command: usually a command that is useful in the current state, sometimes a random one.
+    /// Sends a command. Most commands are useful in the current state; some are random.
     fn command(&mut self) {
         let waiting = self.world.host_write_pending() > 0;
         self.next_command = self.now + self.rng.u64(5..1500);
@@ -247,7 +247,7 @@ impl Soak {
             7 => host::frame(FrameType::FrictionTableUseDefault, &[]),
             8 => host::frame(FrameType::FrictionPolynomialUseDefault, &[]),
             _ => {
-                // Valid frame in which one bit is flipped.
+                // The frame is valid except for one flipped bit.
                 let mut bytes = host::exec(ExecCommand::Execute);
                 let at = rng.usize(0..bytes.len());
                 bytes[at] ^= 1 << rng.u8(0..8);

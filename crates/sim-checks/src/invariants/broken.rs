@@ -9,27 +9,27 @@ use jtc_core::{ControllerState, TrajectoryState};
 pub enum Broken {
     /// The controller sent a torque in a state without torque.
     Torque {
-        /// State.
+        /// State of the controller.
         state: ControllerState,
-        /// Joint.
+        /// Joint with the torque.
         joint: Joint,
-        /// Torque, N·m.
+        /// Torque that the controller sent, N·m.
         torque: f64,
     },
-    /// A torque is larger than the joint's limit.
+    /// The torque of a joint is larger than the torque limit of the joint.
     TorqueLimit {
-        /// Joint.
+        /// Joint with the torque.
         joint: Joint,
-        /// Torque, N·m.
+        /// Torque that the controller sent, N·m.
         torque: f64,
-        /// Limit, N·m.
+        /// Torque limit of the joint, N·m.
         limit: f64,
     },
-    /// A value is NaN or infinite.
+    /// A value of a joint is NaN or infinite.
     NotFinite {
         /// Name of the kind of value.
         what: &'static str,
-        /// Joint.
+        /// Joint with the value.
         joint: Joint,
     },
     /// The controller left the Error state although the host had not cleared the error.
@@ -39,7 +39,7 @@ pub enum Broken {
     },
     /// The controller entered Operate although the host had not sent Execute.
     MovedAlone,
-    /// The controller entered Teaching although the host had not sent the command.
+    /// The controller entered Teaching although the host had not sent the command for it.
     TaughtAlone,
     /// The controller entered an execution state that only a host command may cause.
     ExecutionAlone {
@@ -48,33 +48,33 @@ pub enum Broken {
     },
     /// The point index decreased within a run.
     IndexFell {
-        /// Before.
+        /// Point index before the decrease.
         from: u32,
-        /// Now.
+        /// Point index after the decrease.
         to: u32,
     },
     /// The controller sent no frame in a tick, although it is not in Start.
     Silent {
-        /// State.
+        /// State of the controller.
         state: ControllerState,
     },
-    /// Two frames that replace Move are too close together.
+    /// Too few ticks are between two frames that replace Move.
     NoMove {
         /// Number of ticks since the last such frame.
         ticks: u32,
     },
     /// The first frame after an error is not a Move frame with zero torque.
     ErrorWithoutZero,
-    /// The controller requests Enable for a node in a state that does not permit this.
+    /// The controller requests Enable for a node in a state that does not permit Enable.
     Enabled {
         /// State of the controller.
         state: ControllerState,
-        /// Node.
+        /// Number of the node.
         node: usize,
     },
     /// The controller sent a frame that the protocol does not define.
     UnknownFrame {
-        /// Identifier.
+        /// Identifier of the frame.
         id: u16,
     },
     /// A Pause or Stop took too long, and no error was reported (J-33).
@@ -84,35 +84,35 @@ pub enum Broken {
     },
     /// A joint with torque exceeded its speed limit for too long (J-35).
     Speed {
-        /// Joint.
+        /// Joint that is too fast.
         joint: Joint,
-        /// Measured velocity, rad/s.
+        /// Measured velocity of the joint, rad/s.
         velocity: f64,
         /// Number of consecutive measurements above the limit.
         ticks: u16,
     },
     /// A torque was at its limit in too many ticks, although the arm was not braking and was not catching a load (J-43).
     Saturated {
-        /// Joint.
+        /// Joint with the torque.
         joint: Joint,
-        /// Number of ticks at the limit, of the last 100 ticks.
+        /// Number of ticks with the torque at the limit, of the last 100 ticks.
         ticks: u32,
     },
     /// The level of the safety output does not match the errors.
     SafetyOutput {
-        /// Level.
+        /// Level of the safety output.
         level: bool,
-        /// Error word.
+        /// Error word of the controller.
         errors: u16,
     },
 }
 
-/// Violated invariant and its time.
+/// Violated invariant, and the time of the violation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
-    /// Time since the start, in µs.
+    /// Time since the start of the simulation, µs.
     pub time_us: u64,
-    /// Invariant.
+    /// Violated invariant.
     pub broken: Broken,
 }
 

@@ -1,4 +1,4 @@
-//! Invariants of the motion: a stop ends in time, a joint is never too fast, and a torque does not remain at its limit.
+//! Invariants of the motion: a stop ends in time, no joint is too fast for long, and a torque does not remain at its limit.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
@@ -6,25 +6,25 @@ use jtc_wire::ExecCommand;
 use super::broken::Broken;
 use jtc_sim::{Moment, Worked};
 
-/// Time, in ms, in addition to the time of J-33. In this time the arm comes to rest after the end of the commanded motion.
+/// Time in addition to the time of J-33, ms. The arm comes to rest in this time after the end of the commanded motion.
 const REST_MS: u32 = 20;
-/// Speed below which a joint counts as being at rest, in rad/s.
+/// Speed below which a joint counts as being at rest, rad/s.
 const STANDS: f64 = 0.02;
-/// Number of ticks over which the ticks with a torque at the limit are counted.
+/// Number of ticks in which the checker counts the ticks with a torque at the limit.
 const WINDOW: u32 = 100;
 
-/// State of the check, which is kept from one millisecond to the next.
+/// State of the motion checks, which is kept from one millisecond to the next.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MotionWatch {
-    /// Number of ticks since a Pause or Stop was commanded on the path, until the arm is at rest.
+    /// Number of ticks since a Pause or Stop was commanded on the path. `None` if no stop is in progress.
     stopping: Option<u32>,
-    /// `true` if a push has increased a torque to its limit since that command.
+    /// `true` if a push has increased a torque to its limit since the Pause or Stop.
     overpowered: bool,
     /// Number of consecutive measurements above the speed limit, for each joint.
     fast: [u16; JOINTS],
     /// Number of ticks since each joint was enabled.
     enabled: [u16; JOINTS],
-    /// Bit mask for each joint: the recent ticks in which the torque was at its limit. Bit 0 is the last tick.
+    /// Bit mask for each joint: the recent ticks in which the torque of the joint was at its limit. Bit 0 is the last tick.
     saturated: [u128; JOINTS],
 }
 
@@ -37,7 +37,7 @@ impl MotionWatch {
     }
 
     /// Checks J-33: the arm comes to rest in time, unless an error removes the torque. If a push leaves too little of the torque
-    /// limit for braking, the limit is `braking_ms_max` instead of `stop_ms`.
+    /// limit for braking, the time limit is `braking_ms_max` instead of `stop_ms`.
     fn stop(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {
@@ -53,7 +53,7 @@ impl MotionWatch {
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
-            // After `braking_ms_max`, only the other limits apply to an arm that is held and pushed.
+            // After `braking_ms_max`, only the other invariants apply to an arm that is held and pushed.
             Some(ticks)
                 if self.overpowered && t.trajectory != TrajectoryState::Execute && ticks >= braking =>
             {
@@ -69,7 +69,7 @@ impl MotionWatch {
         }
     }
 
-    /// Checks J-35. A predicted velocity neither increases nor resets the counted time.
+    /// Checks J-35. A predicted velocity neither increases nor resets the counted ticks.
     fn speed(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let config = moment.config;
         for (joint, t) in moment.telemetry.joints.iter().enumerate() {
@@ -93,7 +93,7 @@ impl MotionWatch {
         Ok(())
     }
 
-    /// Checks J-43. Torques at the limit are allowed while a stop brakes, and while a joint that was just enabled catches its load.
+    /// Checks J-43. A torque at the limit is allowed while a stop brakes, and while a joint that was just enabled catches its load.
     fn torque(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let t = moment.telemetry;
         for joint in 0..JOINTS {

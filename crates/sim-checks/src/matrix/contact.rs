@@ -7,9 +7,9 @@ use super::standstill::state_then;
 use super::{MatrixError, bring_to, config_for};
 use jtc_sim::{Fault, FaultKind, ModelError, Operator, Side, Support, Trigger, host};
 
-/// Observed time, in ms. The remainder of the motion takes less time.
+/// Observed time, ms. The remaining motion takes less time.
 const WATCH_MS: u64 = 5_000;
-/// Duration of a push, in ms. The next constant is the push as a share of the largest push that a joint can hold.
+/// Duration of a push, ms. `PUSH_SHARE` is the push as a share of the largest push that a joint can hold.
 const PUSH_MS: u64 = 500;
 const PUSH_SHARE: f64 = 0.8;
 /// Wall on the path of a joint: stiffness (N·m/rad), damping (N·m·s/rad) and distance (rad).
@@ -26,15 +26,15 @@ enum Meets {
     Wall(Joint),
     /// Plane across the path of the flange.
     Plane,
-    /// Mass of a load that the controller does not know, in kg.
+    /// Load of this mass that the controller does not know, kg.
     Load(f64),
-    /// Mass of a load that the controller does not know and that the arm drops after a second, in kg.
+    /// Load of this mass that the controller does not know and that the arm drops after a second, kg.
     Drops(f64),
     /// Friction of all joints, as a factor of the values that the controller knows.
     Friction(f64),
     /// Masses of all links, as a factor of the values that the controller knows.
     Masses(f64),
-    /// Safety input that is low for 1 ms. The host clears the error after this number of milliseconds.
+    /// Safety input that is low for 1 ms. The host clears the error this number of milliseconds later.
     Cleared(u64),
 }
 
@@ -52,7 +52,7 @@ impl Meets {
         }
     }
 
-    /// Returns the index of the affected joint, if there is one.
+    /// Returns the index of the affected joint, if the influence affects one joint.
     fn joint(self) -> Option<usize> {
         match self {
             Self::Push(joint) | Self::Wall(joint) => Some(joint.index()),
@@ -60,7 +60,7 @@ impl Meets {
         }
     }
 
-    /// Returns the model errors, which are present from the start.
+    /// Returns the model errors that the influence needs. The model errors are present from the start.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -130,20 +130,20 @@ fn plane(operator: &Operator) -> FaultKind {
     FaultKind::Wall { position, normal: way.map(|x| -x / length), stiffness, damping }
 }
 
-/// Result of the observation.
+/// Result of observing an influence.
 struct Outcome {
     then: String,
-    /// Time of the first reaction, in ms.
+    /// Time of the first reaction, ms.
     found: Option<u64>,
     /// `true` if the motion was finished.
     ended: bool,
-    /// Maximum deviations, in rad: first of the affected joint (or of any joint), then of the other joints.
+    /// Maximum deviations, rad: first of the affected joint (or of any joint), then of the other joints.
     way: [f64; 2],
-    /// Maximum speed of a joint, in rad/s.
+    /// Maximum speed of a joint, rad/s.
     speed: f64,
-    /// Maximum external torque on a joint, and the external torque at the end, in N·m.
+    /// Maximum external torque on a joint, and the external torque at the end, N·m.
     torque: [f64; 2],
-    /// Work of the arm against external forces, and work of these forces on the arm, in J.
+    /// Work of the arm against external forces, and work of external forces on the arm, J.
     work: [f64; 2],
 }
 
@@ -189,7 +189,7 @@ fn outcome(meets: Meets, state: ControllerState) -> Result<Outcome, MatrixError>
     let config = jtc_sim::SimConfig { model_error: meets.model_error(), ..config_for(Support::Stand, 0) };
     let mut operator = bring_to(config, state)?;
     if state == ControllerState::HoldPos {
-        // After this time, the controller has estimated the load.
+        // After 3 s, the controller has finished its estimate of the load.
         operator.run(3_000);
     }
     let from = operator.world.truth().q;

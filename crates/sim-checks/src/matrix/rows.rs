@@ -1,4 +1,4 @@
-//! Rows of the tables with their faults, and the reasons for cells without a reaction.
+//! Rows of the tables with their faults. Also contains the reasons for cells without a reaction.
 use jtc_bus::{GRIPPER, Joint};
 use jtc_core::ControllerState;
 use jtc_wire::{FrameType, fixed};
@@ -7,7 +7,7 @@ use jtc_sim::{Fault, FaultKind, Operator, Trigger, host};
 
 /// Number of ticks after which a lasting fault is removed.
 pub(super) const LASTING_MS: u64 = 300;
-/// Number of short frames before a Stop.
+/// Number of short frames that the host sends before a Stop.
 const FLOOD: usize = 4_000;
 
 /// Action on the simulated world.
@@ -15,7 +15,8 @@ const FLOOD: usize = 4_000;
 pub(super) enum Act {
     /// Fault, with its duration in ms.
     Fault(FaultKind, u64),
-    /// Fault, its duration in ms, and the tick in which the host's command to clear all errors is executed.
+    /// Fault, its duration in ms, and the tick in which the controller executes the command to clear all
+    /// errors.
     Cleared(FaultKind, u64, u64),
     /// Two faults at the same time, with their duration in ms.
     Both(FaultKind, FaultKind, u64),
@@ -25,7 +26,7 @@ pub(super) enum Act {
     ResetGripper,
     /// Frame that the host sends.
     Frame(&'static [u8]),
-    /// Frame directly after one byte of noise, and one more byte of noise every 6 ms.
+    /// Frame directly after one byte of noise. Further noise follows every 6 ms.
     InNoise(&'static [u8]),
     /// Frame that follows thousands of short frames in the same millisecond.
     Behind(&'static [u8]),
@@ -65,7 +66,7 @@ impl Act {
     }
 }
 
-/// Byte of noise. This value has the worst effect, because it begins a frame.
+/// Byte of noise. The header byte has the worst effect, because it begins a frame.
 const NOISE: u8 = jtc_wire::HEADER;
 
 /// Row of the fault matrix.
@@ -74,14 +75,14 @@ pub(super) struct Row {
     pub act: Act,
     /// Silence of the host after which the controller reacts, in ms (J-59); 0 disables the reaction.
     pub host_timeout_ms: u16,
-    /// Reason for the missing reaction while the arm is held or moves.
+    /// Reason why the controller does not react while it holds or moves the arm.
     held: Option<&'static str>,
-    /// Reason for the missing reaction in Init and Error.
+    /// Reason why the controller does not react in Init and Error.
     parked: Option<&'static str>,
 }
 
 impl Row {
-    /// Returns the text for a cell without a reaction; `None` if a reaction is expected.
+    /// Returns the text for a cell without a reaction; `None` if the controller must react.
     pub(super) fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {
@@ -116,7 +117,7 @@ const fn fault(kind: FaultKind) -> Act {
     Act::Fault(kind, LASTING_MS)
 }
 
-/// Joint that the faults of a single joint affect.
+/// Joint of the faults that affect a single joint.
 const MEANT: Joint = Joint::ALL[1];
 const SILENT: FaultKind = FaultKind::NodeSilent { node: MEANT.index() as u8 };
 const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };

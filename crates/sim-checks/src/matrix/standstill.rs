@@ -1,18 +1,18 @@
-//! Distance and speed of the arm after a fault in motion until the arm is at rest, with and without holding brakes.
+//! Distance and speed of the arm from a fault in motion until standstill, with and without holding brakes.
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 
 use super::rows::{Act, ROWS, STOPS};
 use super::{MatrixError, words, world_in};
 use jtc_sim::Support;
 
-/// Speed below which a joint counts as being at rest, in rad/s.
+/// Speed below which a joint counts as being at rest, rad/s.
 const STANDS: f64 = 2e-3;
-/// Time below this speed after which a joint counts as being at rest, in ms.
+/// Time below this speed after which a joint counts as being at rest, ms.
 const STANDS_MS: u64 = 50;
-/// Time after the fault at which the motion is checked, in ms. If the arm still executes the motion at that time, the
+/// Time after the fault at which the motion is checked, ms. If the arm still executes the motion at that time, the
 /// fault did not stop it. Without a fault, the motion takes longer than this time.
 const WATCH_MS: u64 = 700;
-/// Maximum observed time, in ms.
+/// Maximum observed time, ms.
 const LONGEST_MS: u64 = 10_000;
 
 /// Motion of the arm after the fault.
@@ -60,7 +60,7 @@ pub(super) fn stop_lines() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Checks J-33. Allows 20 ms more, in which the arm comes to rest after the commanded motion.
+/// Checks J-33. The check allows 20 ms more, in which the arm comes to rest after the commanded motion.
 pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
     match *motion {
         Motion::Stands { ms, .. } if ms <= 520 => Ok(()),
@@ -108,7 +108,7 @@ fn motion(support: Support, act: Act, host_timeout_ms: u16) -> Result<(String, M
     Ok((state_then(t.state, t.trajectory, t.errors, joints), motion))
 }
 
-/// Returns the controller state, the execution state if there is a path, and the errors.
+/// Returns the controller state, the execution state if the controller has a path, and the errors.
 pub(super) fn state_then(
     state: ControllerState,
     trajectory: TrajectoryState,

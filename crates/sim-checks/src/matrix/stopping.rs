@@ -6,7 +6,8 @@ use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
 use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
 use jtc_sim::Support;
 
-/// Holding torque of the shoulder as a share of its torque limit, speed (rad/s), and `true` if the torque suffices to stop in time.
+/// Holding torque of the shoulder as a share of its torque limit, and speed (rad/s). The third value is `true` if the torque
+/// suffices to stop in time.
 const LOADS: [(f64, f64, bool); 6] = [
     (0.90, 0.2, true),
     (0.95, 0.2, true),
@@ -15,9 +16,9 @@ const LOADS: [(f64, f64, bool); 6] = [
     (1.02, 0.2, false),
     (1.02, 0.4, false),
 ];
-/// Payload masses, in kg.
+/// Masses of the payloads, kg.
 const PAYLOADS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
-/// Shoulder angle (rad) and speed (rad/s) at which the arm with a payload is stopped.
+/// Shoulder angle (rad) and speed (rad/s) at which the host stops the arm with a payload.
 const WITH_PAYLOAD: (f64, f64) = (-0.9, 0.3);
 
 /// Returns the results of the stop commands as Markdown tables.
@@ -60,7 +61,7 @@ pub fn stopping_table() -> Result<String, MatrixError> {
 struct Line {
     then: [String; 2],
     motion: [Motion; 2],
-    /// Maximum sag of both cases, in rad.
+    /// Maximum sag with and without brakes, rad.
     sag: f64,
 }
 

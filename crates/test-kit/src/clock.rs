@@ -1,14 +1,14 @@
-//! Clock for benchmarks, which measures only the processor time of this thread.
+//! Clock for benchmarks. The clock measures only the processor time of the current thread.
 
 use std::time::Duration;
 
-/// Processor time of this thread. The clock stops while the processor runs another program. Other programs still slow the
-/// thread down because they fill the caches, so the minimum of many measurements is nearest to the true time.
+/// Processor time of the current thread. The clock stops while the processor runs another program. Other programs still
+/// slow the thread down because they fill the caches, so the minimum of many measurements is nearest to the true time.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuTime(Duration);
 
 impl CpuTime {
-    /// Returns the present time.
+    /// Returns the present processor time.
     #[cfg(unix)]
     pub fn now() -> Self {
         let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -23,7 +23,7 @@ impl CpuTime {
         Self(BEGIN.get_or_init(std::time::Instant::now).elapsed())
     }
 
-    /// Returns the nanoseconds since this time.
+    /// Returns the processor time since this time, ns.
     pub fn elapsed_ns(self) -> f64 {
         Self::now().0.saturating_sub(self.0).as_secs_f64() * 1e9
     }
@@ -44,7 +44,7 @@ pub fn least_ns(rounds: usize, mut work: impl FnMut()) -> f64 {
 mod tests {
     use super::*;
 
-    /// The minimum is returned, and a sleeping thread uses no processor time.
+    /// The function must return the minimum, and a sleeping thread must use no processor time.
     #[test]
     fn work_takes_time_and_sleep_does_not() {
         let mut rounds = 0;

@@ -15,11 +15,12 @@ pub fn file(name: &str) -> Option<PathBuf> {
     there.then_some(path)
 }
 
-/// Returns the positions, velocities and accelerations of a trajectory file as the host sends them to the
-/// controller. The file has 19 integers per line; the first integer is the time.
+/// Returns the positions, velocities and accelerations of a trajectory file. The function returns the
+/// raw values that the host sends to the controller. A trajectory file has 19 integers per line; the
+/// first integer is the time.
 ///
 /// # Panics
-/// If the file has another form.
+/// Panics if the file does not have this format.
 pub fn points(name: &str) -> Option<Vec<[[i16; 6]; 3]>> {
     let text = std::fs::read_to_string(file(name)?).expect("it can be read");
     let point = |line: &str| {

@@ -89,7 +89,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
     let (over, opened) = (AtomicBool::new(false), AtomicUsize::new(0));
     std::thread::scope(|threads| {
         threads.spawn(|| keep_open(http, flood, &opened, &over));
-        // This ends the flood even if a Stop fails.
+        // The guard ends the flood even if a Stop fails.
         let _end = End(&over);
         until(format_args!("the flood of {}", flood.what), || opened.load(Ordering::Relaxed) >= CONNECTIONS);
         for n in 0..STOPS {
@@ -116,7 +116,7 @@ impl Drop for End<'_> {
     }
 }
 
-/// Keeps `CONNECTIONS` connections open, and replaces each connection that is closed.
+/// Keeps `CONNECTIONS` connections open, and replaces each connection that the agent closes.
 fn keep_open(http: &Http, flood: &Flood, opened: &AtomicUsize, over: &AtomicBool) {
     let mut streams: Vec<TcpStream> = Vec::new();
     while !over.load(Ordering::Relaxed) {

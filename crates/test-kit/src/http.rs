@@ -1,4 +1,4 @@
-//! Requests that any client can send: plain HTTP, without code of this project.
+//! HTTP requests that any client can send. The functions use plain HTTP, without code of this project.
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 
@@ -6,17 +6,17 @@ use serde_json::Value;
 
 use crate::patience::{LONGEST, Patience};
 
-/// Agent as a remote client sees it.
+/// An agent, as a remote client reaches it.
 #[derive(Clone, Debug)]
 pub struct Http {
     /// Address at which the agent listens.
     pub address: SocketAddr,
-    /// The operator's token.
+    /// Token of the operator.
     pub operator: String,
 }
 
 impl Http {
-    /// Sends a request with these header lines, and returns the status and the body of the answer.
+    /// Sends a request with the given header lines, and returns the status and the body of the answer.
     pub fn ask(&self, request: &str, lines: &[&str]) -> (u16, String) {
         let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
         self.exchange(&format!("{request} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: 0\r\n\r\n"))
@@ -27,12 +27,12 @@ impl Http {
         self.ask(request, &[&format!("Host: {}", self.address)])
     }
 
-    /// Sends a request with the operator's token and, if they are set, a lease key and a body.
+    /// Sends a request with the operator's token. A lease key and a body are optional.
     pub fn api(&self, request: &str, key: Option<&str>, body: Option<Value>) -> (u16, Value) {
         self.api_as(Some(&self.operator), request, key, body)
     }
 
-    /// Like [`Self::api`], but with another token or without a token.
+    /// Like [`Self::api`], but uses another token or no token.
     pub fn api_as(
         &self,
         token: Option<&String>,
@@ -51,7 +51,8 @@ impl Http {
         (status, serde_json::from_str(&body).unwrap_or(Value::Null))
     }
 
-    /// Sends a request without a body, with this token or without a token. Returns the status, the head and the body bytes of the answer.
+    /// Sends a request without a body, with the given token or without a token. Returns the status, the head and the body bytes of the
+    /// answer.
     pub fn bytes_as(&self, token: Option<&String>, request: &str) -> (u16, String, Vec<u8>) {
         let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
         let host = self.address;
@@ -73,15 +74,15 @@ impl Http {
     fn exchange_bytes(&self, request: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(LONGEST)).expect("a time");
-        // If the agent rejects a request, it may close the connection before the whole request is written.
+        // If the agent rejects a request, the agent may close the connection before the whole request is written.
         let _ = stream.write_all(request.as_bytes());
         let mut all = Vec::new();
         let _ = stream.read_to_end(&mut all);
         all
     }
 
-    /// Waits for the first event after number `after` for which `is` returns `true`, and returns its number and
-    /// the event. Checks that the event numbers have no gap.
+    /// Waits for the first event after number `after` for which `is` returns `true`. Returns the number of the event and the event.
+    /// Checks that the event numbers have no gap.
     pub fn event(&self, after: u64, what: &str, is: impl Fn(&Value) -> bool) -> (u64, Value) {
         let (mut patience, mut last, mut seen) = (Patience::begin(), after, Vec::new());
         loop {
@@ -135,7 +136,7 @@ impl Http {
     }
 }
 
-/// Returns the status in the first line of an answer, or 0 if this line has no status.
+/// Returns the HTTP status in the first line of an answer, or 0 if this line has no status.
 fn status(answer: &str) -> u16 {
     answer.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0)
 }
@@ -164,11 +165,11 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         }
     }
     assert_eq!(http.get("GET /api/status").0, 200);
-    // Reading a state changes nothing, so an image or a link on a page cannot stop anything.
+    // A request that reads a state must change nothing, so that an image or a link on a page cannot stop the arm or the boards.
     assert_eq!(http.get("GET /api/stop").0, 405);
 }
 
-/// Checks that the agent serves the dashboard pages for requests with one of its names, but not for pages of another site.
+/// Checks that the agent serves the dashboard pages for requests with one of its host names, but not for pages of another site.
 pub fn pages_are_the_agents_own(http: &Http) {
     let own = format!("Host: {}", http.address);
     // A wrong token does not affect a page, because the page itself asks the user for a token.
@@ -189,7 +190,7 @@ pub fn pages_are_the_agents_own(http: &Http) {
     assert_ne!(http.get("POST /").0, 200);
 }
 
-/// Checks that a page can pass the token for its socket in the protocol header, and that a page of another site cannot.
+/// Checks that a page can pass the token for its WebSocket in the protocol header, and that a page of another site cannot.
 pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
     let host = format!("Host: {}", http.address);
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
@@ -206,7 +207,7 @@ pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
     assert_eq!(asked(&http.operator, &[evil]), 403);
 }
 
-/// Checks that a page of another site cannot open a socket.
+/// Checks that a page of another site cannot open a WebSocket.
 pub fn a_socket_of_another_site_is_refused(http: &Http, path: &str) {
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
     let host = format!("Host: {}", http.address);
@@ -222,7 +223,8 @@ pub fn tokens_cannot_be_tried_without_end(http: &Http) {
         (0..40).map(|n| http.ask("GET /api/status", &[&host, &format!("Authorization: Bearer {n:0>43}")]).0);
     assert!(answers.by_ref().take(20).all(|status| status == 401));
     assert!(answers.all(|status| status == 429));
-    // Clients with a valid token are not blocked, and neither are clients on this computer, which need no token.
+    // The agent does not block clients with a valid token. The agent also does not block clients on this computer, which need no
+    // token.
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
@@ -264,8 +266,7 @@ pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
     }
 }
 
-/// Checks that the answers to a long series of rejected requests are short. [`refusals_cost_few_short_lines`] checks
-/// the log afterwards.
+/// Checks that the answers to a long series of rejected requests are short. [`refusals_cost_few_short_lines`] later checks the log.
 pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
     let (own, bearer) = (format!("Host: {}", http.address), "Authorization: Bearer 0123456789abcdefghij");
     for length in [100, 1_000, 12_000, 15_000, 65_000, 380_000] {
@@ -297,7 +298,7 @@ pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
-/// Checks the command log that [`refused_requests_are_answered_shortly`] has produced, after the agent has ended.
+/// Checks the command log that [`refused_requests_are_answered_shortly`] has produced. Call this function after the agent has ended.
 pub fn refusals_cost_few_short_lines(log: &str) {
     let lines: Vec<Value> =
         log.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
@@ -308,7 +309,7 @@ pub fn refusals_cost_few_short_lines(log: &str) {
     assert!(log.lines().all(|line| line.len() < 1_000) && log.len() < 40_000, "{} bytes", log.len());
 }
 
-/// Checks that long or invalid requests are answered with an error status and change nothing.
+/// Checks that the agent answers long or invalid requests with an error status and changes nothing.
 pub fn what_is_long_or_wrong_is_refused(http: &Http, requests: &[(&str, &str)]) {
     let host = format!("Host: {}", http.address);
     for (request, line) in requests {
@@ -321,7 +322,7 @@ pub fn what_is_long_or_wrong_is_refused(http: &Http, requests: &[(&str, &str)]) 
     assert_eq!(http.get("GET /api/status").0, 200);
 }
 
-/// Checks that idle connections are closed, and do not block other clients.
+/// Checks that the agent closes idle connections, and that idle connections do not block other clients.
 pub fn idle_connections_are_closed(http: &Http) {
     let mut idle: Vec<TcpStream> = (0..100)
         .map(|_| {
@@ -338,8 +339,8 @@ pub fn idle_connections_are_closed(http: &Http) {
     assert!(!String::from_utf8_lossy(&rest).contains("200"));
 }
 
-/// Checks that at most 64 requests wait for an event at the same time. Further requests are answered at once, and
-/// the waiting requests receive their event. `begin` starts the first job of the agent.
+/// Checks that at most 64 requests wait for an event at the same time. The agent must answer further requests at once, and the waiting
+/// requests must receive their event. `begin` starts the first job of the agent.
 pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
     const MOST: usize = 64;
     const MORE: usize = 16;
@@ -348,7 +349,7 @@ pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
         let (http, answered) = (http.clone(), answered.clone());
         std::thread::spawn(move || {
             let (status, found) = http.api("GET /api/events?job=1&wait_s=8", None, None);
-            // The test may have failed in the meantime.
+            // If the test has failed in the meantime, the receiver no longer exists.
             let _ = answered.send((status, found["events"].as_array().map_or(0, Vec::len)));
         });
     }

@@ -30,12 +30,12 @@ pub type Body = fn(&[u8]);
 /// Fuzz target: the name of its file in `fuzz/fuzz_targets`, and its body.
 pub type Target = (&'static str, Body);
 
-/// Runs each body on every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the current
-/// file is printed, so that the output of a failed test shows the file.
+/// Runs each body on every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. Prints the name of the
+/// current file, so that the output of a failed test shows it.
 ///
 /// # Panics
-/// If a body panics, if the target does not exist, or if no input is stored for it. Otherwise a misspelt name would
-/// test nothing.
+/// Panics if a body panics, if the target does not exist, or if no input is stored for the target. Otherwise a
+/// misspelt name would test nothing.
 pub fn run_kept_inputs(targets: &[Target]) {
     for (target, body) in targets {
         let files = kept_inputs(target);

@@ -3,18 +3,19 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of output lines that are shown completely.
+/// Maximum number of output lines that the page shows completely.
 const LINES_MAX: usize = 12;
-/// Numbers of lines that are shown at the start and at the end of a longer output.
+/// Numbers of lines that the page shows at the start and at the end of a longer output.
 const SHOWN: (usize, usize) = (5, 4);
-/// Maximum number of runs of a case whose output depends on timing. If the output of no run matches, the case has changed.
+/// Maximum number of runs of a case whose output depends on timing. If the output of no run matches the page, the case has
+/// changed.
 const TRIES: usize = 4;
 
-/// Words after which a number is kept, because the number identifies an item.
+/// Words before numbers that are kept, because such a number identifies an item.
 const KEPT: [&str; 9] =
     ["joint ", "joints ", "board ", "boards ", "number ", "code ", "stop ", "certain: ", "localhost:"];
 
-/// Part of a document.
+/// Part of a document that contains command output.
 pub struct Page {
     file: PathBuf,
     name: &'static str,
@@ -27,15 +28,15 @@ pub struct Page {
 pub struct Printed {
     /// Exit code.
     pub code: i32,
-    /// Text of stdout and stderr.
+    /// Combined text of stdout and stderr.
     pub text: String,
 }
 
 impl Page {
-    /// Opens the part `name` of `docs/FILE`, between `<!-- NAME begin -->` and `<!-- NAME end -->`.
+    /// Opens the part `name` of `docs/FILE`. The part is between `<!-- NAME begin -->` and `<!-- NAME end -->`.
     ///
     /// # Panics
-    /// If the document or its marks are missing.
+    /// Panics if the document or the marks of the part are missing.
     pub fn new(file: &str, name: &'static str) -> Self {
         let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")).join(file);
         let whole = std::fs::read_to_string(&file).expect("the document is there");
@@ -43,22 +44,22 @@ impl Page {
         Self { file, name, old: whole[begin..end].to_owned(), text: "\n".into() }
     }
 
-    /// Adds a heading above the cases that follow.
+    /// Adds a heading above the next cases.
     pub fn group(&mut self, title: &str) {
         let _ = write!(self.text, "## {title}\n\n");
     }
 
-    /// Adds a text unchanged.
+    /// Adds a text to the part unchanged.
     pub fn text(&mut self, text: &str) {
         self.text += text;
     }
 
-    /// Adds a case: the user's mistake, the command, and its output.
+    /// Adds a case: the user's mistake, the command, and the output of the command.
     pub fn case(&mut self, title: &str, command: &str, printed: &Printed) {
         self.text += &block(title, command, printed);
     }
 
-    /// Adds a case whose output depends on timing. If the output differs from the document, the case is run again.
+    /// Adds a case whose output depends on timing. If the output differs from the document, the function runs the case again.
     pub fn case_of_a_moment(&mut self, title: &str, command: &str, mut run: impl FnMut() -> Printed) {
         let mut made = String::new();
         for _ in 0..TRIES {
@@ -71,16 +72,16 @@ impl Page {
         self.text += &made;
     }
 
-    /// Compares the part with the document, or writes it if `UPDATE_DOCS=1` is set.
+    /// Compares this part with the document, or writes the part if `UPDATE_DOCS=1` is set.
     ///
     /// # Panics
-    /// If the document differs, with the first lines that differ.
+    /// Panics if the document differs. The message contains the first lines that differ.
     pub fn finish(self) {
         if self.old == self.text {
             return;
         }
         if updating() {
-            // The document is read again, because another part may have been written in the meantime.
+            // The function reads the document again, because another test may have written another part in the meantime.
             let whole = std::fs::read_to_string(&self.file).expect("the document is there");
             let (begin, end) = marks(&whole, self.name);
             let new = format!("{}{}{}", &whole[..begin], self.text, &whole[end..]);
@@ -100,10 +101,10 @@ impl Page {
     }
 }
 
-/// Compares the part `name` of `docs/FILE` with this text, or writes the part if `UPDATE_DOCS=1` is set.
+/// Compares the part `name` of `docs/FILE` with the text `text`, or writes the part if `UPDATE_DOCS=1` is set.
 ///
 /// # Panics
-/// As [`Page::new`] and [`Page::finish`].
+/// Panics in the same cases as [`Page::new`] and [`Page::finish`].
 pub fn part(file: &str, name: &'static str, text: &str) {
     Page { text: text.to_owned(), ..Page::new(file, name) }.finish();
 }
@@ -130,7 +131,7 @@ pub fn check_requests<'a>(description: &str, names: impl Iterator<Item = &'a str
 /// Compares `docs/FILE` with this text, or writes the file if `UPDATE_DOCS=1` is set.
 ///
 /// # Panics
-/// If the document differs, with the first line that differs and the command that updates it.
+/// Panics if the document differs. The message contains the first line that differs and the command that updates the document.
 pub fn whole(file: &str, text: &str) {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")).join(file);
     if updating() {
@@ -188,8 +189,8 @@ fn block(title: &str, command: &str, printed: &Printed) -> String {
     text
 }
 
-/// Returns the text without the parts that differ from run to run. Tables of measured values are omitted. Numbers
-/// are replaced by `…`, except the numbers of joints and boards and numbers that are part of a name.
+/// Returns the text without the parts that differ from run to run. `blurred` omits tables of measured values. `blurred`
+/// replaces numbers by `…`, except the numbers of joints and boards and numbers that are part of a name.
 pub fn blurred(text: &str) -> String {
     let mut out = String::new();
     for line in text.lines().filter(|line| !is_figures(line)) {

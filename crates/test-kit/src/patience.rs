@@ -3,7 +3,7 @@ use std::fmt::Display;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Timeout of a test on a computer without delays.
+/// Timeout of a test on a computer that causes no delays.
 const TIME: Duration = Duration::from_secs(60);
 /// Maximum timeout of a test on any computer. Blocking reads use this timeout.
 pub const LONGEST: Duration = Duration::from_secs(300);
@@ -12,7 +12,7 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// Seconds that are added to the timeout for each second of delay of the waiting thread.
 const GROWTH: u32 = 4;
 
-/// Wait of a test for a condition. If the computer delays the waiting thread, it also delays the programs that the test waits for.
+/// Wait of a test for a condition. If the computer delays the waiting thread, it also delays the programs for which the test waits.
 #[derive(Debug)]
 pub struct Patience {
     begun: Instant,
@@ -20,7 +20,7 @@ pub struct Patience {
 }
 
 impl Patience {
-    /// Begins to wait.
+    /// Begins a wait.
     pub fn begin() -> Self {
         Self { begun: Instant::now(), late: Duration::ZERO }
     }
@@ -31,7 +31,8 @@ impl Patience {
         self.wait(missing, std::thread::sleep);
     }
 
-    /// Like `pause`, but waits by calling `wait`, which blocks for at most the time that is passed to it. Returns the result of `wait`.
+    /// Like `pause`, but calls `wait` instead of sleeping. `wait` blocks for at most the time that is passed to it. Returns the result
+    /// of `wait`.
     #[track_caller]
     pub fn wait<T>(&mut self, missing: impl Display, wait: impl FnOnce(Duration) -> T) -> T {
         let (waited, late) = (self.begun.elapsed(), self.late);

@@ -1,23 +1,24 @@
-//! Pages whose commands are run in the way in which a reader of the page types them. The test compares their output with the page.
+//! Pages with commands that a test runs. The test types the commands in the way in which a reader of the page types them, and compares
+//! their output with the page.
 //!
-//! A page is executed from top to bottom in a separate folder. A comment on the page selects the program whose tests
-//! run the fenced blocks of the page, for example `<!-- commands: jtc -->`. The blocks are of the kind `console`
-//! (commands after `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next
-//! command is `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment directly above a
-//! block contains options, separated by semicolons:
+//! The test executes a page from top to bottom in a separate folder. A comment on the page selects the program whose tests run the
+//! fenced blocks of the page, for example `<!-- commands: jtc -->`. The blocks are of the kind `console` (commands after `$ `, output
+//! below) and `sh` (commands without output). Each command must succeed, unless the next command is `echo $?`, and must print the
+//! output on the page. A line `...` on the page stands for any number of output lines. A comment directly above a block contains
+//! options, separated by semicolons:
 //!
-//! - `not run: REASON`: the block is skipped and counted with its reason.
-//! - `numbers vary`: numbers are not compared, except numbers of joints and boards.
-//! - `terminal: NAME`: the block is typed in a separate terminal; its last command keeps running. If the block shows
-//!   no command, the test waits until the terminal has printed these lines. With `Ctrl-C`, the program in this
-//!   terminal is interrupted first.
-//! - `in tests: WORDS`: these options are added to the last command, so that a test takes no longer than necessary.
-//! - `typed: NAME`: the lines of a `text` block are typed into the program that runs in that terminal.
-//! - `program: NAME`: this program runs the block, instead of the program of the page.
+//! - `not run: REASON`: the test skips the block and counts it with its reason.
+//! - `numbers vary`: the test does not compare numbers, except numbers of joints and boards.
+//! - `terminal: NAME`: the test types the block in a separate terminal; the last command of the block keeps running. If the block shows
+//!   no command, the test waits until the terminal has printed the lines of the block. With `Ctrl-C`, the test first interrupts the
+//!   program in this terminal.
+//! - `in tests: WORDS`: the test adds these options to the last command, so that it takes no longer than necessary.
+//! - `typed: NAME`: the test types the lines of a `text` block into the program that runs in the terminal `NAME`.
+//! - `program: NAME`: the tests of the program `NAME` run the block, instead of the tests of the program of the page.
 //!
-//! `/tmp/jtc` and other paths in `/tmp` are mapped to the folder of the page. If `in tests` specifies a port
-//! for a program (`127.0.0.1:0`), this port replaces the port that the page shows. `UPDATE_DOCS=1` updates the
-//! page if the output of its commands has changed.
+//! The test maps `/tmp/jtc` and other paths in `/tmp` to the folder of the page. If `in tests` specifies a port for a program
+//! (`127.0.0.1:0`), this port replaces the port on the page. `UPDATE_DOCS=1` updates the page if the output of its commands has
+//! changed.
 
 mod blocks;
 mod compare;
@@ -37,18 +38,18 @@ use terminal::Terminal;
 pub struct Followed {
     /// Number of commands that were run.
     pub commands: usize,
-    /// Reasons why blocks were not run.
+    /// Reasons why the test did not run blocks.
     pub left_out: Vec<String>,
     /// Differences between the page and the output.
     pub wrong: Vec<String>,
 }
 
-/// Runs every page that has blocks of this program, in parallel: README.md and the pages of docs/. `programs` is
-/// the folder that contains the program.
+/// Runs every page with blocks of this program, in parallel: README.md and the pages of docs/. `programs` is the folder that contains
+/// the program.
 ///
 /// # Panics
-/// If a page differs from the output of its commands, with the first lines that differ of each block; if no page has
-/// such blocks.
+/// Panics if a page differs from the output of its commands, or if no page has such blocks. The message contains the first lines that
+/// differ of each block.
 pub fn follow_all(program: &str, programs: &Path) {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let docs = std::fs::read_dir(root.join("docs")).expect("docs/");
@@ -86,7 +87,7 @@ pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
     let text = std::fs::read_to_string(page).expect("a page");
     let mut run = Run::new(programs, page);
     let mut new = text.clone();
-    // The blocks are replaced from the end to the beginning, so that earlier positions remain valid.
+    // The function replaces the blocks from the end to the beginning, so that earlier positions remain valid.
     let mut changed = Vec::new();
     for block in blocks(&text).iter().filter(|block| block.program() == Some(program)) {
         if let Some(reason) = block.note("not run") {
@@ -102,7 +103,7 @@ pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
         if new != text {
             std::fs::write(page, new).expect("the page can be written");
         }
-        // On every page, a command that fails is an error.
+        // A command that fails is an error on every page.
         run.done.wrong.retain(|text| text.contains("exit code"));
     }
     std::mem::take(&mut run.done)
@@ -120,7 +121,7 @@ struct Run {
     done: Followed,
 }
 
-/// Default terminal for blocks without the option `terminal`.
+/// Name of the default terminal, for blocks without the option `terminal`.
 const OWN: &str = "";
 
 impl Run {
@@ -141,19 +142,19 @@ impl Run {
         self.terminals.entry(name.to_owned()).or_insert_with(new)
     }
 
-    /// Returns the real command for a command on the page.
+    /// Returns the command that the test types for a command on the page.
     fn real(&self, shown: &str) -> String {
         self.places.iter().fold(shown.to_owned(), |text, (page, real)| text.replace(page, real))
     }
 
-    /// Returns a printed line in the form in which the page shows it.
+    /// Returns a printed line as the page shows it.
     fn on_page(&self, line: &str) -> String {
         let line =
             self.places.iter().rev().fold(line.to_owned(), |text, (page, real)| text.replace(real, page));
         line.trim_end().to_owned()
     }
 
-    /// Runs a block. Returns the steps of the block with their real output if the page shows other output.
+    /// Runs a block. If the real output differs from the page, returns the steps of the block with the real output.
     fn block(&mut self, block: &Block) -> Option<Vec<Step>> {
         if let Some(name) = block.note("typed") {
             for step in block.steps() {
@@ -164,7 +165,7 @@ impl Run {
         }
         let mut steps = block.steps();
         if steps.is_empty() {
-            // The page does not show the output yet.
+            // The page does not show the output of this block yet.
             steps.push(Step { command: String::new(), shown: Vec::new() });
         }
         let name = block.note("terminal").unwrap_or(OWN).to_owned();
@@ -202,12 +203,12 @@ impl Run {
         changed.then_some(steps)
     }
 
-    /// Starts a program that keeps running, or waits for later output of the program. Returns the lines that were printed so far.
+    /// Starts a program that keeps running, or waits for later output of a running program. Returns the lines that were printed so far.
     fn go_on(&mut self, block: &Block, name: &str, step: &Step) -> Vec<String> {
         let (varying, shown) = (block.says("numbers vary"), step.shown.clone());
         let starts = !step.command.is_empty();
         if starts {
-            // If a program still runs in this terminal, it is ended first.
+            // If a program still runs in this terminal, the test first ends that program.
             if !self.taken.insert(name.to_owned()) {
                 self.terminals.remove(name);
             }
@@ -219,7 +220,7 @@ impl Run {
             self.terminal(name).interrupt();
         }
         let Some(last) = shown.iter().rfind(|line| !line.is_empty()).cloned() else {
-            // The page does not show the output yet: the test accepts all lines until 6 s pass without a line.
+            // If the page does not show the output yet, the test accepts all lines until 6 s pass without a line.
             let mut printed = Vec::new();
             while std::env::var_os("UPDATE_DOCS").is_some()
                 && let Some(line) = self.terminal(name).line(Duration::from_secs(6))
@@ -230,7 +231,7 @@ impl Run {
         };
         let places = std::cell::RefCell::new(self.places.clone());
         let is_last = |line: &str| {
-            // If the program uses another port than the page shows, the pair of ports is stored.
+            // If the program uses another port than the port on the page, the test stores the pair of ports.
             if let (Some(port), Some(real)) = (port(&shown.join("\n")), port(line))
                 && starts
                 && port != real
@@ -248,7 +249,7 @@ impl Run {
         if starts {
             return printed;
         }
-        // The output before the first line that the page shows is ignored.
+        // The test ignores the output before the first line that the page shows.
         let from = printed.iter().position(|line| same(&shown[..1], std::slice::from_ref(line), varying));
         printed[from.unwrap_or(0)..].to_vec()
     }
@@ -282,7 +283,7 @@ fn difference(block: &Block, step: &Step, printed: &[String]) -> String {
 mod tests {
     use super::*;
 
-    /// Runs a page that is stored in a separate file.
+    /// Runs a page that the test stores in a separate file.
     fn followed(name: &str, text: &str) -> Followed {
         let page = std::env::temp_dir().join(format!("{name}-{}.md", std::process::id()));
         std::fs::write(&page, text).expect("a file");

@@ -1,10 +1,10 @@
-//! Functions for files that another thread or program writes.
+//! Functions for files that another thread or another program writes.
 use std::path::Path;
 
 use crate::patience::Patience;
 
-/// Returns the complete text of a file as soon as the text contains all of these words. The wait is necessary,
-/// because the log is written without waiting for the disk.
+/// Returns the complete text of a file as soon as the text contains all words in `words`. `text_with` must
+/// wait, because the writer does not wait for the disk.
 pub fn text_with(path: &Path, words: &[&str]) -> String {
     let mut patience = Patience::begin();
     loop {

@@ -1,4 +1,4 @@
-//! Fenced blocks of a page, and the comments that specify how each block is run.
+//! Fenced blocks of a page, and the comments that specify how the test runs each block.
 
 use std::ops::Range;
 
@@ -13,16 +13,16 @@ pub enum Kind {
     Text,
 }
 
-/// Block that is used when the page is run.
+/// Block that the test uses when it runs the page.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// Kind of the block.
     pub kind: Kind,
     /// Line number of the opening fence, counted from 1.
     pub line: usize,
-    /// Lines of the block without the fences, as a byte range of the page.
+    /// Byte range in the page that contains the lines of the block without the fences.
     pub body: Range<usize>,
-    /// The text between the fences.
+    /// Text between the fences of the block.
     pub text: String,
     /// Options in the comment directly above the block.
     notes: Vec<String>,
@@ -36,7 +36,7 @@ impl Block {
         self.notes.iter().find_map(|note| note.strip_prefix(key)?.strip_prefix(':')).map(str::trim)
     }
 
-    /// Returns `true` if an option in the comment is `words`.
+    /// Returns `true` if one of the options in the comment is `words`.
     pub fn says(&self, words: &str) -> bool {
         self.notes.iter().any(|note| note == words)
     }
@@ -52,8 +52,8 @@ fn comment(line: &str) -> Option<&str> {
     line.trim().strip_prefix("<!--")?.strip_suffix("-->").map(str::trim)
 }
 
-/// Returns the blocks of a page in order. Blocks that tests generate, between `<!-- … begin -->` and `<!-- …
-/// end -->`, and texts that are not typed are omitted.
+/// Returns the blocks of a page in order. Omits blocks that tests generate, between `<!-- … begin -->` and
+/// `<!-- … end -->`, and texts that the reader does not type.
 pub fn blocks(page: &str) -> Vec<Block> {
     let named = page.lines().filter_map(comment).find_map(|text| text.strip_prefix("commands:"));
     let named = named.map(|name| name.trim().to_owned());
@@ -99,14 +99,14 @@ pub fn blocks(page: &str) -> Vec<Block> {
 /// Command of a block and its output on the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// Command that is typed; empty if the block shows later output of a running program.
+    /// Command that the test types; empty if the block shows later output of a running program.
     pub command: String,
-    /// Lines below it.
+    /// Output lines below the command.
     pub shown: Vec<String>,
 }
 
 impl Block {
-    /// Returns its commands. A line after `> ` continues the previous command.
+    /// Returns the commands of the block. A line after `> ` continues the previous command.
     pub fn steps(&self) -> Vec<Step> {
         let mut steps: Vec<Step> = Vec::new();
         for line in self.text.lines() {
@@ -130,7 +130,7 @@ impl Block {
     }
 }
 
-/// Returns the text of a console block with these steps.
+/// Returns the text of a console block that contains these steps.
 pub(super) fn written(steps: &[Step]) -> String {
     let mut text = String::new();
     for step in steps {

@@ -1,10 +1,10 @@
-//! Comparison of command output with the output on the page.
+//! Comparison of the output of a command with the output on the page.
 
 /// Line on a page that stands for any number of output lines.
 const LEFT_OUT: &str = "...";
 
-/// Returns `true` if the printed lines match the lines of the page; `...` matches any number of lines. If
-/// `varying` is set, numbers are not compared, except the numbers of joints and boards.
+/// Returns `true` if the printed lines match the lines of the page. `...` matches any number of lines. If `varying` is set,
+/// the function does not compare numbers, except the numbers of joints and boards.
 pub(super) fn same(shown: &[String], printed: &[String], varying: bool) -> bool {
     let prepared = |lines: &[String]| -> Vec<String> {
         let line = |line: &String| if varying { masked(line) } else { line.trim_end().to_owned() };
@@ -26,7 +26,8 @@ fn fits(shown: &[String], printed: &[String]) -> bool {
     }
 }
 
-/// Returns the line with `#` for each number and one blank for each gap. The width of a gap depends on the adjacent numbers.
+/// Returns the line with `#` instead of each number and one blank instead of each gap. The width of a gap depends on the
+/// adjacent numbers.
 fn masked(line: &str) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut out = Vec::new();
@@ -43,7 +44,7 @@ fn numbers_masked(word: &str) -> String {
     let mut rest = word;
     while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
         let (before, from) = rest.split_at(at);
-        // The sign belongs to the number.
+        // A sign before the number belongs to the number.
         out += before.strip_suffix(['-', '+', '−']).unwrap_or(before);
         out.push('#');
         rest = &from[number_length(from)..];

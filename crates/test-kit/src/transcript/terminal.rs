@@ -1,4 +1,4 @@
-//! Terminal of the reader who runs the commands of a page: a shell, and its output.
+//! Terminal of a reader who runs the commands of a page: a shell, and the output of the shell.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::patience::Patience;
 /// Mark that the shell prints after each command, followed by the exit code. Commands never print this mark.
 const END: &str = "\u{1}end of the command ";
 
-/// Shell, or the program that has replaced the shell.
+/// A shell, or the program that has replaced the shell.
 pub(super) struct Terminal {
     child: Child,
     stdin: ChildStdin,
@@ -19,8 +19,8 @@ pub(super) struct Terminal {
 }
 
 impl Terminal {
-    /// Starts a shell in this folder. The shell searches commands in `programs` first; environment variables that
-    /// begin with an element of `without` are removed.
+    /// Starts a shell in the folder `folder`. The shell searches commands in `programs` first. The function removes environment
+    /// variables that begin with an element of `without`.
     pub(super) fn new(folder: &Path, programs: &Path, without: &[&str]) -> Self {
         let mut shell = Command::new("bash");
         shell.args(["--norc", "--noprofile"]).current_dir(folder);
@@ -30,7 +30,7 @@ impl Terminal {
         let path = std::env::var("PATH").unwrap_or_default();
         let state = folder.join(".home");
         std::fs::create_dir_all(&state).expect("a home");
-        // In this directory, agents keep files that only their user may read.
+        // Agents store files in this directory that only the agent's user may read.
         std::fs::set_permissions(&state, std::os::unix::fs::PermissionsExt::from_mode(0o700))
             .expect("rights");
         shell.env("PATH", format!("{}:{path}", programs.display())).env("COLUMNS", "100");
@@ -51,15 +51,15 @@ impl Terminal {
                 }
             }
         });
-        // stdout and stderr are merged in their order, as on a screen.
+        // The shell merges stdout and stderr in their order, as on a screen.
         writeln!(stdin, "exec 2>&1").expect("bash reads");
         Self { child, stdin, lines }
     }
 
-    /// Runs a command until it ends, and returns its output and its exit code.
+    /// Runs a command until it ends, and returns the output and the exit code of the command.
     ///
     /// # Panics
-    /// If the command does not end.
+    /// Panics if the command does not end.
     pub(super) fn run(&mut self, command: &str) -> (Vec<String>, i32) {
         // The command has no stdin; otherwise it would read the line that is typed next. The subshell sets `$?` for the next command.
         let typed = format!("{{ {command}\n}} < /dev/null\n__code=$?; echo \"{END}$__code\"; (exit $__code)");
@@ -69,7 +69,7 @@ impl Terminal {
             let Some(line) = Patience::begin().receive(&self.lines) else {
                 panic!("`{command}` does not end; it printed\n{}", printed.join("\n"))
             };
-            // If the output does not end with a line break, the mark follows in the same line.
+            // If the output does not end with a line break, the mark is in the last output line.
             if let Some((before, code)) = line.split_once(END) {
                 printed.extend(Some(before.to_owned()).filter(|before| !before.is_empty()));
                 return (printed, code.trim().parse().expect("a code"));
@@ -83,17 +83,18 @@ impl Terminal {
         self.type_line(&format!("exec {command}"));
     }
 
-    /// Types a line.
+    /// Types a line into the terminal.
     pub(super) fn type_line(&mut self, line: &str) {
         writeln!(self.stdin, "{line}").expect("it reads what is typed");
     }
 
-    /// Returns the next line; `None` if no line is printed within this time, or at the end of the output.
+    /// Returns the next output line. Returns `None` at the end of the output, or if no line is printed within the time `within`.
     pub(super) fn line(&mut self, within: Duration) -> Option<String> {
         self.lines.recv_timeout(within).ok()
     }
 
-    /// Returns the lines up to and including the first line for which `last` returns `true`; all lines if such a line does not exist.
+    /// Returns the output lines up to and including the first line for which `last` returns `true`. Returns all lines if no line
+    /// fulfils `last`.
     pub(super) fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
         let (mut patience, mut printed) = (Patience::begin(), Vec::new());
         while let Some(line) = patience.receive(&self.lines) {

@@ -1,5 +1,5 @@
-// Makes api-types.ts for each page, with the types of the objects in the description of its API. With --check it compares the
-// files instead.
+// Makes api-types.ts for each page. The files contain the types of the objects in the description of the page's API.
+// With --check the program only compares the files.
 import { readFileSync, writeFileSync } from 'node:fs';
 
 import openapiTS, { astToString } from 'openapi-typescript';

@@ -1,8 +1,8 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vite';
 
-// The agent's program contains the built files, so a build on any computer must give the same bytes. Therefore the build makes no
-// source maps, which contain paths, and the names of files depend only on their contents.
+// The agent's program contains the built files, so a build on any computer must give the same bytes. The build
+// therefore makes no source maps, which contain paths, and the names of files depend only on the contents of the files.
 export default defineConfig({
   plugins: [svelte()],
   build: {

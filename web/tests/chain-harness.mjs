@@ -1,4 +1,5 @@
-// Test harness of a chain's page: an agent with simulated boards, its page, and a browser.
+// Test harness for the page of a chain: an agent with simulated boards, the agent's page, and a
+// browser.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -20,7 +21,7 @@ function firstLine(child, name) {
 }
 
 /**
- * Starts an agent in a new directory, with this number of simulated boards. `edges` is a signal table. With `separate` the boards are in a separate
+ * Starts an agent in a new directory, with `boards` simulated boards. `edges` is a signal table. With `separate`, the boards run in a separate
  * process, which accepts faults through `fault`.
  */
 export async function startChain({ boards = 3, edges = undefined, separate = false } = {}) {
@@ -58,7 +59,10 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
       rmSync(dir, { recursive: true, force: true });
     },
     ask: asking(url, token('operator')),
-    /** Runs a job as another client, which then releases the lease. Boards that the job has started continue to run. */
+    /**
+     * Runs a job as another client, which releases the lease after the job. Boards that the job has started continue to
+     * run.
+     */
     async job(path, body = {}) {
       const grant = await agent.ask('POST', '/api/lease', { name: 'test', policy: 'continue', lasts_s: 60 });
       const { key } = grant.body;
@@ -74,7 +78,7 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
 
 export const card = (page, number) => page.getByRole('button', { name: new RegExp(`^Board ${number} `) });
 
-/** Returns an image. A simulated board accepts any bytes as a program. */
+/** Returns an image for an update. A simulated board accepts any bytes as a program. */
 export function image(bytes) {
   return Buffer.from(Array.from({ length: bytes }, (_, i) => (37 * i + 11) & 0xff));
 }
@@ -82,7 +86,7 @@ export function image(bytes) {
 const hex = (bytes) => Buffer.from(bytes).toString('hex').toUpperCase();
 const sum = (bytes) => bytes.reduce((a, b) => a + b, 0) & 0xff;
 
-/** Returns the bytes from address 0 on as Intel HEX with 16 bytes per record. */
+/** Returns the bytes, which begin at address 0, as Intel HEX with 16 bytes per record. */
 export function intelHex(bytes) {
   const record = (address, kind, data) => {
     const all = [data.length, address >> 8, address & 0xff, kind, ...data];
@@ -93,7 +97,7 @@ export function intelHex(bytes) {
   return `${text}:00000001FF\n`;
 }
 
-/** Like `intelHex`, but as Motorola S-records. */
+/** Like `intelHex`, but returns Motorola S-records. */
 export function sRecords(bytes) {
   const record = (kind, address, data) => {
     const all = [data.length + 3, address >> 8, address & 0xff, ...data];

@@ -1,4 +1,4 @@
-// Page of a chain: Stop, the shown data of boards, and the requests to them.
+// Tests of the page of a chain: Stop, the shown data of boards, and the requests to boards.
 import assert from 'node:assert/strict';
 import { after, before } from 'node:test';
 
@@ -134,7 +134,7 @@ on('to open a page and look at everything sends nothing', { boards: 2 }, async (
 on('a slider sends ten times a second at most, in the unit, and shows what was confirmed', { boards: 1, edges: EDGES.replace('PROGRAM', '0x8676') }, async ({ agent, look }) => {
   await running(agent, [1], true);
   const page = await watched(look);
-  // The test uses the clock of the page, because it may receive a request late.
+  // The test uses the clock of the page, because the test may receive a request late.
   await page.evaluate(() => {
     window.puts = [];
     const own = window.fetch;
@@ -168,7 +168,7 @@ on('a slider sends ten times a second at most, in the unit, and shows what was c
   await slider.focus();
   await slider.press('ArrowRight');
   await until('one more was sent', () => sent(page).length === puts.length + 1);
-  // The board follows the input, and the page shows its position.
+  // The board must follow the input, and the page must show the position of the board.
   await page.locator('section[aria-label="Outputs"] tr', { hasText: 'position' }).first().getByText(/[1-9]\d*\.\d\d/).waitFor();
 });
 
@@ -239,14 +239,14 @@ on('an update is checked, written with progress, and verified by reading back', 
   await page.getByText('Board 2: Verified by reading back.').waitFor({ timeout: 60_000 });
   const { program_id } = await agent.board(2);
   await card(page, 2).getByText(`0x${program_id.toString(16).toUpperCase().padStart(4, '0')}`).waitFor();
-  // Starts another update and cancels it before anything is erased.
+  // Starts another update and cancels this update before anything is erased.
   await page.getByLabel('Another file').setInputFiles({ name: 'other.bin', mimeType: 'application/octet-stream', buffer: image(60_000) });
   await page.getByRole('button', { name: 'Update …' }).click();
   await page.getByRole('button', { name: 'Yes, update' }).click();
   await progress.getByText(/Nothing has been erased yet/).waitFor();
   await progress.getByRole('button', { name: 'Cancel' }).click();
   await page.getByText(/Board 2: Cancelled before anything was erased/).waitFor();
-  // A text file is not a valid image. The page shows the reason of the refusal.
+  // A text file is not a valid image. The page must show the reason of the refusal.
   await page.getByLabel('Another file').setInputFiles({ name: 'notes.hex', mimeType: 'text/plain', buffer: Buffer.from('no image') });
   await page.getByRole('button', { name: 'Check only' }).click();
   await page.getByRole('alert').getByText(/./).first().waitFor();
@@ -264,7 +264,7 @@ on('every option of an update is sent as it was chosen, and each form of a file 
     const count = asked.length;
     const button = page.getByRole('button', { name: 'Check only' });
     await until('it can be checked', () => button.isEnabled());
-    // The keyboard is used, because a message about the last check may cover the button.
+    // The test uses the keyboard, because a message about the last check may cover the button.
     await button.press('Enter');
     await until('it was asked', () => asked.length > count);
     await until('that is over', async () => (await agent.ask('GET', '/api/jobs')).body.every((job) => job.stage !== 'running'));
@@ -291,14 +291,14 @@ on('every option of an update is sent as it was chosen, and each form of a file 
   const sent = await check(/Checks passed|Next: /);
   assert.deepEqual([sent.format, sent.addresses, sent.date, sent.expect_program_id], ['hex', 'byte', '2026-01-02', 0x4b3f]);
   assert.deepEqual([sent.group, sent.force, sent.accept_unverified, sent.boards], [true, true, true, [{ board: 1 }, { board: 2 }]]);
-  // These boards do not accept a second image. The page says so before anything is written. Then the image is removed
-  // again.
+  // These boards do not accept a second image. The page must report this before anything is written. The test
+  // then removes the second image again.
   await page.getByLabel('Second image').setInputFiles({ name: 'data.bin', mimeType: 'application/octet-stream', buffer: bytes });
   await until('it is read', () => page.getByRole('button', { name: 'Without a second image' }).isVisible());
   assert.equal((await check(/Next: /)).second, bytes.toString('base64'));
   await page.getByRole('button', { name: 'Without a second image' }).click();
   assert.equal((await check(/Checks passed|Next: /)).second, undefined);
-  // A file that was built again under the same name is sent with its new bytes.
+  // A file that was built again under the same name must be sent with its new bytes.
   await choose('app.txt', Buffer.from(intelHex(image(32))));
   assert.equal(Buffer.from((await check(/Checks passed|Next: /)).image, 'base64').toString(), intelHex(image(32)));
 });

@@ -1,4 +1,5 @@
-// Mistakes that the page prevents: torque with another arm's parameters, an arm drawn in a wrong pose, waypoints in wrong units, keys without effect.
+// Tests of mistakes that the page prevents: torque with another arm's parameters, an arm drawn in a wrong pose,
+// waypoints in wrong units, keys without effect.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,7 +12,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-// The controller is at a port, like a real one. The dialog shows the arm and the risk.
+// The controller is at a serial port, like a real controller. The dialog must show the arm and the risk.
 on('a controller without parameters gets none before the page has asked which arm it is', { faults: 'format = 2\n' }, async ({ agent, look }) => {
   const page = await look();
   const sent = [];
@@ -20,7 +21,8 @@ on('a controller without parameters gets none before the page has asked which ar
   });
   await state(page).getByText('No torque').waitFor();
   const dialog = page.getByRole('dialog', { name: 'Which arm is this?' });
-  // Tests each Recover button of the page. Neither Escape nor Enter on the element with the first focus recovers the arm.
+  // Tests each Recover button of the page. Neither Escape nor Enter on the element with the first focus may recover the
+  // arm.
   for (const [button, key] of [[state(page).getByRole('button', { name: 'Recover …' }), 'Escape'], [page.locator('#panel').getByRole('button', { name: 'Recover …' }), 'Enter']]) {
     await button.focus();
     await page.keyboard.press('Enter');
@@ -33,7 +35,7 @@ on('a controller without parameters gets none before the page has asked which ar
     await dialog.waitFor({ state: 'detached' });
   }
   assert.deepEqual(sent, []);
-  // The file of another arm is compared and sent.
+  // The page must compare and send the file of another arm.
   const { text } = (await agent.ask('GET', '/api/arm')).body;
   writeFileSync(join(agent.dir, 'mine.toml'), text.replace('kp = 8000', 'kp = 7900'));
   await state(page).getByRole('button', { name: 'Recover …' }).click();
@@ -60,7 +62,7 @@ on('an arm at rest is drawn where it stands in a new theme, and when its gains a
   });
   const same = async (what) => (await posed()).measured.forEach((q, i) => assert.ok(Math.abs(q - at[i]) < 0.002, `${what}: joint ${i + 1} is drawn at ${q}, stands at ${at[i]}`));
   const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
-  // Switches to dark, to light, and to the setting of the system.
+  // Switches the theme to dark, to light, and to the setting of the system.
   for (const wanted of ['dark', 'light', 'light']) {
     await page.getByRole('button', { name: /^Theme/ }).click();
     await until(`the theme is ${wanted}`, async () => (await theme()) === wanted);
@@ -107,7 +109,7 @@ on('waypoints that are added are in the units of the file, and planned so', {}, 
     const { body } = await agent.ask('GET', `/api/trajectories/${/number (\d+)/.exec(kept)[1]}/points`);
     body.positions_rad.at(-1).forEach((q, i) => assert.ok(Math.abs(q - to[i]) < 0.005, `${file}, ${button}: joint ${i + 1} ends at ${q} rad, the arm stands at ${to[i]} rad`));
   }
-  // A table to which the row cannot be added is unchanged.
+  // A table to which the row cannot be added must stay unchanged.
   const own = 't,q1,q2,q3,q4,q5,q6,qd1\n';
   await text.fill(own);
   await page.getByRole('button', { name: 'Add current position' }).click();
@@ -124,7 +126,7 @@ on('the jog keys are disabled while a motion is uploaded, with the reason', {}, 
   await page.click('#tab-jog');
   const keys = page.getByRole('button', { name: /^Joint \d, / });
   await until('they are enabled', async () => (await keys.count()) === 12 && (await keys.nth(0).isEnabled()));
-  // The page itself watches for the upload, because the upload is too short for the test to see it.
+  // The page itself watches for the upload, because the upload is too short for the test to notice it.
   const seen = page.evaluate(() => new Promise((done) => {
     const look = () => {
       const reason = [...document.querySelectorAll('#panel .note')].map((note) => note.textContent).find((text) => /being uploaded/.test(text));

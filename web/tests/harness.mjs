@@ -1,4 +1,5 @@
-// Test harness of the built page: an agent with a simulated arm, its page, and a browser.
+// Test harness for the built page of an arm: an agent with a simulated arm, the agent's page, and a
+// browser.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -10,15 +11,15 @@ import { fileURLToPath } from 'node:url';
 
 import { chromium } from 'playwright-core';
 
-/** Folder for pictures of pages with a failed test. */
+/** Folder for the pictures that failed tests take of pages. */
 const FAILED = fileURLToPath(new URL('./out/', import.meta.url));
-/** Folder for the pictures in the docs, which contain their names. */
+/** Folder for the pictures of the docs. Only pictures that the docs mention are stored. */
 const PICTURES = fileURLToPath(new URL('../pictures/', import.meta.url));
 const SHOWN = readFileSync(new URL('../../docs/dashboard.md', import.meta.url), 'utf8');
 const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/release/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
-/** Runs `jtc` with these arguments. Resolves to its output. */
+/** Runs `jtc` with the given arguments. Resolves to the output of `jtc`. */
 export function jtc(args, options = {}) {
   return new Promise((done, fail) => {
     const child = spawn(JTC, args, options);
@@ -68,12 +69,12 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     dir,
     operator: token('operator'),
     viewer: token('viewer'),
-    /** Kills the agent, which closes nothing, like after a power failure. */
+    /** Kills the agent. The agent closes nothing, like after a power failure. */
     kill() {
       child.kill('SIGKILL');
       return gone;
     },
-    /** Kills the agent and starts another one at its address. */
+    /** Kills the agent and starts another agent at the same address. */
     async again() {
       child.kill('SIGKILL');
       await gone;
@@ -92,7 +93,10 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
   };
 }
 
-/** Returns a function for requests to an agent with this token, which resolves to status and body of the answer. */
+/**
+ * Returns a function that sends requests to an agent with this token. The function resolves to status and body of the
+ * answer.
+ */
 export function asking(url, token) {
   return async (method, path, body, key) => {
     const headers = { Authorization: `Bearer ${token}`, 'Content-Type': 'application/json' };
@@ -115,13 +119,13 @@ export function startBrowser() {
   return chromium.launch(LAUNCH);
 }
 
-/** Starts a browser that can be killed. This simulates a tablet whose battery is empty. */
+/** Starts a browser that the test can kill. The killed browser simulates a tablet whose battery becomes empty. */
 export async function startMortal() {
   const server = await chromium.launchServer(LAUNCH);
   return { browser: await chromium.connect(server.wsEndpoint()), kill: () => server.kill() };
 }
 
-/** Takes a picture for the docs if PICTURES is set and the docs show a picture of this name. */
+/** Takes a picture for the docs if PICTURES is set and the docs show a picture with this name. */
 export async function picture(page, name) {
   if (process.env.PICTURES && SHOWN.includes(`/${name}.png`)) await page.screenshot({ path: join(PICTURES, `${name}.png`) });
 }
@@ -137,7 +141,7 @@ export function stage(browser, agent) {
       contexts.push(page.context());
       return page;
     },
-    /** Takes a picture of each page, to find the reason of a failure. */
+    /** Takes a picture of each page, so that a developer can find the reason of a failure. */
     async picture(name) {
       for (const [i, context] of contexts.entries()) {
         for (const page of context.pages()) await page.screenshot({ path: join(FAILED, `${name}-${i}.png`), fullPage: true }).catch(() => {});
@@ -150,7 +154,7 @@ export function stage(browser, agent) {
   };
 }
 
-/** Defines tests. Each test has its own new agent. A failed test takes a picture. */
+/** Defines tests. Each test has its own new agent. After a failure, the test takes a picture. */
 export function staged(browser, start = startAgent) {
   return (name, options, act) =>
     test(name, async () => {
@@ -172,13 +176,13 @@ export function state(page) {
   return page.locator('section[aria-label="State"]');
 }
 
-/** Waits until the page shows that the arm is held. */
+/** Waits until the page shows that the controller holds the arm. */
 export function held(page) {
   return state(page).getByText('Holding', { exact: true }).waitFor();
 }
 
 /**
- * Listens from now on for a text that the page shows for a short time. The returned function waits until it was shown. The page itself notes it,
+ * Listens from now on for a text that the page shows for a short time. The returned function waits until the page has shown the text. The page itself notes it,
  * because the text may have disappeared before a busy browser answers.
  */
 export async function says(page, pattern) {
@@ -191,7 +195,7 @@ export async function says(page, pattern) {
   return () => page.waitForFunction(() => window.heard, undefined, { polling: 100 });
 }
 
-/** Checks that the browser has reported no errors except refused requests. */
+/** Checks that the browser has reported no errors, apart from requests that the agent refused. */
 export function fine(page) {
   assert.deepEqual(page.complaints.filter((text) => !/status of 40[459]/.test(text)), []);
 }
@@ -202,7 +206,10 @@ export async function recoverAs(page, arm = 'avena') {
   await page.getByRole('dialog').getByRole('button', { name: `Recover as ${arm}` }).click();
 }
 
-/** Opens a page that collects the errors of the browser. With `clock` the test can stop the time of the page, and advance it with `passes`. */
+/**
+ * Opens a page and collects the errors of the browser. With `clock`, the test can stop the time of the page, and
+ * advance it with `passes`.
+ */
 export async function open(browser, url, { clock = false, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, ...options });
   const page = await context.newPage();
@@ -217,12 +224,15 @@ export async function open(browser, url, { clock = false, ...options } = {}) {
   return page;
 }
 
-/** Advances the time of a page by `ms` and then stops it, so that the page does not depend on the load of this computer. */
+/**
+ * Advances the time of a page by `ms` and then stops the time, so that the page does not depend on the load of this
+ * computer.
+ */
 export async function passes(page, ms) {
   await page.clock.pauseAt((await page.evaluate(() => Date.now())) + ms);
 }
 
-/** Waits until a condition holds in this process. The timeout is long enough for a busy computer. */
+/** Waits until a condition is true in this process. The timeout is long enough for a busy computer. */
 export async function until(what, condition, within = 120_000) {
   const end = Date.now() + within;
   for (;;) {

@@ -1,5 +1,5 @@
-// Layout and accessibility of the page: each tab fits a phone and a large screen, and axe finds no fault in light and dark. If PICTURES is set,
-// the tests also take the pictures in pictures/.
+// Tests of layout and accessibility of the page: each tab fits a phone and a large screen, and axe finds no fault in
+// light and dark. If PICTURES is set, the tests also take the pictures of the folder pictures/.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -18,7 +18,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-/** All faults so far, which are reported together at the end. */
+/** All faults that a test has found so far. The test reports the faults together at its end. */
 const wrong = [];
 function collect(found, what) {
   wrong.push(...found.map((each) => `${what}: ${each}`));
@@ -141,7 +141,7 @@ on('a motion and its preview', {}, async ({ agent, look }) => {
   await page.waitForTimeout(500);
   await reads(page, 'preview');
   await picture(page, 'preview-1400-light');
-  // At a low speed, because a busy computer needs seconds for a picture.
+  // The arm moves at a low speed, because a busy computer needs seconds for a picture.
   await page.getByLabel('Speed, % of its own').selectOption({ label: '25 %' });
   await page.getByRole('button', { name: /^Run/ }).click();
   await state(page).getByText('Moving', { exact: true }).waitFor();

@@ -1,4 +1,4 @@
-// Checks the sizes of the built pages, compressed as for a browser: the scripts that are loaded first, and all files.
+// Checks the compressed sizes of the built pages: the scripts that a browser loads first, and all files.
 import { readdirSync, readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -13,7 +13,7 @@ const follow = (path, first) => {
   if (first.has(path)) return;
   first.add(path);
   const text = readFileSync(path, 'utf8');
-  // Only static imports: dynamic imports are loaded later.
+  // Follows only static imports, because dynamic imports are loaded later.
   for (const [, next] of text.matchAll(/(?:from|import)\s*["'](\.\/[^"']+\.js)["']/g)) follow(join(dirname(path), next), first);
 };
 let large = false;

@@ -1,4 +1,5 @@
-// Stop, and the messages about an unknown state. These are the most important parts of the page.
+// Tests of Stop and of the messages about an unknown state. Stop and the messages are the most
+// important parts of the page.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -13,8 +14,8 @@ after(() => browser.close());
 const on = staged(() => browser);
 
 /**
- * Starts a motion of half a minute as another client, and calls `act` during the motion. This is long enough even on a
- * busy computer.
+ * Starts a motion of half a minute as another client, and calls `act` during the motion. The motion is long enough even
+ * on a busy computer.
  */
 async function moving(agent, act) {
   await jtc(['example', 'motion', '-o', agent.dir]);
@@ -38,7 +39,7 @@ on('Stop by one touch ends a motion, and says what it did', {}, async ({ agent, 
   await state(page).getByText('Holding').waitFor();
   await moving(agent, async () => {
     await state(page).getByText('Moving').waitFor();
-    // Stop acts when the button is pressed, before it is released.
+    // Stop must act when the button is pressed, before it is released.
     const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     const said = await says(page, /Stopped on the path in \d\.\d s; the arm is held/);
@@ -137,7 +138,7 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   await recover(agent);
   const page = await look({ clock: true });
   await state(page).getByText('Holding').waitFor();
-  // The first drawing keeps a computer without graphics hardware busy.
+  // The first drawing keeps a computer without graphics hardware busy for a while.
   await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0));
   await jtc(['example', 'motion', '-o', agent.dir]);
   await page.click('#tab-run');
@@ -145,7 +146,7 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   agent.suspend();
   await passes(page, 2000);
   await page.getByText('No connection', { exact: true }).first().waitFor();
-  // A file dialog may stay open longer than this loss.
+  // A file dialog may stay open longer than this loss of the connection.
   await file.setInputFiles(join(agent.dir, 'motion.csv'));
   agent.wake();
   await page.clock.resume();
@@ -172,10 +173,10 @@ on('a Stop that nobody confirms says so, at once and as often as it is touched',
   const page = await look();
   await state(page).getByText('Holding').waitFor();
   const words = page.getByTestId('stop-words');
-  // Loads the parts of the page that are needed later.
+  // Loads the parts of the page that the test needs later.
   await page.getByRole('button', { name: 'Nobody commands' }).click();
   await page.getByRole('button', { name: 'Close' }).click();
-  // The message of an earlier Stop is still shown.
+  // When the next Stop begins, the page still shows the message of this first Stop.
   await page.getByRole('button', { name: /STOP/ }).click();
   await words.getByText(/Nothing was moving/).waitFor();
   const seen = await page.evaluate(() => {
@@ -194,7 +195,7 @@ on('a Stop that nobody confirms says so, at once and as often as it is touched',
   assert.match(await words.innerText(), /STOP NOT SENT/);
   const texts = [...new Set(await page.evaluate(() => globalThis.seen))];
   assert.deepEqual(texts.filter((text) => !/NOT CONFIRMED|NOT SENT|being sent|Nothing was moving/.test(text)), []);
-  // A dialog shows the message next to its own button.
+  // A dialog must show the message next to its own Stop button.
   await page.getByRole('button', { name: 'Not known' }).click();
   await page.getByRole('dialog').getByRole('alert').getByText(/STOP NOT SENT/).waitFor();
   agent.wake();
@@ -219,7 +220,7 @@ on('Pause touched twice is a pause', {}, async ({ agent, look }) => {
   }
   await state(page).getByText('Paused', { exact: true }).waitFor();
   assert.equal((await agent.ask('GET', '/api/status')).body.controller.trajectory, 'Pause');
-  // The message is complete and visible in addition to the errors.
+  // The message must be complete and visible in addition to the errors.
   await page.setViewportSize({ width: 360, height: 740 });
   const [toasts, dock] = await Promise.all([page.getByRole('region', { name: 'Messages' }).boundingBox(), page.locator('footer').boundingBox()]);
   assert.ok(toasts.y + toasts.height <= dock.y, JSON.stringify({ toasts, dock }));
@@ -229,7 +230,7 @@ on('an address with a token that is none shows the page all the same', {}, async
   await recover(agent);
   const page = await look({ token: '%E0%A4%A' });
   await page.getByRole('dialog').getByText(/not accepted/).waitFor();
-  // On the agent's own computer a Stop needs no token, and a wrong token does not prevent it.
+  // On the agent's own computer a Stop needs no token, and a wrong token must not prevent the Stop.
   await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).click();
   await until('it was sent', async () => (await agent.ask('GET', '/api/status')).body.last_halt === 1);
 });

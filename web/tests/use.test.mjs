@@ -1,4 +1,5 @@
-// Use of the page: run, jog, poses, teaching, arm files, plots and gains, two users of one arm, errors.
+// Tests of the use of the page: run, jog, poses, teaching, arm files, plots and gains, two users of one arm,
+// errors.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,7 +12,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 
 const on = staged(() => browser);
-/** Times are checked only on a computer without other load. */
+/** True: the tests check times. Times can be checked only on a computer without other load. */
 const JUDGED = process.env.FIGURES !== undefined;
 
 const status = async (agent) => (await agent.ask('GET', '/api/status')).body;
@@ -60,7 +61,8 @@ on('a file is checked, looked at, and run; the report is one touch away', {}, as
   await slider.fill('3');
   await until('the ghost is where the motion is at 3 s', () => page.evaluate(() => Math.abs(globalThis.arm.preview.time - 3) < 0.01));
   assert.deepEqual(await joints(agent), before, 'the preview moved the arm');
-  // The speed is low until the motion was paused and resumed, because a busy computer needs seconds for each touch.
+  // The speed is low until the test has paused and resumed the motion, because a busy computer needs seconds for
+  // each touch.
   await page.getByLabel('Speed, % of its own').selectOption({ label: '25 %' });
   await page.getByRole('button', { name: /^Run/ }).click();
   await state(page).getByText('Moving', { exact: true }).waitFor();
@@ -88,7 +90,7 @@ on('what a check refuses is named with its joint, and shown at its place', {}, a
   const page = await look();
   await held(page);
   await page.click('#tab-run');
-  // First the file is invalid, and the page shows the place of the error.
+  // First the file is invalid, and the page must show the position of the error.
   writeFileSync(join(agent.dir, 'none.csv'), 't,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n0.1,0,0,x,0,0,0\n');
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'none.csv'));
   await page.getByRole('alert').getByText(/line 3, column 4, q3: "x" is not a number/).waitFor();
@@ -98,7 +100,7 @@ on('what a check refuses is named with its joint, and shown at its place', {}, a
   await page.getByText(/Error: joint \d/).first().waitFor();
   await page.locator('#panel').getByRole('button', { name: 'Show' }).first().click();
   assert.ok((await page.evaluate(() => globalThis.arm.preview.time)) > 0);
-  // This file passes the check. Another client replaces it before it runs.
+  // The second file passes the check. Another client replaces this file before it runs.
   await jtc(['example', 'motion', '-o', agent.dir]);
   await page.getByLabel('Trajectory file').setInputFiles(join(agent.dir, 'motion.csv'));
   await page.getByText('Passed the check').waitFor();
@@ -125,7 +127,7 @@ on('a joint moves as long as its key is held', {}, async ({ agent, look }) => {
   });
   await page.mouse.up();
   await until('it rests', async () => !(await moves(agent)), 5000);
-  // Uses the keyboard. The key is released because the window loses the focus.
+  // The test uses the keyboard. The key is released because the window loses the focus.
   await page.getByRole('button', { name: 'Joint 3, negative' }).focus();
   await page.keyboard.down('Enter');
   await until('it moves back', () => moves(agent));
@@ -186,7 +188,7 @@ on('a key that was let go before the lease came moves nothing, nor does one that
   await until('it moves', () => moves(agent));
   await page.mouse.up();
   await until('it rests', async () => !(await moves(agent)), 5000);
-  // If all requests arrive late, the arm does not move after the key was released.
+  // If all requests arrive late, the arm must not move after the key was released.
   const before = await joints(agent);
   const late = [];
   await page.route('**/api/jog*', async (route) => {
@@ -219,7 +221,7 @@ on('a pose is saved, gone to, and removed', {}, async ({ agent, look }) => {
     await ended(agent, job.body.number);
   });
   await held(page);
-  // Another client saves another position under this name: the arm moves to the position that this page shows.
+  // Another client saves another position under this name. The arm must move to the position that this page shows.
   await commanding(agent, (key) => agent.ask('PUT', '/api/poses/home', {}, key));
   await row.getByRole('button', { name: 'Go' }).click();
   await until('it is home', async () => Math.abs((await joints(agent))[0]) < 0.002 && !(await moves(agent)));
@@ -238,7 +240,7 @@ on('teaching is switched on and off; a way is recorded, thinned, planned', {}, a
   await state(page).getByText('Teaching', { exact: true }).waitFor();
   await page.locator('#panel').getByRole('button', { name: /End teaching/ }).click();
   await held(page);
-  // A move replaces the hand that would lead the arm.
+  // A move replaces the simulated hand that would guide the arm.
   await page.getByRole('button', { name: 'Record', exact: true }).click();
   await letGo(page);
   await commanding(agent, async (key) => {
@@ -282,7 +284,7 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   await page.click('#tab-plots');
   await page.locator('.uplot canvas').first().waitFor();
   await until('the plot has curves', () => page.evaluate(() => globalThis.arm.history.length > 20));
-  // Shows each tick of the last second, from the flight recorder.
+  // Shows each tick of the last second from the flight recorder.
   await page.getByRole('group', { name: 'Time read from the flight recorder' }).getByRole('button', { name: '1 s' }).click();
   await page.getByRole('button', { name: 'Each ms of them' }).click();
   await page.getByText(/1001 ticks of 1 ms/).waitFor({ timeout: 120_000 });
@@ -291,7 +293,7 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   assert.ok(await page.getByRole('button', { name: 'Temperature' }).isDisabled());
   await page.getByRole('button', { name: 'Live again' }).click();
   await page.getByLabel(/^Kp/).fill('7000');
-  // A value that the user types while the arm is being read does not replace the value to set.
+  // A value that the user types while the page reads the arm must not replace the value to set.
   let read;
   await page.route('**/api/arm', async (route) => {
     if (route.request().method() === 'GET') await new Promise((done) => (read = done));
@@ -310,7 +312,7 @@ on('gains are set, tested by a step, and undone', {}, async ({ agent, look }) =>
   await page.locator('#panel td', { hasText: '7000' }).waitFor();
   const now = await joints(agent);
   before.forEach((q, i) => assert.ok(Math.abs(q - now[i]) < 0.002, 'it is back where it began'));
-  // A Stop before the return motion ends the test of the gains.
+  // A Stop before the return motion must end the test of the gains.
   let second;
   await page.route('**/api/moves*', async (route) => {
     second = route.request().url();
@@ -360,7 +362,7 @@ on('two at one arm: one commands, the other asks for it and gets it', {}, async 
   await anna.getByRole('button', { name: /You command/ }).click();
   await anna.getByRole('button', { name: 'Give it to Bert' }).click();
   await bert.getByRole('banner').getByRole('button', { name: 'You command' }).waitFor();
-  // Every client can stop, whether or not it holds the lease.
+  // Every client can stop, with or without the lease.
   await anna.getByRole('button', { name: 'Close' }).click();
   await anna.getByRole('button', { name: /STOP/ }).click();
   await until('it was sent', async () => (await status(agent)).last_halt === 1);

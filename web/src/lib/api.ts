@@ -1,7 +1,7 @@
-// Requests to an agent, and its refusals. The code does not depend on the agent's device. The pages of an arm and of a
-// chain share it.
+// Requests to an agent, and refusals of the agent. The pages of an arm and of a chain share this code, which does not
+// depend on the controlled device.
 
-/** Reason of a refusal, in the format of an agent's answer. */
+/** Reason why the agent refused a request, in the format of the agent's answer. */
 export interface Problem {
   code: string;
   message: string;
@@ -46,31 +46,34 @@ export type Query = Record<string, string | number | undefined>;
 export interface Ask {
   query?: Query;
   body?: unknown;
-  /** Longest time for the answer, ms. */
+  /** Longest time until the answer arrives, ms. */
   within?: number;
-  /** The request continues after the page has closed. */
+  /** True: the request continues after the page has closed. */
   keepalive?: boolean;
-  /** The request is sent without waiting for others: Stop, Pause, and held keys. */
+  /** True: the request is sent without waiting for other requests. Used for Stop, Pause, and held keys. */
   ahead?: boolean;
-  /** The request is sent without the token. */
+  /** True: the request is sent without the token. */
   bare?: boolean;
-  /** The request moves nothing, so a Stop does not drop it from the queue. */
+  /** True: the request moves nothing, so a Stop does not drop the request from the queue. */
   ends?: boolean;
-  /** The request is cancelled if a Stop needs its connection. */
+  /** True: the request is cancelled if a Stop needs its connection. */
   yields?: boolean;
 }
 
 /**
- * Largest number of open requests, in addition to those sent ahead. A browser opens six connections to one agent, and
+ * Largest number of open requests, in addition to requests with `ahead`. A browser opens six connections to one agent, and
  * silently queues further requests.
  */
 export const OPEN_MAX = 3;
-/** Longest wait of a command for its turn, ms. After that the command is dropped, because the page may have changed by then. */
+/**
+ * Longest time for which a command waits in the queue, ms. A command that waits longer is dropped, because the page may
+ * have changed.
+ */
 export const WAIT_MAX_MS = 2000;
 
 type Fetch = (input: string, init: RequestInit) => Promise<Response>;
 
-/** Returns the path with its query. Undefined parts are left out. */
+/** Returns the path with its query. Undefined parameters of the query are omitted. */
 export function address(path: string, query: Query = {}): string {
   const parts = Object.entries(query).filter((entry): entry is [string, string | number] => entry[1] !== undefined);
   if (parts.length === 0) return path;
@@ -85,7 +88,7 @@ export function problemOf(status: number, text: string): Problem {
       return { ...(value as Problem), next: (value as Problem).next ?? '' };
     }
   } catch {
-    // The answer is not JSON, because it comes from a proxy, or from a router without this path.
+    // The answer is not JSON. A proxy sent it, or a router that does not know this path.
   }
   if (status === 404) {
     return {
@@ -102,13 +105,13 @@ export function problemOf(status: number, text: string): Problem {
 }
 
 interface Waiting {
-  /** `true` for a query, or for a command that moves nothing. */
+  /** True for a query, and for a command that moves nothing. */
   stays: boolean;
   go(): void;
   drop(why: string): void;
 }
 
-/** Returns the error for an answer that did not arrive, or only in part. */
+/** Returns the error for an answer that did not arrive, or that arrived only in part. */
 function unreached(error: unknown): ApiError {
   const late = error instanceof DOMException && error.name === 'TimeoutError';
   return new ApiError(0, {
@@ -142,7 +145,7 @@ export class Api {
     this.#fetch = fetch ?? ((input, init) => globalThis.fetch(input, init));
   }
 
-  /** Drops waiting commands that may move the device, and cancels requests that yield. */
+  /** Drops queued commands that may move the device, and cancels requests whose `yields` is true. */
   recall(why: string): void {
     const commands = this.#waiting.filter((each) => !each.stays);
     this.#waiting = this.#waiting.filter((each) => each.stays);
@@ -151,7 +154,7 @@ export class Api {
     this.#yielding.clear();
   }
 
-  /** Sends a request, and returns the raw answer. Throws ApiError for everything else. */
+  /** Sends a request, and returns the raw answer. Throws an ApiError if the request is refused, fails, or is not sent. */
   async send(method: string, path: string, ask: Ask = {}): Promise<Response> {
     if (ask.ahead || ask.keepalive) return this.#send(method, path, ask);
     if (this.#open >= OPEN_MAX) await this.#turn(method === 'GET' || ask.ends === true);
@@ -159,7 +162,7 @@ export class Api {
     try {
       return await this.#send(method, path, ask);
     } finally {
-      // The next waiting request gets this place.
+      // The next request in the queue can be sent now.
       const next = this.#waiting.shift();
       if (next) next.go();
       else this.#open -= 1;

@@ -1,6 +1,7 @@
-// The stream of an agent: a WebSocket that is reopened after each loss and continues after the last event.
+// Stream of an agent: a WebSocket. After each loss the page reopens the WebSocket, and the stream
+// continues after the last event.
 
-/** Common part of every agent's status. */
+/** Fields that the status of every agent has. */
 export interface BaseStatus {
   agent: string;
   last_event: number;
@@ -18,7 +19,7 @@ export interface EventsMessage<E extends Entry = Entry> {
   missed: boolean;
 }
 
-/** The part of a WebSocket that this module needs. */
+/** The functions of a WebSocket that this module needs. */
 export interface Socket {
   onopen: ((event: never) => void) | null;
   onmessage: ((event: { data: unknown }) => void) | null;
@@ -38,8 +39,8 @@ export interface Surroundings {
 export type Phase = 'connecting' | 'open' | 'waiting' | 'closed';
 
 /**
- * Time without a message after which the connection is considered lost, ms. The agent sends at least one message every
- * half second.
+ * Time without a message after which the connection counts as lost, ms. The agent sends at least one message every half
+ * second.
  */
 export const SILENT_MS = 1400;
 /** Longest time to open a socket, ms. */
@@ -49,10 +50,13 @@ const WAIT_MS = [200, 400, 800, 1500, 2000];
 export interface Handlers<S extends BaseStatus> {
   status(status: S): void;
   events(message: EventsMessage): void;
-  /** Handles every other message, by its kind. */
+  /** Handles a message of any other kind. */
   other?(message: { kind: string }): void;
   phase(phase: Phase): void;
-  /** Called if a socket did not open. The reason must be requested separately, because a browser does not report it. */
+  /**
+   * Called if a socket could not be opened. The caller must request the reason separately, because a browser does not
+   * report it.
+   */
   refused(): void;
 }
 
@@ -83,12 +87,12 @@ export class Connection<S extends BaseStatus> {
     return this.#around.now() - this.#heard;
   }
 
-  /** Returns `true` if the displayed state is current: a message arrived recently. */
+  /** Returns `true` if the displayed state is current, because a message arrived recently. */
   get isLive(): boolean {
     return this.#phase === 'open' && this.silence < SILENT_MS;
   }
 
-  /** Opens the stream, with the current token. */
+  /** Opens the stream with the current token. */
   start(): void {
     this.stop();
     this.#attempt = 0;
@@ -103,8 +107,8 @@ export class Connection<S extends BaseStatus> {
   }
 
   /**
-   * Tries at once instead of waiting for the next attempt. Called when the network is back, or the page is visible
-   * again.
+   * Tries to open the stream at once, without waiting for the time of the next attempt. Called when the network is back,
+   * or when the page is visible again.
    */
   hurry(): void {
     if (this.#phase !== 'waiting') return;
@@ -171,8 +175,8 @@ export class Connection<S extends BaseStatus> {
   }
 
   /**
-   * Detects another agent, whose event numbers begin again. Its events are requested from the beginning, and this
-   * message is dropped.
+   * Detects another agent, whose event numbers begin again. The page then requests the events of this agent from the
+   * beginning, and drops this message.
    */
   #know(agent: string): boolean {
     const other = this.#agent !== undefined && this.#agent !== agent;

@@ -1,9 +1,10 @@
-// Formats numbers with their units. An unknown value is shown as a dash, never as an old value.
+// Formats numbers with their units. For an unknown value, the page shows a dash and never an old
+// value.
 
 export const NONE = '–';
 export const DEGREES = 180 / Math.PI;
 
-/** Formats with a true minus sign, and without a negative zero. */
+/** Formats a number with a true minus sign, and without a negative zero. */
 export function number(value: number | null | undefined, digits: number): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
   const text = value.toFixed(digits);
@@ -33,7 +34,7 @@ export function toRad(value: number, unit: AngleUnit): number {
   return unit === 'deg' ? value / DEGREES : value;
 }
 
-/** Parses a typed number. A decimal comma and a true minus are accepted. NaN: the text is invalid. */
+/** Parses a typed number. A decimal comma and a true minus sign are accepted. NaN: the text is invalid. */
 export function parse(text: string): number {
   const plain = text.trim().replace('\u2212', '-').replace(',', '.');
   return plain === '' ? NaN : Number(plain);
@@ -59,7 +60,7 @@ export function bytes(n: number): string {
   return n < 1e6 ? `${(n / 1000).toFixed(1)} kB` : `${(n / 1e6).toFixed(1)} MB`;
 }
 
-/** Returns a number with its noun, such as "one point" or "2 points". */
+/** Returns a number with the noun in singular or plural, such as "one point" or "2 points". */
 export function count(n: number, one: string, many = `${one}s`): string {
   return n === 1 ? `one ${one}` : `${n} ${many}`;
 }

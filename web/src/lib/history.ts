@@ -1,5 +1,5 @@
-// The last minutes of measured values, for plots and figures. The values are in a ring of rows, which is read from the
-// oldest row on.
+// Measured values of the last minutes, for plots and figures. The values are in a ring buffer of rows, which is read
+// from the oldest row on.
 
 export class History {
   readonly channels: number;
@@ -18,7 +18,7 @@ export class History {
     return this.#count;
   }
 
-  /** Adds a row. Its first value is the time. Unknown values are NaN. */
+  /** Adds a row. The first value of the row is the time. Unknown values are NaN. */
   push(row: ArrayLike<number>): void {
     this.#data.set(row, this.#next * this.channels);
     this.#next = (this.#next + 1) % this.#room;
@@ -29,7 +29,7 @@ export class History {
     this.#next = this.#count = 0;
   }
 
-  /** Returns columns of the rows from a time on. NaN becomes null, which is drawn as a gap. */
+  /** Returns columns of the rows from a time on. NaN becomes null, which the plot shows as a gap. */
   since(time: number, columns: readonly number[]): (number | null)[][] {
     const out: (number | null)[][] = columns.map(() => []);
     for (let i = 0; i < this.#count; i += 1) {

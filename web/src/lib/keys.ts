@@ -1,4 +1,4 @@
-// The space bar stops everywhere except in text fields.
+// Keys of the page. Everywhere except in text fields, the space bar sends a Stop.
 
 /** The properties of an element that this module needs. */
 export interface Focused {
@@ -10,8 +10,8 @@ export interface Focused {
 const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'date', 'time', '']);
 
 /**
- * Returns `true` if keys enter text in this element. Buttons, sliders and switches do not take text. There the space
- * bar stops, and Enter presses the button.
+ * Returns `true` if keys enter text in this element. Buttons, sliders and switches do not take text. On such
+ * elements the space bar sends a Stop, and Enter presses the button.
  */
 export function takesText(element: Focused | null | undefined): boolean {
   if (!element) return false;

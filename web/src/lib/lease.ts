@@ -1,5 +1,5 @@
-// The lease: one client commands at a time. The first command takes the lease. The page renews it while it is in use,
-// and releases it when the user requests this or closes the page.
+// The lease: only one client at a time can command. The first command of a client takes the lease. The page renews
+// the lease while the page is in use, and releases it when the user requests this or closes the page.
 import { type Api, ApiError } from './api.ts';
 
 export type Policy = 'continue' | 'pause' | 'stop';
@@ -18,7 +18,7 @@ export const RENEW_MS = 3000;
 export interface LeaseWishes {
   name(): string;
   policy(): Policy;
-  /** Phase or `wantedBy` has changed. */
+  /** Called when `phase` or `wantedBy` has changed. */
   changed(): void;
 }
 
@@ -35,14 +35,14 @@ export class Lease {
     this.#wishes = wishes;
   }
 
-  /** Takes the lease if this client does not have it. Two commands at the same time send only one request. */
+  /** Takes the lease if this client does not hold it. Two commands at the same time send only one request. */
   take(): Promise<void> {
     if (this.phase === 'held') return Promise.resolve();
     this.#taking ??= this.#post(false).finally(() => (this.#taking = undefined));
     return this.#taking;
   }
 
-  /** Asks the holder for the lease. Renewing keeps the place in the queue. */
+  /** Asks the lease holder for the lease. Renewing the request keeps the position in the queue. */
   ask(): Promise<void> {
     return this.#post(true);
   }
@@ -53,7 +53,7 @@ export class Lease {
     this.#enter(grant.held ? 'held' : 'waiting', grant.key);
   }
 
-  /** Renews the lease, or the place in its queue. Returns `true` if this client holds the lease. */
+  /** Renews the lease, or the position in the queue for the lease. Returns `true` if this client holds the lease. */
   async renew(): Promise<boolean> {
     if (!this.key) return false;
     const key = this.key;
@@ -65,14 +65,14 @@ export class Lease {
       if (lost) this.#enter('none', undefined);
       else this.#enter(state.held ? 'held' : 'waiting', key);
     } catch (error) {
-      // Without an answer this client may still hold the lease. After a refusal it does not.
+      // If no answer arrived, this client may still hold the lease. After a refusal it does not hold the lease.
       if (!(error instanceof ApiError) || error.isNoConnection) return this.phase === 'held';
       if (this.key === key) this.#enter('none', undefined);
     }
     return this.phase === 'held';
   }
 
-  /** Notes that a command was refused, because another client holds the lease or the agent no longer knows this key. */
+  /** Records that the agent refused a command, because another client holds the lease or the agent no longer knows this key. */
   lost(): void {
     this.#enter('none', undefined);
   }

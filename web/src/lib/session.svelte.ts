@@ -1,5 +1,5 @@
-// Parts that all pages share: connection, token, lease, Stop, messages, events. These parts do not depend on the
-// agent's device.
+// Functions that all pages share: connection, token, lease, Stop, messages, events. The shared functions do not
+// depend on the device that the agent controls.
 import { getContext, setContext } from 'svelte';
 
 import { Api, ApiError, type Ask, type Problem } from './api.ts';
@@ -36,12 +36,12 @@ export interface Toast {
   title: string;
   text: string;
   problem?: Problem;
-  /** A button with a remedy, next to the message. */
+  /** A button next to the message that carries out a remedy. */
   action?: { word: string; act: () => void };
 }
 
 export interface Line {
-  /** Number that this page has given the line, because a new agent restarts its event numbers. */
+  /** Number that this page has given the event line. A new agent restarts its own event numbers. */
   id: number;
   unix_s: number;
   text: string;
@@ -52,7 +52,7 @@ export interface Line {
 
 export interface StopState {
   phase: 'idle' | 'sending' | 'sent' | 'failed';
-  /** performance.now() of the touch, and of the answer. */
+  /** Times of the touch and of the answer, from performance.now(). */
   at: number;
   answered: number;
   text: string;
@@ -60,33 +60,36 @@ export interface StopState {
 
 /** Texts about the controlled device. */
 export interface Driven {
-  /** `arm` or `chain`. */
+  /** Word for the device: `arm` or `chain`. */
   thing: string;
-  /** Sentence about the actions that every viewer can take. */
+  /** Sentence about the commands that need neither the lease nor the operator's token. */
   works: string;
-  /** Actions allowed with a viewer's token. */
+  /** Actions that a viewer's token allows. */
   viewerMay: string;
   /**
-   * Policies for a running motion after a disconnect of this browser, the usual one first. Each has the words that end
-   * the sentence `left`.
+   * Policies for a running motion after this browser has disconnected. The usual policy is first. Each policy has the
+   * words that complete the sentence `left`.
    */
   policies: readonly [[Policy, string], ...[Policy, string][]];
   left: string;
 }
 
-/** Function that turns an event into a line. */
+/** Function that turns an event into a line of the event list. */
 export type Describe = (entry: Entry) => Omit<Line, 'id' | 'unix_s'> | undefined;
 
-/** Time after a touch of the page during which the lease is renewed, ms. A running job of this page renews it as well. */
+/**
+ * Time after a touch of the page during which the page renews the lease, ms. A running job of this page also causes
+ * renewals.
+ */
 const IN_USE_MS = 120_000;
 const LINES_MAX = 400;
-/** Interval of requests for the agent's time until the time is known, ms. */
+/** Interval at which the page requests the agent's time until it knows this time, ms. */
 const PROBE_MS = 1000;
-/** Longest wait for the lease after which a command that may move the device is still sent, ms. */
+/** Longest wait for the lease, ms. After a longer wait, a command that may move the device is not sent. */
 const LEASE_MAX_MS = 3000;
-/** Shortest time for which a failed Stop is shown, ms. */
+/** Shortest time for which the page shows that a Stop failed, ms. */
 const FAILED_MS = 20_000;
-/** Age above which status values are shown as outdated, ms. */
+/** Age above which the page shows status values as outdated, ms. */
 const OLD_MS = 1500;
 
 function load(name: string): string | null {
@@ -115,13 +118,13 @@ export class Session<S extends SessionStatus> {
   readonly tokens = new TokenStore(tab, device);
 
   phase = $state<Phase>('connecting');
-  /** True if messages arrive. */
+  /** True if messages arrive from the agent. */
   live = $state(false);
   /** True if the device answers the agent. */
   fresh = $state(false);
-  /** Delay of messages that arrive steadily, s. 0: a delay is not the reason for the unknown state. */
+  /** Delay of messages that arrive steadily, s. 0: the state is not unknown because of a delay. */
   late = $state(0);
-  /** Time without connection in whole seconds. */
+  /** Time without a connection in whole seconds. */
   lostFor = $state(0);
   status = $state.raw<S | undefined>(undefined);
   role = $state<'viewer' | 'operator'>('viewer');
@@ -142,11 +145,11 @@ export class Session<S extends SessionStatus> {
   /** `true` while a job of this page runs. */
   isBusy: () => boolean = () => false;
   /**
-   * `true` if no motion would continue without a lease. Then the lease is released when the page closes. Otherwise the
-   * lease expires, and its policy applies.
+   * `true` if no motion would continue without a lease. If no motion would continue, the page releases the lease when
+   * it closes. Otherwise the lease expires, and the policy of the lease applies.
    */
   isAtRest: () => boolean = () => false;
-  /** Result of the last Stop, in the words of the page. Empty: no message. */
+  /** Result of the last Stop, in the words of the page. Empty: the page shows no message. */
   saysOfStop: () => { text: string; failed: boolean } = () => ({ text: this.stopState.text, failed: this.stopState.phase === 'failed' });
   readonly #statusHandlers: ((status: S) => void)[] = [];
   readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
@@ -162,7 +165,7 @@ export class Session<S extends SessionStatus> {
   #touched = 0;
   #toastId = 0;
   #lineId = 0;
-  /** Time of the last status, and its delay. */
+  /** Time of the last status, and the delay of this status. */
   #statusAt = -Infinity;
   #late = 0;
   #halt = 0;
@@ -170,7 +173,7 @@ export class Session<S extends SessionStatus> {
   #agent = '';
   #lostAt = performance.now();
   #probing = false;
-  /** Token whose refusal was reported. An empty string: no token was sent. */
+  /** Token whose refusal the page has reported. An empty string: no token was sent. */
   #refused: string | undefined;
 
   constructor(describe: Describe, of: Driven) {
@@ -222,7 +225,7 @@ export class Session<S extends SessionStatus> {
     this.#eventHandlers.push(handler);
   }
 
-  /** Calls `handler` with messages of the stream other than status and events. */
+  /** Calls `handler` with each message of the stream that is neither a status nor an event. */
   onMessage(handler: (message: { kind: string }) => void): void {
     this.#messageHandlers.push(handler);
   }
@@ -232,7 +235,7 @@ export class Session<S extends SessionStatus> {
     this.#lossHandlers.push(handler);
   }
 
-  /** Calls `handler` when events were missed, so that the current job must be requested. */
+  /** Calls `handler` when the page has missed events, so that the current job must be requested. */
   onMissed(handler: () => void): void {
     this.#missedHandlers.push(handler);
   }
@@ -250,7 +253,7 @@ export class Session<S extends SessionStatus> {
       if (!document.hidden) this.connection.hurry();
     });
     addEventListener('pagehide', () => {
-      // If a job runs, the lease is not released. The lease then expires, and the chosen policy applies.
+      // If a job runs, the page does not release the lease. The lease then expires, and the chosen policy applies.
       if (this.lease.phase === 'waiting' || this.isAtRest()) void this.lease.release(true).catch(() => {});
     });
   }
@@ -286,20 +289,26 @@ export class Session<S extends SessionStatus> {
     this.connection.start();
   }
 
-  /** Number of the last Stop, for a command that is requested now. A later Stop prevents its motion. */
+  /**
+   * Number of the last Stop, for a command that the user requests now. A later Stop prevents the motion of this
+   * command.
+   */
   get askedAfter(): number | undefined {
     const shown = this.status?.last_halt;
     return shown === undefined ? undefined : Math.max(shown, this.#halt);
   }
 
-  /** The agent's time, as far as this page knows it. The agent refuses a command with this time if it arrives late. */
+  /**
+   * The agent's time as far as this page knows it. If a command with this time arrives late, the agent refuses the
+   * command.
+   */
   get agentTime(): number | undefined {
     return this.#lateness.agentTime(performance.now());
   }
 
   /**
-   * Stops, ahead of all other requests. Tries again if the network drops the request. `stopState` has the result of the
-   * last touch only. Until the agent confirms the Stop, it shows that the Stop is unconfirmed.
+   * Sends a Stop before all other requests. Sends it again if the network drops the request. `stopState` has the result
+   * of the last touch only. `stopState` shows that the Stop is unconfirmed until the agent confirms it.
    */
   async stop(): Promise<void> {
     const at = performance.now();
@@ -338,19 +347,19 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** Removes the message of the last Stop, unless it is still being sent. */
+  /** Removes the message about the last Stop, unless the page is still sending the Stop. */
   forgetStop(): void {
     if (this.#stopping === 0) this.stopState = { phase: 'idle', at: 0, answered: 0, text: '' };
   }
 
-  /** Pauses the motion. No lease is needed. */
+  /** Pauses the motion. A pause needs no lease. */
   async pause(): Promise<boolean> {
     return (await this.attempt('Pause', () => this.#halting('/api/pause', 3000), (sent) => {
       this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
     })) !== undefined;
   }
 
-  /** Sends Stop or Pause. A client that needs no token is not blocked by an expired one. */
+  /** Sends Stop or Pause. An expired token does not block a client that needs no token. */
   async #halting(path: string, within: number): Promise<{ halt?: number } | undefined> {
     try {
       return await this.api.json<{ halt?: number }>('POST', path, { within, ahead: true });
@@ -363,9 +372,9 @@ export class Session<S extends SessionStatus> {
   }
 
   /**
-   * Sends a command, with the lease. A command that may move the device also carries the state that this page showed
-   * when the user requested it: the present state, or `after` for a later part of the same request. Returns the answer.
-   * After a refusal, returns undefined and shows the reason as a message.
+   * Sends a command, with the lease. A command that may move the device also contains the state that this page showed
+   * when the user requested the command. The state is the present state, or `after` for a later part of the same
+   * request. Returns the answer. If the agent refuses the command, returns undefined and shows the reason as a message.
    */
   async command<T = unknown>(
     what: string, method: string, path: string, ask: Ask & { moves?: boolean; after?: number | undefined; quiet?: boolean } = {},
@@ -382,7 +391,7 @@ export class Session<S extends SessionStatus> {
       try {
         return { value: await this.api.json<T>(method, path, query ? { ...ask, query } : ask) };
       } catch (error) {
-        // If the lease has expired while the page was idle, it is taken again, once.
+        // If the lease has expired while the page was idle, the page takes the lease again, once.
         if (!had || !(error instanceof ApiError) || error.problem.code !== 'denied' || error.problem.next.includes('three seconds')) throw error;
         if (await this.lease.renew()) throw error;
         await this.lease.take();
@@ -392,7 +401,7 @@ export class Session<S extends SessionStatus> {
     return this.attempt(what, act, undefined, ask.quiet);
   }
 
-  /** Calls `act`, and shows the reason of a failure. */
+  /** Calls `act`. If `act` fails, shows the reason. */
   async attempt<T>(what: string, act: () => Promise<T>, then?: (value: T) => void, quiet = false): Promise<T | undefined> {
     try {
       const value = await act();
@@ -463,7 +472,7 @@ export class Session<S extends SessionStatus> {
       this.#agent = message.agent;
       this.#known = -1;
     }
-    // Events from before the page was opened are not new.
+    // Events that occurred before the page was opened are not new.
     const isFirst = this.#known < 0;
     const fresh: Line[] = [];
     for (const entry of message.events) {
@@ -497,12 +506,12 @@ export class Session<S extends SessionStatus> {
     if (fresh !== this.fresh) {
       this.fresh = fresh;
       if (!fresh) {
-        // The waiting commands are dropped, because the user requested them for a state that is now outdated.
+        // The page drops the waiting commands, because the user requested them for a state that is now outdated.
         this.api.recall('The connection was lost');
         for (const handler of this.#lossHandlers) handler();
       }
     }
-    // The failure was shown long enough, and the device is at rest. A new job hides the failure at once.
+    // The page has shown the failure long enough, and the device is at rest. A new job hides the failure at once.
     if (this.stopState.phase === 'failed' && performance.now() - this.stopState.answered > FAILED_MS && this.isAtRest()) this.forgetStop();
     const lostFor = live ? 0 : Math.floor((performance.now() - this.#lostAt) / 1000);
     if (lostFor !== this.lostFor) this.lostFor = lostFor;
@@ -522,11 +531,11 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** Requests the agent's time, so that a delay of all messages is detected. */
+  /** Requests the agent's time, so that the page detects a delay of all messages. */
   async #probeTime(): Promise<void> {
     if (!this.live || document.hidden) return;
     this.#probes += 1;
-    // The time is requested often until it is known, then occasionally.
+    // The page requests the time often until it knows the time, then occasionally.
     if (this.#probes > 4 && this.#probes % 5 !== 0) return;
     const [sent, agent] = [performance.now(), this.status?.agent];
     try {
@@ -537,7 +546,7 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** Finds out with an ordinary request why a socket was refused, because a browser does not report the reason. */
+  /** Sends an ordinary request to find out why a socket was refused, because a browser does not report the reason. */
   async #probe(): Promise<void> {
     if (this.#probing) return;
     this.#probing = true;
@@ -546,7 +555,8 @@ export class Session<S extends SessionStatus> {
     } catch (error) {
       if (error instanceof ApiError && !error.isNoConnection) {
         this.denied = error.problem;
-        // The dialog is opened only once for each token. A user who has closed it can open it again next to the state.
+        // The page opens the dialog only once for each token. A user who has closed the dialog can open it again next
+        // to the state.
         const token = this.tokens.get() ?? '';
         if (error.wantsToken && this.#refused !== token) {
           this.#refused = token;

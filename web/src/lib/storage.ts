@@ -1,4 +1,5 @@
-// Storage of a browser. If it is blocked or full, a page still works, but its data is lost when it closes.
+// Storage of a browser. If the storage is blocked or full, a page still works, but its data is lost when
+// the page closes.
 
 export interface Store {
   getItem(name: string): string | null;
@@ -6,7 +7,7 @@ export interface Store {
   removeItem(name: string): void;
 }
 
-/** Returns the browser's storage. If it fails, a storage in the memory of this page is used. */
+/** Returns the browser's storage. If this storage fails, the page uses a storage in its memory. */
 export function guarded(open: () => Store): Store {
   const own = new Map<string, string>();
   const attempt = <T>(act: (store: Store) => T, instead: T): T => {

@@ -13,7 +13,7 @@ export function savedTheme(): Theme {
   return saved === 'light' || saved === 'dark' ? saved : 'auto';
 }
 
-/** Applies the theme now, and when the system changes. */
+/** Applies the theme now, and again when the setting of the system changes. */
 export function applyTheme(theme: Theme): void {
   chosen = theme;
   if (theme === 'auto') device.removeItem(NAME);
@@ -21,7 +21,7 @@ export function applyTheme(theme: Theme): void {
   show();
 }
 
-/** Returns `true` if the page is dark now. */
+/** Returns `true` if the page is dark at present. */
 export function isDark(theme: Theme): boolean {
   return theme === 'dark' || (theme === 'auto' && system.matches);
 }

@@ -1,4 +1,5 @@
-// The token of this browser: from the address (#token=…), from this session, or remembered on this device.
+// Token of this browser. The page reads the token from the address (#token=…), from this session, or from
+// the storage of this device.
 
 import type { Store } from './storage.ts';
 

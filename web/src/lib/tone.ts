@@ -1,4 +1,5 @@
-// Tones of displayed states. The text of a state always has the same meaning as its tone.
+// Tones of the displayed states. The text of a state always has the same meaning as the tone of the
+// state.
 
 /** Colour and shape of a state. Each shape is different, for users who cannot distinguish colours. */
 export type Tone = 'off' | 'hold' | 'move' | 'pause' | 'teach' | 'error' | 'lost';

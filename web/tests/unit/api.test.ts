@@ -88,7 +88,7 @@ test('so many requests are open at once, a Stop beside them, and commands that w
   }
   await Promise.all(reads);
   assert.equal(open.at(-1)?.path, `/read/${OPEN_MAX}`);
-  // All places are free again.
+  // All connections are free again.
   const more = Array.from({ length: OPEN_MAX }, () => api.get('/more'));
   await new Promise((done) => setImmediate(done));
   for (const each of open.filter(({ path }) => path === '/more')) each.answer();
@@ -98,12 +98,13 @@ test('so many requests are open at once, a Stop beside them, and commands that w
 test('messages that all come late are as late as they are, beside the soonest', () => {
   const lateness = new Lateness();
   assert.equal(lateness.agentTime(0), undefined);
-  // The agent started 500 ms after this page. Its messages take 20 ms, then one takes 45 ms, and one takes 3 s.
+  // The agent started 500 ms after this page. Most messages of the agent take 20 ms, then one takes 45 ms, and
+  // one takes 3 s.
   assert.equal(lateness.take(0, 520), 0);
   assert.equal(lateness.take(1000, 1545), 25);
   assert.equal(lateness.take(2000, 5500), 2980);
   assert.equal(lateness.agentTime(6520), 6000);
-  // A clock that is slower by 100 ppm is not reported as a delay, because old messages are not used.
+  // A clock that is slower by 100 ppm must not count as a delay, because old messages are not used.
   let [most, now] = [0, 10_000];
   const slow = new Lateness();
   for (let i = 0; i < 4000; i += 1, now += 5000) most = Math.max(most, slow.take(now * (1 - 1e-4), now));
@@ -113,7 +114,7 @@ test('messages that all come late are as late as they are, beside the soonest', 
 });
 
 test('a delay that all messages have is seen by what is asked, and clocks that stood still are no delay', () => {
-  // The agent has the same clock, and every message takes 3 s.
+  // The agent and the page have the same clock, and every message takes 3 s.
   const late = new Lateness();
   for (let now = 10_000; now < 40_000; now += 500) {
     const found = late.take(now - 3000, now);
@@ -127,7 +128,7 @@ test('a delay that all messages have is seen by what is asked, and clocks that s
     if (now % 5000 === 0) good.probe(now - (now === 30_000 ? 1020 : 20), now - 10);
     assert.ok(found <= 20, `${now}: ${found}`);
   }
-  // The agent's computer is suspended for a minute, and later this computer.
+  // First the agent's computer is suspended for a minute, and later this computer.
   for (const slept of [60_000, -60_000]) {
     for (let now = 60_000; now < 90_000; now += 500) {
       good.take(now - 10 - slept, now);

@@ -21,7 +21,7 @@ const model: ArmModel = {
   flange: { origin_xyz_m: [0, 0, 0.08], origin_rpy_rad: [0.2, 0, 0] },
 };
 
-/** Returns the cells of a row in their order, read in the same way as by the agent. */
+/** Returns the cells of a row in their order, and reads them as the agent does. */
 function read(row: string, separator: string): (number | string)[] {
   const cells = separator === ' ' ? row.trim().split(/\s+/) : row.split(separator).map((cell) => cell.trim());
   return cells.map((cell) => (cell === '' || Number.isNaN(Number(cell)) ? cell : Number(cell)));
@@ -69,7 +69,7 @@ test('a row is in the columns, units and separator of the header', () => {
 test('a row of the flange is its pose, in the units of the header', () => {
   const frame = flange(model, Q);
   const xyz = [frame[3]!, frame[7]!, frame[11]!];
-  // The cells contain roll, pitch and yaw of the same frame, in the order of the file.
+  // The cells must contain roll, pitch and yaw of this frame, in the order of the file.
   const angles = (cells: (number | string)[], unit: number) => frameOf(xyz as Vector, cells.map((cell) => Number(cell) * unit) as Vector);
   const cases: [string, boolean, number][] = [
     ['x,y,z,roll,pitch,yaw', false, 1], ['x,y,z,roll,pitch,yaw', true, DEG], ['x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg', false, DEG], ['X,Y,Z,Roll_RAD,Pitch_RAD,Yaw_RAD', true, 1],

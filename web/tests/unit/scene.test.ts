@@ -104,7 +104,7 @@ test('a ghost that is hidden stays hidden, and a position that is not known stay
     const drawn = scene();
     drawn.setModel(model());
     drawn.setMeasured(POSES[1]);
-    // The commanded pose equals the measured pose, so the ghost is not shown.
+    // The commanded pose equals the measured pose, so the scene must not show the ghost.
     drawn.setGhost(POSES[1]);
     change(drawn);
     assert.equal(drawn.posed.ghostShown, false);

@@ -1,4 +1,5 @@
-// State of the page of an arm: model, controller, jobs, preview. Components read it, and send requests through it.
+// State of the page of an arm: model, controller, jobs, preview. Components read this state, and send requests
+// through it.
 import { getContext, setContext } from 'svelte';
 
 import { ApiError } from '../api.ts';
@@ -19,14 +20,14 @@ const ROWS = 15_000;
 /** Shortest interval between two updates of displayed text, ms. */
 const READ_MS = 120;
 
-/** A job, according to its events. */
+/** A job, as its events describe it. */
 export interface Course {
   number: number;
   what: string;
   client: string;
   phase: string;
   stage: 'begun' | 'uploading' | 'executing' | 'ended';
-  /** Progress of the phase, 0 to 1. */
+  /** Progress of the phase of the job, 0 to 1. */
   progress: number;
   duration_s: number;
   runs: number;
@@ -34,7 +35,7 @@ export interface Course {
   own: boolean;
 }
 
-/** Stages of a job before a motion. */
+/** Texts for the stages of a job before a motion. */
 const STAGES = { begun: ': being prepared', uploading: ': being uploaded', executing: '', ended: '' };
 
 export interface Preview {
@@ -67,9 +68,9 @@ export class ArmPage {
 
   tab = $state<Tab>('state');
   unit = $state<AngleUnit>(device.getItem('openjtc-unit') === 'rad' ? 'rad' : 'deg');
-  /** Last displayed status; undefined: no current status. */
+  /** Status of the controller that the page displays; undefined: no current status. */
   controller = $state.raw<Controller | undefined>(undefined);
-  /** Every status, for the scene and the plots. */
+  /** Latest received status, for the scene and the plots. */
   latest: Controller | undefined;
   model = $state.raw<ArmModel | undefined>(undefined);
   info = $state.raw<InfoObject | undefined>(undefined);
@@ -86,9 +87,9 @@ export class ArmPage {
   explained = $state<string | undefined>(undefined);
   /** True while the page asks which arm this is, before it recovers the arm. */
   asksArm = $state(false);
-  /** An arm file that the user has opened, to compare it or to send it to the controller. */
+  /** Arm file that the user has opened, to compare it or to send it to the controller. */
   armFile = $state.raw<{ name: string; text: string } | undefined>(undefined);
-  /** Result of the last Stop that was sent. */
+  /** Result of the last Stop that this page sent. */
   #did = $state('');
   readonly stopWords = $derived.by(() => {
     const { phase, text } = this.session.stopState;
@@ -120,7 +121,7 @@ export class ArmPage {
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
   }
 
-  /** Calls `handler` with each status, and with undefined without a current status. */
+  /** Calls `handler` with each status, and with undefined if the current status is missing. */
   onFrame(handler: (controller: Controller | undefined) => void): () => void {
     this.#frames.push(handler);
     return () => this.#frames.splice(this.#frames.indexOf(handler), 1);
@@ -131,20 +132,20 @@ export class ArmPage {
     device.setItem('openjtc-unit', unit);
   }
 
-  /** Recovers the arm. For a controller without parameters, asks first which arm it is. */
+  /** Recovers the arm. If the controller has no parameters, the page first asks which arm this is. */
   recover(): void {
     if (this.lacksArm) this.asksArm = true;
     else void this.session.command('Recover', 'POST', '/api/recover', { body: {}, moves: true });
   }
 
-  /** Measured positions, or undefined if a position is unknown. */
+  /** Measured positions of the joints, or undefined if a position is unknown. */
   get position(): number[] | undefined {
     const values = this.controller?.joints.map((joint) => joint.position_rad);
     return values?.every((value) => typeof value === 'number') ? (values as number[]) : undefined;
   }
 
   async stop(): Promise<void> {
-    // The Stop is sent before all other steps. The messages follow.
+    // The page sends the Stop before all other steps, and then shows the messages.
     const sent = this.session.stop();
     const controller = this.latest;
     const moved = isMoving(controller) || isPaused(controller) || this.words?.tone === 'move';
@@ -172,7 +173,7 @@ export class ArmPage {
   #take(status: Status): void {
     if (status.agent !== this.#agent) {
       this.#agent = status.agent;
-      // The new agent has other jobs, so the current job is requested.
+      // A new agent has other jobs, so the page requests the current job.
       this.course = undefined;
       this.#stop = undefined;
       void this.refresh();
@@ -195,7 +196,7 @@ export class ArmPage {
   #lose(): void {
     this.latest = undefined;
     this.controller = undefined;
-    // The plots show a gap instead of a line.
+    // The plots show a gap here instead of a line.
     if (this.history.length > 0) this.history.push([Date.now() / 1000, ...new Array<number>(COLUMNS - 1).fill(NaN)]);
     for (const frame of this.#frames) frame(undefined);
   }
@@ -219,7 +220,7 @@ export class ArmPage {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
-        // The result of a Stop is shown until the next job.
+        // The page shows the result of a Stop until the next job.
         if (isNew && !this.#stop) this.session.forgetStop();
         this.course = {
           number: event.job, what: event.what, client: event.client, phase: '', stage: 'begun', progress: 0, duration_s: 0, runs: 0,
@@ -256,11 +257,12 @@ export class ArmPage {
       if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
       else if (outcome === 'finished') this.session.toast({ tone: 'good', title: jobWords(job.what), text: 'Finished.' });
     } catch {
-      // An error is ignored: the log has the event, and the figures come with the next request for the job.
+      // The page ignores an error: the log has the event, and the figures arrive with the next request for the
+      // job.
     }
   }
 
-  /** Reads data that the stream does not send. */
+  /** Reads data that the stream of the agent does not send. */
   async refresh(): Promise<void> {
     await Promise.all([this.readModel(), this.readInfo(), this.readPayload(), this.readPoses(), this.readTrajectories(), this.readJobs(), this.readSpeed()]);
   }
@@ -312,8 +314,8 @@ export class ArmPage {
   }
 
   /**
-   * Returns a free number for a new trajectory. If the request contains `new`, the agent refuses the number if another
-   * client has used it meanwhile.
+   * Returns a free number for a new trajectory. If another client has used the number meanwhile, the agent refuses a
+   * request that contains `new`.
    */
   async freeNumber(): Promise<number> {
     await this.readTrajectories();

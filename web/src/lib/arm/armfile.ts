@@ -3,13 +3,15 @@ import { parse, type Table, type Value } from './toml.ts';
 
 /** A difference between two arm files. */
 export interface Difference {
-  /** Place in the file, such as "joint 2, pid.kp". Joints are counted from 1. */
+  /** Position of the difference in the file, such as "joint 2, pid.kp". Joints are counted from 1. */
   place: string;
   board: string;
   file: string;
 }
 
-/** Relative difference below which two values are equal, because the controller's numbers have single precision. */
+/**
+ * Relative difference below which two values count as equal, because the controller's numbers have single precision.
+ */
 const SAME = 2e-6;
 const NAMED = new Set(['joint', 'link']);
 
@@ -69,7 +71,7 @@ function compare(board: Value | undefined, file: Value | undefined, place: strin
   out.push({ place: place.replaceAll(/ (\d+)\./g, ' $1, '), board: shown(board), file: shown(file) });
 }
 
-/** Keys that are never sent to the controller. A difference in them is not a difference of the arm. */
+/** Keys that are never sent to the controller. A difference in these keys is not a difference of the arm. */
 const NOT_GIVEN = new Set(['poses', 'format']);
 
 /**
@@ -104,10 +106,10 @@ export function gainsOf(text: string): Gains[] {
   });
 }
 
-/** Returns the file with other gains of a joint (from 1). All other text is unchanged, including comments. */
+/** Returns the file with other gains of a joint (counted from 1). All other text is unchanged, including comments. */
 export function withGains(text: string, joint: number, gains: Gains): string {
   const parts = text.split(/^(?=\[\[joint\]\])/m);
-  // The text before the first joint is a separate part, unless it is empty.
+  // The text before the first joint is a separate part, if it is not empty.
   const first = parts.findIndex((part) => part.startsWith('[[joint]]'));
   const at = first + joint - 1;
   const part = parts[at];

@@ -1,19 +1,25 @@
-// Jogging with a dead man's switch: rates are sent while a key is held, and zeros when the key is released for any
-// reason.
+// Jogging with a dead man's switch. The page sends rates while a key is held. When the key is released for any reason,
+// it sends zeros.
 
-/** Interval of sent rates, ms. A rate acts for 200 ms. */
+/** Interval at which the page sends rates, ms. A rate acts for 200 ms. */
 export const PERIOD_MS = 90;
 /** Longest wait for the answer to a request, ms. */
 const LATE_MS = 1000;
-/** Duration of a suspension of the page above which the state of the key is unknown, ms. */
+/** Duration of a suspension of the page above which the state of the key counts as unknown, ms. */
 const ASLEEP_MS = 450;
 
 export interface JogLine {
-  /** Sends rates. Resolves when the agent has accepted them. Zeros end a jog and are accepted from every client. */
+  /**
+   * Sends rates. Resolves when the agent has accepted the rates. Zeros end a jog, and the agent accepts them from every
+   * client.
+   */
   send(rates: number[]): Promise<unknown>;
-  /** Called if the request was refused and is not repeated. `after`: the key had been released by then. */
+  /**
+   * Called if the agent refused the request and the page does not repeat it. `after`: the user had released the key by
+   * then.
+   */
   refused(error: unknown, after: boolean): void;
-  /** Called if the page was suspended while a key was held. The key is treated as released. */
+  /** Called if the page was suspended while a key was held. The key then counts as released. */
   slept(): void;
   every(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
@@ -62,7 +68,8 @@ export class Jogger {
   }
 
   #zeros(): void {
-    // At most one request with zeros is open. Another one follows, because rates may have overtaken the first one.
+    // At most one request with zeros is open. Another request follows, because rates may have overtaken the first
+    // request.
     if (this.#ending) {
       this.#again = true;
       return;
@@ -72,7 +79,7 @@ export class Jogger {
     this.#line
       .send(new Array<number>(6).fill(0))
       .catch(() => {
-        // An error is ignored: rates act only for 200 ms, so without further requests the arm stops by itself.
+        // The page ignores an error: rates act only for 200 ms, so the arm stops by itself without further requests.
       })
       .finally(() => {
         this.#ending = false;
@@ -100,8 +107,8 @@ export class Jogger {
   #send(): void {
     const rates = this.#rates;
     if (!rates) return;
-    // At most one request with rates is open. The agent refuses a second one, and a slow line must not fill up with old
-    // requests.
+    // At most one request with rates is open. The agent refuses a second request, and old requests must not accumulate
+    // on a slow line.
     if (this.#open > 0 && this.#line.now() - this.#sentAt < LATE_MS) return;
     const turn = this.#turn;
     this.#open += 1;
@@ -109,8 +116,8 @@ export class Jogger {
     this.#line.send(rates).then(
       () => {
         this.#open -= 1;
-        // The key was released while these rates were being sent. The zeros may have overtaken them, or were refused
-        // because of them, so zeros are sent again.
+        // The user released the key while these rates were being sent. The zeros may have overtaken the rates, or the
+        // agent refused the zeros because of the rates. The page therefore sends zeros again.
         if (turn !== this.#turn && !this.#rates) this.#zeros();
       },
       (error: unknown) => {

@@ -1,5 +1,5 @@
-// The arm's geometry: computes frames from joint positions. Frames are defined like in a URDF: origin in the parent frame, and rpy about
-// fixed axes. Joints rotate about z.
+// Geometry of the arm: computes frames from joint positions. Frames are defined as in a URDF: origin in the parent
+// frame, and rpy about fixed axes. Joints rotate about z.
 
 export interface JointModel {
   joint: number;
@@ -29,7 +29,7 @@ export interface ArmModel {
   links: LinkModel[];
 }
 
-/** A frame as a 4×4 matrix, rows one after another. */
+/** A frame as a 4×4 matrix, row by row. */
 export type Frame = number[];
 export type Vector = [number, number, number];
 
@@ -72,7 +72,7 @@ export function transform(frame: Frame, [x, y, z]: Vector): Vector {
   return [row(0), row(1), row(2)];
 }
 
-/** Returns the frames of the rotated joints and of the flange, in the frame of the base. */
+/** Returns the frames of the rotated joints and of the flange, in the base frame. */
 export function forward(model: ArmModel, q: readonly number[]): Frame[] {
   const frames: Frame[] = [];
   let frame = frameOf([0, 0, 0], [0, 0, 0]);
@@ -101,7 +101,7 @@ export function rpy(frame: Frame): Vector {
 export function quaternion(frame: Frame): [number, number, number, number] {
   const at = (r: number, c: number) => frame[4 * r + c] ?? 0;
   const trace = at(0, 0) + at(1, 1) + at(2, 2);
-  // The computation begins with the largest component, so that it never divides by a small one (Shepperd 1978).
+  // The computation begins with the largest component, so that it never divides by a small number (Shepperd 1978).
   const parts = [at(0, 0), at(1, 1), at(2, 2), trace];
   const k = parts.indexOf(Math.max(...parts));
   const q: [number, number, number, number] = [0, 0, 0, 0];
@@ -124,7 +124,7 @@ export function reach(model: ArmModel): number {
   return lengths.reduce((sum, length) => sum + length, 0);
 }
 
-/** Returns the distance of a joint from the nearer limit: 0 at the limit, 1 in the middle of its range. */
+/** Returns the distance of a joint from its nearer limit: 0 at the limit, 1 in the middle of the range of the joint. */
 export function room(joint: JointModel, q: number): number {
   const half = (joint.position_max_rad - joint.position_min_rad) / 2;
   return Math.min(q - joint.position_min_rad, joint.position_max_rad - q) / half;

@@ -1,8 +1,9 @@
-// Preview of a trajectory: pose of the arm at a time, path of the flange, and places of problems.
+// Preview of a trajectory: pose of the arm at a time, path of the flange, and positions of
+// problems.
 import { type ArmModel, flange, place, type Vector } from './kinematics.ts';
 import type { Points, ProblemObject } from './types.ts';
 
-/** Returns the positions at a time, interpolated linearly between the points. */
+/** Returns the joint positions at a time, interpolated linearly between the points of the trajectory. */
 export function previewAt(points: Points, time: number): number[] {
   const times = points.times_s;
   const last = times.length - 1;
@@ -21,7 +22,7 @@ export function previewAt(points: Points, time: number): number[] {
   return from.map((q, i) => q + share * ((to[i] ?? q) - q));
 }
 
-/** Returns the path of the flange, and the worst place of each problem. */
+/** Returns the path of the flange, and the position of the worst point of each problem. */
 export function wayOf(model: ArmModel, points: Points, problems: readonly ProblemObject[]): { line: Vector[]; places: { at: Vector; warning: boolean }[] } {
   const at = (q: readonly number[]) => place(flange(model, q));
   return {

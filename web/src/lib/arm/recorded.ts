@@ -1,4 +1,4 @@
-// The flight recorder's data for plots: 1000 rows per second.
+// Data of the flight recorder for plots: 1000 rows per second.
 import type { LogValues } from './types.ts';
 
 const COLUMNS = { position: 'position_rad', velocity: 'velocity_rad_s', torque: 'torque_nm', error: 'error_rad' } as const;

@@ -1,18 +1,18 @@
-// Rows of waypoint files. Each row has the columns, units and separator of the file's header, so that the agent can read
-// them.
+// Rows of waypoint files. Each row has the columns, units and separator of the file's header, so that the agent can
+// read the row.
 import { type ArmModel, flange, place, quaternion, rpy } from './kinematics.ts';
 
-/** A pose to add as a row. */
+/** A pose that is added to the file as a row. */
 export interface Waypoint {
   /** Joint positions, rad. */
   q: readonly number[];
-  /** Name of the pose, if it has one. */
+  /** Name of the pose, if the pose has a name. */
   pose?: string | undefined;
 }
 
-/** A row, or the reason why it cannot be added to the file. */
+/** A row, or the reason why the row cannot be added to the file. */
 export type Row = { row: string } | { problem: string };
-/** The file with the row, or the reason why the row cannot be added. */
+/** The waypoint file with the new row, or the reason why the row cannot be added. */
 export type Added = { text: string; row: string } | { problem: string };
 
 const JOINTS = ['q1', 'q2', 'q3', 'q4', 'q5', 'q6'];
@@ -20,10 +20,10 @@ const XYZ = ['x', 'y', 'z'];
 const QUATERNION = ['qx', 'qy', 'qz', 'qw'];
 const RPY = ['roll', 'pitch', 'yaw'];
 const ANGLES = new Set([...JOINTS, ...RPY]);
-/** Other names of columns. */
+/** Other names for the columns. */
 const ALSO = new Map([['t', 't'], ['t_s', 't'], ['time', 't'], ['time_s', 't'], ['pose', 'pose'], ['name', 'pose'], ['leg', 'leg']]);
 const LENGTHS = new Set([...XYZ, ...QUATERNION]);
-/** Pattern of a number in a file, in contrast to the name of a column. */
+/** Pattern of a number in a file. A text that does not match is the name of a column. */
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
 interface Column {
@@ -31,7 +31,7 @@ interface Column {
   unit: 'rad' | 'deg' | undefined;
 }
 
-/** Returns the first line that is neither blank nor a comment. */
+/** Returns the first line of a text that is neither blank nor a comment. */
 function first(text: string): string | undefined {
   return text
     .replace(/^\uFEFF/, '')
@@ -53,7 +53,7 @@ function column(cell: string): Column | undefined {
   return ANGLES.has(name) ? { name, unit: unit as Column['unit'] } : undefined;
 }
 
-/** Returns `true` if the header contains the unit of an angle. In this case the switch for degrees has no effect. */
+/** Returns `true` if the header contains the unit of an angle. If the header contains units, the switch for degrees has no effect. */
 export function namesUnits(text: string): boolean {
   if (isJson(text)) return /"(q[1-6]|roll|pitch|yaw)_deg"/.test(text);
   return cells(first(text) ?? '').some((cell) => column(cell)?.unit !== undefined);
@@ -80,8 +80,8 @@ export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model
     if (columns.some((each) => each.name === found.name)) return { problem: `The header has the column ${found.name} twice.` };
     columns.push(found);
   }
-  // The cells of `t` and `leg` stay empty. An empty `t` means no time. For an empty `leg`, the switch for straight
-  // lines decides.
+  // The cells of `t` and `leg` stay empty. An empty `t` means no time. If `leg` is empty, the switch for straight lines
+  // decides.
   const filled = valuesFor(new Set(columns.map((each) => each.name)), waypoint, model);
   if ('problem' in filled) return filled;
   const out = columns.map(({ name, unit }) => {
@@ -90,12 +90,15 @@ export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model
     const inDegrees = ANGLES.has(name) && (unit === undefined ? degrees : unit === 'deg');
     return (inDegrees ? (value * 180) / Math.PI : value).toFixed(6);
   });
-  // With spaces as separator, a cell cannot be empty, so commas are used.
+  // If the separator is a space, a cell cannot be empty, so commas are used.
   const separator = /[;,]\s*/.exec(header)?.[0].replace(/\s+/, ' ') ?? (out.includes('') ? ',' : ' ');
   return { row: out.join(separator).trim() };
 }
 
-/** Returns the values for the columns: the joint positions, else the name of the pose, else the pose of the flange. */
+/**
+ * Returns the values for the columns: the joint positions, otherwise the name of the pose, otherwise the pose of the
+ * flange.
+ */
 function valuesFor(has: Set<string>, waypoint: Waypoint, model: ArmModel | undefined): { values: Record<string, number | string> } | { problem: string } {
   const lacks = (names: readonly string[]) => names.filter((name) => !has.has(name));
   const any = (names: readonly string[]) => lacks(names).length < names.length;
@@ -119,7 +122,7 @@ function valuesFor(has: Set<string>, waypoint: Waypoint, model: ArmModel | undef
   return { values: Object.fromEntries([...XYZ, ...orientation].map((name, i) => [name, numbers[i] ?? NaN])) };
 }
 
-/** Returns the file with a row for the waypoint as its last row. A file without a header gets one. */
+/** Returns the file with a row for the waypoint as its last row. A file without a header gets a header. */
 export function withRow(text: string, waypoint: Waypoint, degrees: boolean, model?: ArmModel): Added {
   const made = rowFor(text, waypoint, degrees, model);
   if ('problem' in made) return made;

@@ -1,4 +1,4 @@
-// 3D scene of the arm, which is drawn only after a change, and loaded only when it is shown.
+// 3D scene of the arm. The scene is loaded only when it is shown, and is drawn only after a change.
 import {
   AmbientLight, ArrowHelper, BufferGeometry, CircleGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
   LineBasicMaterial, LineDashedMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D, PCFShadowMap, PerspectiveCamera, RingGeometry, Scene,
@@ -28,7 +28,7 @@ export interface Shown {
   limits: boolean;
   trail: boolean;
   path: boolean;
-  /** True: shows the limits of all joints, and the direction of gravity. */
+  /** True: the scene shows the limits of all joints, and the direction of gravity. */
   all: boolean;
 }
 
@@ -38,7 +38,9 @@ export type Renderer = Pick<WebGLRenderer, 'render' | 'setPixelRatio' | 'setSize
 const TRAIL = 400;
 /** Distance between commanded and measured position above which the ghost is shown, rad. */
 const APART_RAD = 0.004;
-/** Distance to a limit, as a share of half the range. The range of a joint that is closer to a limit is shaded. */
+/**
+ * Distance to a limit, as a share of half the range of a joint. The range is shaded if the joint is closer to a limit.
+ */
 const NEAR = 0.12;
 
 export class ArmScene {
@@ -63,7 +65,7 @@ export class ArmScene {
   readonly #payload = new Mesh(new SphereGeometry(1, 32, 20), new MeshStandardMaterial({ transparent: true, opacity: 0.75, roughness: 0.5 }));
   #trailPoints: Vector[] = [];
   #q: number[] = [];
-  /** Joint positions of the ghost, and its visibility. Both are kept for a new body. */
+  /** Joint positions of the ghost, and its visibility. The scene keeps both values when it creates a new body. */
   #ghostQ: number[] = [];
   #ghostShown = false;
   #palette: Palette;
@@ -72,7 +74,7 @@ export class ArmScene {
   #pointed: number | undefined;
   #asked = false;
   #lost = false;
-  /** Number of drawn pictures, for tests that no picture is drawn without a change. */
+  /** Number of drawn pictures. Tests check with it that the scene draws no picture without a change. */
   drawn = 0;
 
   constructor(canvas: HTMLCanvasElement, palette: Palette, renderer: Renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' })) {
@@ -96,7 +98,7 @@ export class ArmScene {
     this.view('home');
   }
 
-  /** Requests a picture in the next frame. Several requests give one picture. */
+  /** Requests a picture in the next frame. Several requests before that frame give one picture. */
   ask(): void {
     if (this.#asked) return;
     this.#asked = true;
@@ -132,7 +134,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Rotates the camera around the arm, when keys are pressed. */
+  /** Rotates the camera around the arm when the user presses keys. */
   turn(across: number, up: number, zoom = 1): void {
     const offset = this.#camera.position.clone().sub(this.#controls.target);
     const radius = offset.length() / zoom;
@@ -194,7 +196,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Rotates the joints of both bodies to the known positions. */
+  /** Rotates the joints of the arm and of the ghost to the known positions. */
   #pose(): void {
     this.#body?.joints.forEach((joint, i) => (joint.rotation.z = this.#q[i] ?? 0));
     if (!this.#ghost) return;
@@ -202,7 +204,10 @@ export class ArmScene {
     this.#ghost.root.visible = this.#ghostShown;
   }
 
-  /** Sets the measured positions. Undefined: the positions are unknown, and the arm is drawn faint in its last pose. */
+  /**
+   * Sets the measured positions. Undefined: the positions are unknown, and the scene draws the arm faint in its last
+   * pose.
+   */
   setMeasured(q: readonly number[] | undefined): void {
     if ((q === undefined) !== this.#lost) {
       this.#lost = q === undefined;
@@ -223,7 +228,9 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Sets the ghost, which shows the target pose. The ghost is drawn if it differs from the current pose. */
+  /**
+   * Sets the ghost, which shows the target pose. The scene draws the ghost if its pose differs from the current pose.
+   */
   setGhost(q: readonly number[] | undefined, always = false): void {
     const apart = q?.some((value, i) => Math.abs(value - (this.#q[i] ?? value)) > APART_RAD) ?? false;
     const visible = q !== undefined && (apart || always);
@@ -246,7 +253,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Sets the path of the flange, and the places of problems on it. */
+  /** Sets the path of the flange, and the positions of problems on the path. */
   setPath(points: readonly Vector[] | undefined, places: readonly { at: Vector; warning: boolean }[] = []): void {
     this.#path.geometry.dispose();
     this.#path.geometry = new BufferGeometry().setFromPoints((points ?? []).map((point) => new Vector3(...point)));
@@ -263,7 +270,8 @@ export class ArmScene {
 
   setPayload(mass_kg: number, com_m: readonly number[]): void {
     this.#payload.visible = mass_kg > 0;
-    // The payload is drawn as large as a ball of its mass with a density of 2.7 kg per litre.
+    // The drawn size of the payload is that of a ball with the payload's mass and a density of 2.7
+    // kg per litre.
     this.#payload.scale.setScalar(Math.cbrt((3 * Math.max(mass_kg, 1e-3)) / (4 * Math.PI * 2700)));
     this.#payload.position.set(com_m[0] ?? 0, com_m[1] ?? 0, com_m[2] ?? 0);
     this.ask();
@@ -326,7 +334,7 @@ export class ArmScene {
     this.#scene.add(floor);
   }
 
-  /** Draws the range of each joint as a sector about its axis, with a needle at its position. */
+  /** Draws the range of each joint as a sector about the joint's axis, with a needle at the position of the joint. */
   #shadeLimits(model: ArmModel): void {
     this.#limits = [];
     this.#needles = [];

@@ -1,5 +1,5 @@
-// The arm's body, drawn only from its kinematic chain, without meshes: housings about the joint axes, and links between
-// them.
+// Body of the arm, drawn only from the kinematic chain, without meshes: housings about the joint axes, and links
+// between the housings.
 import {
   BufferGeometry, CapsuleGeometry, CylinderGeometry, Group, LatheGeometry, type Material, Matrix4, Mesh, Quaternion, SphereGeometry, TorusGeometry, Vector2,
   Vector3,
@@ -41,7 +41,7 @@ function rounded(radius: number, low: number, high: number): BufferGeometry {
   return new LatheGeometry(profile, 40).rotateX(Math.PI / 2);
 }
 
-/** Returns a tube with round ends from one place to another. Its radius changes from `radius` to `thin`. */
+/** Returns a tube with round ends from one point to another. The radius of the tube changes from `radius` to `thin`. */
 function tube(from: Vector3, to: Vector3, radius: number, thin: number, material: Material): Group {
   const group = new Group();
   const way = to.clone().sub(from);
@@ -64,12 +64,12 @@ function tube(from: Vector3, to: Vector3, radius: number, thin: number, material
   return group;
 }
 
-/** All parts that move with the joints, as nested groups. The groups of joints are rotated about z. */
+/** All parts that move with the joints, as nested groups. Each joint group is rotated about z. */
 export interface Body {
   root: Group;
-  /** Groups that are rotated about z by the position of their joint. */
+  /** Groups that are rotated about z by the positions of their joints. */
   joints: Group[];
-  /** Frame of each joint before its rotation. The limits are drawn in this frame. */
+  /** Frame of each joint before the rotation of the joint. The scene draws the limits in this frame. */
   mounts: Group[];
   flange: Group;
 }
@@ -145,14 +145,14 @@ function linkOf(parent: Group, to: Vector3, aside: number, radius: number, thin:
   const across = Math.hypot(to.x, to.y);
   if (to.length() < 0.02) return;
   if (across > 0.2) {
-    // For two parallel axes: a straight tube in the plane of the masses, and a housing at its far end.
+    // For two parallel axes, the link is a straight tube in the plane of the masses, with a housing at its far end.
     const [from, end] = [new Vector3(0, 0, aside), new Vector3(to.x, to.y, aside)];
     parent.add(tube(from, end, radius * 0.8, Math.max(thin * 0.86, radius * 0.62), material));
     const back = new Mesh(rounded(thin * 0.96, Math.min(aside, to.z) - thin * 0.78, Math.max(aside, to.z) + thin * 0.78), material);
     back.position.set(to.x, to.y, 0);
     parent.add(back);
   } else {
-    // The link is an elbow: first along the axis, then across.
+    // The link is an elbow: its first part is along the axis, its second part across the axis.
     const r = Math.min(radius, thin) * 0.9;
     const knee = new Vector3(0, 0, to.z);
     if (Math.abs(to.z) > 0.01) parent.add(tube(new Vector3(0, 0, 0), knee, radius * 0.86, r, material));

@@ -1,4 +1,4 @@
-// Points that were recorded while the arm was guided by hand, and their reduction to few waypoints.
+// Points that were recorded while the arm was guided by hand, and the reduction of these points to few waypoints.
 
 export interface Sample {
   t: number;
@@ -6,12 +6,12 @@ export interface Sample {
 }
 
 /**
- * Returns the largest distance of a joint, rad, between a sample and the nearest place on the line between two other
+ * Returns the largest distance of a joint, rad, between a sample and the nearest point on the line between two other
  * samples.
  */
 function aside(sample: Sample, from: Sample, to: Sample): number {
-  // The nearest place on the line in joint space is used, not the place at the same time, because the speed of the hand
-  // is irrelevant for the path.
+  // The code uses the nearest point on the line in joint space, not the point at the same time, because the speed of
+  // the hand is irrelevant for the path.
   const way = to.q.map((value, i) => value - (from.q[i] ?? 0));
   const length = way.reduce((sum, value) => sum + value * value, 0);
   const along = sample.q.reduce((sum, value, i) => sum + (value - (from.q[i] ?? 0)) * (way[i] ?? 0), 0);
@@ -19,7 +19,10 @@ function aside(sample: Sample, from: Sample, to: Sample): number {
   return Math.max(...sample.q.map((value, i) => Math.abs(value - ((from.q[i] ?? 0) + share * (way[i] ?? 0)))));
 }
 
-/** Returns the fewest samples that keep every joint within `tolerance` of the path between them (Ramer 1972; Douglas & Peucker 1973). */
+/**
+ * Returns the fewest samples that keep every joint within `tolerance` of the path between the samples (Ramer 1972;
+ * Douglas & Peucker 1973).
+ */
 export function thin(samples: readonly Sample[], tolerance: number): Sample[] {
   if (samples.length <= 2) return [...samples];
   const keep = new Array<boolean>(samples.length).fill(false);
@@ -42,7 +45,7 @@ export function thin(samples: readonly Sample[], tolerance: number): Sample[] {
   return samples.filter((_, i) => keep[i]);
 }
 
-/** Removes the repeated samples of an arm at rest. */
+/** Removes the repeated samples that an arm at rest produces. */
 export function moved(samples: readonly Sample[], least = 0.002): Sample[] {
   const out: Sample[] = [];
   for (const sample of samples) {

@@ -1,6 +1,6 @@
-// The part of TOML that arm files use: tables, arrays of tables, inline tables, arrays over several lines, comments.
-// The result is used for display and comparison only. The agent itself reads the arm files that are sent to the
-// controller.
+// Parser for the part of TOML that arm files use: tables, arrays of tables, inline tables, arrays over several
+// lines, comments. The page uses the result for display and comparison only. The agent itself reads the arm files
+// that are sent to the controller.
 
 export type Value = string | number | boolean | Value[] | Table;
 export interface Table {
@@ -147,7 +147,7 @@ function descend(table: Table, keys: readonly string[]): Table {
   return at;
 }
 
-/** Parses TOML. Throws a TomlError that contains the line. */
+/** Parses TOML. Throws a TomlError that contains the line of the error. */
 export function parse(text: string): Table {
   const reader = new Reader(text);
   const root: Table = {};

@@ -1,4 +1,5 @@
-// Tests of gains. A joint moves by a step and back, and its errors are compared with the errors of earlier tests.
+// Tests of gains. A joint moves by a step and back, and the page compares the errors of the joint with the errors
+// of earlier tests.
 import type { Gains } from './armfile.ts';
 import type { JointResult } from './types.ts';
 
@@ -13,12 +14,12 @@ export interface Trial {
   /** Start of the test, s since 1970. */
   start: number;
   times: number[];
-  /** Errors, rad; null if unknown. */
+  /** Position errors, rad; null if unknown. */
   errors: (number | null)[];
   figures: Figures | undefined;
 }
 
-/** Returns the worse figures of two motions. */
+/** Returns the worse of the figures of two motions. */
 export function figuresOf(result: JointResult | undefined, before: Figures | undefined): Figures | undefined {
   const [max, rms] = [result?.max_error_mrad, result?.rms_error_mrad];
   if (typeof max !== 'number' || typeof rms !== 'number') return before;
@@ -36,7 +37,7 @@ export function overlay(trials: readonly Trial[]): (number | null)[][] {
     trial.times.forEach((time, i) => {
       const error = trial.errors[i];
       if (error == null) return;
-      // Samples are at least 40 ms apart. Times are rounded to 40 ms, so that the tests have common times.
+      // Samples are at least 40 ms apart. The code rounds times to 40 ms, so that the tests have common times.
       const at = Math.round((time - first) / 0.04) * 0.04;
       const row = rows.get(at) ?? new Array<number | null>(trials.length).fill(null);
       row[k] = error * 1000;

@@ -1,4 +1,4 @@
-// Reports of the controller as text: state, cause, and next step.
+// Texts for the reports of the controller: state, cause, and next step.
 import type { Controller, ArmEvent, InfoObject } from './types.ts';
 import { count, duration } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
@@ -7,17 +7,17 @@ export type Step = 'recover' | 'acknowledge' | 'which-arm' | 'resume' | 'teach-o
 
 export interface Cause {
   words: string;
-  /** Code that `explain` accepts. */
+  /** Code that `jtc explain` accepts. */
   code: string;
 }
 
 export interface StateWords {
   tone: Tone;
   word: string;
-  /** Reason why the arm does not move, or its current action. */
+  /** Reason why the arm does not move, or the current action of the arm. */
   detail: string;
   causes: Cause[];
-  /** Next step as text, and the action of its button. */
+  /** Next step as text, and the action of the button for this step. */
   next: string;
   step?: Step;
 }
@@ -36,14 +36,14 @@ export function causesOf(controller: Controller): Cause[] {
   return [...found, ...controller.causes.map((words) => ({ words: sentence(words), code: words }))];
 }
 
-/** Returns the next step after a held stop, in the words of the agent. */
+/** Returns the next step after a held stop, in the words that the agent sends. */
 function afterHeldStop({ held_stop: stop }: Controller): string {
   if (!stop) return 'Remove what it met, or set its payload, then acknowledge. Nothing moves until then.';
   const remedy = sentence(stop.remedy);
   return stop.kind === 'encoder-jump' ? `${remedy}.` : `${remedy}, then acknowledge. Nothing moves until then.`;
 }
 
-/** Returns the joints that are declared absent. Under torque, only drives of absent joints are in Start. */
+/** Returns the joints that are declared absent. Under torque, only the drives of absent joints are in Start. */
 export function absent(controller: Controller): number[] {
   const powered = ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
   return powered ? controller.joints.filter((joint) => joint.state === 'Start').map((joint) => joint.joint) : [];
@@ -53,7 +53,10 @@ export function hasTorque(controller: Controller | null | undefined): boolean {
   return controller != null && ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
 }
 
-/** Returns the drives that are not enabled yet, from 1. The controller holds the position with the enabled drives. */
+/**
+ * Returns the numbers of the drives that are not enabled yet, counted from 1. The controller holds the position with
+ * the enabled drives.
+ */
 export function enabling(controller: Controller): number[] {
   return controller.joints.filter((joint) => joint.state !== 'OperationEnable' && joint.state !== 'Start').map((joint) => joint.joint);
 }
@@ -63,12 +66,12 @@ export function isHeldStop(controller: Controller): boolean {
   return hasTorque(controller) && controller.error_codes.join() === 'internal-joint-error';
 }
 
-/** Returns true if teaching can begin in this state. A held stop is such a state. */
+/** Returns true if teaching can begin in this state. Teaching can begin in a held stop. */
 export function canBeTaught(controller: Controller | null | undefined): boolean {
   return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0;
 }
 
-/** Returns true if a motion can begin, because every joint that is not absent is held. */
+/** Returns true if a motion can begin. A motion can begin only if the controller holds every joint that is not absent. */
 export function isHeld(controller: Controller | null | undefined): boolean {
   return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0 && controller.errors.length === 0;
 }
@@ -82,7 +85,7 @@ export function isPaused(controller: Controller | null | undefined): boolean {
 }
 
 /**
- * Returns the reason why no joint can be jogged. Empty: jogging is possible. `job` is the running job and its stage.
+ * Returns the reason why no joint can be jogged. Empty: joints can be jogged. `job` is the running job and its stage.
  */
 export function noJog(controller: Controller | undefined, job?: { what: string; stage: 'begun' | 'uploading' | 'executing' }): string {
   if (!controller) return 'The state of the arm is not known.';
@@ -100,8 +103,8 @@ export function noJog(controller: Controller | undefined, job?: { what: string; 
 }
 
 /**
- * Returns the question that is asked before a controller without parameters uses its defaults. The text explains the
- * origin of the defaults, and the risk if the arm is a different one.
+ * Returns the question that the page asks before a controller without parameters uses its defaults. The text explains
+ * the origin of the defaults, and the risk if the arm is a different arm.
  */
 export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> | undefined, simulated: boolean): { question: string; used: string; risk: string; button: string } {
   const name = info?.arm || 'the built-in arm';
@@ -197,7 +200,10 @@ export function stateWords(controller: Controller, job: string | undefined, miss
   }
 }
 
-/** Returns the effect of a Stop as text, from the state when the user touched Stop and the current state. */
+/**
+ * Returns the effect of a Stop as text. The effect follows from the state when the user touched Stop and from the
+ * current state.
+ */
 export function whatStopDid(before: string | undefined, wasMoving: boolean, now: Controller | undefined | null, tookMs: number): string {
   const took = `${(tookMs / 1000).toFixed(1)} s`;
   if (!now) return 'Stop was sent. No status has come since.';
@@ -207,12 +213,12 @@ export function whatStopDid(before: string | undefined, wasMoving: boolean, now:
   return isMoving(now) ? 'Stop was sent: the arm decelerates on its path.' : `Stopped on the path in ${took}; ${held}.`;
 }
 
-/** Returns a sentence for the name of a job in events, such as "recover". */
+/** Returns a sentence about a job. `what` is the name of the job in events, such as "recover". */
 export function jobWords(what: string): string {
   return sentence(what);
 }
 
-/** Returns an event as text. Undefined: the event is not shown. */
+/** Returns an event as text. Undefined: the page does not show the event. */
 export function eventWords(event: ArmEvent): { text: string; tone: EventTone; of: string } | undefined {
   const of = 'job' in event ? `job ${event.job}` : '';
   const line = (text: string, tone: EventTone = 'info', whose = of) => ({ text, tone, of: whose });

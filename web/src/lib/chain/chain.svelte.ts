@@ -1,4 +1,4 @@
-// State of the page of a chain: bus, boards, values, jobs. Components read it, and send requests through it.
+// State of the page of a chain: bus, boards, values, jobs. Components read this state, and send requests through it.
 import { getContext, setContext } from 'svelte';
 
 import { History } from '../history.ts';
@@ -11,7 +11,9 @@ import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, s
 const ROWS = 3000;
 /** Shortest interval between two updates of displayed text, ms. */
 const READ_MS = 120;
-/** Age above which outputs are shown as outdated, ms. The agent reports outputs as outdated after half a second. */
+/**
+ * Age above which the page shows outputs as outdated, ms. The agent reports outputs as outdated after half a second.
+ */
 const OLD_MS = 900;
 const TICK_MS = 250;
 
@@ -26,19 +28,19 @@ const DRIVEN: Driven = {
   left: 'When this browser goes (closed, hidden for 10 s, network gone), boards that it has started',
 };
 
-/** A job, according to its events. */
+/** A job, as its events describe it. */
 export interface Course {
   number: number;
   what: string;
   client: string;
   own: boolean;
   over: boolean;
-  /** For an update: the boards that receive the image now, and the progress. */
+  /** Progress of an update: the boards that receive the image now, the attempt, the cycle and the bytes. */
   progress: { boards: number[]; attempt: number; cycle: number; bytes: number; total: number } | undefined;
   notes: string[];
 }
 
-/** A board, the time at which this state was received, and the time of its last heartbeat, by this browser's clock. */
+/** A board, the time at which its state was received, and the time of its last heartbeat, by this browser's clock. */
 export interface BoardView {
   board: BoardObject;
   at: number;
@@ -47,7 +49,7 @@ export interface BoardView {
 
 export type Tab = 'boards' | 'board' | 'update' | 'doctor' | 'jobs' | 'log';
 
-/** Questions before a command. */
+/** Questions that the page asks before a command. */
 export type Question = { what: 'init' } | { what: 'run' } | { what: 'reset'; board: number };
 
 /** States in which a board is safe even if no client holds the lease. */
@@ -68,7 +70,7 @@ export class ChainPage {
   values = $state.raw<ReadonlyMap<number, { values: Values; at: number }>>(new Map());
   course = $state<Course | undefined>(undefined);
   jobs = $state.raw<JobObject[]>([]);
-  /** Result of the last Stop that was sent, with or without confirmation of the boards. */
+  /** Result of the last Stop that this page sent, with or without confirmation of the boards. */
   #did = $state<{ text: string; failed: boolean }>({ text: '', failed: false });
   readonly stopWords = $derived.by(() => {
     const { phase, text } = this.session.stopState;
@@ -76,9 +78,9 @@ export class ChainPage {
   });
   readonly stopFailed = $derived(this.session.stopState.phase === 'failed' || (this.session.stopState.phase !== 'sending' && this.#did.failed));
   question = $state<Question | undefined>(undefined);
-  /** Value of performance.now(), updated a few times a second. Ages are computed with it. */
+  /** Value of performance.now(), updated a few times a second. The page computes ages with this value. */
   now = $state(performance.now());
-  /** Number of Stops of all clients. When it changes, waiting values are dropped. */
+  /** Number of Stops of all clients. When this number changes, waiting values are dropped. */
   halts = $state(0);
   /** Result of a scan or of numbering that the user has not closed yet. */
   found = $state.raw<JobObject | undefined>(undefined);
@@ -87,7 +89,7 @@ export class ChainPage {
   readonly #traces = new Map<number, { names: string; history: History; last: number }>();
   #read = 0;
   #agent = '';
-  /** True if this agent has sent its boards. */
+  /** True if this agent has already sent its list of boards. */
   #boardsKnown = false;
   #stop: { at: number; ran: boolean } | undefined;
   #stopTimer: ReturnType<typeof setTimeout> | undefined;
@@ -110,10 +112,10 @@ export class ChainPage {
     this.session.onLoss(() => this.#lose());
     this.session.saysOfStop = () => ({ text: this.stopWords, failed: this.stopFailed });
     this.session.onMissed(() => void this.readJobs());
-    // A lost board may be running.
+    // A lost board may still run.
     this.session.isAtRest = () => this.known && this.#boardsKnown && !this.isRunning && this.boards.every((board) => AT_REST.has(board.state));
-    // Boards that this page has started stop when its lease expires. So the page renews the lease while the boards run
-    // and the page is visible.
+    // Boards that this page has started stop when the lease of the page expires. The page therefore renews the lease
+    // while the boards run and the page is visible.
     this.session.isBusy = () => this.session.leasePhase === 'held' && (this.runs || ((this.course?.own ?? false) && !this.course?.over));
   }
 
@@ -133,7 +135,7 @@ export class ChainPage {
     return this.views.find((view) => view.board.number === number);
   }
 
-  /** Returns `true` if outputs received at that time are outdated. */
+  /** Returns `true` if outputs that were received at this time are outdated. */
   isOld(of: { values: Values; at: number } | undefined): boolean {
     return !this.known || !of || of.values.stale || (of.values.age_s ?? Infinity) * 1000 + (this.now - of.at) > OLD_MS;
   }
@@ -144,12 +146,12 @@ export class ChainPage {
   }
 
   /**
-   * Sends a command. A refusal is shown as a message. `ends`: the command moves no board and is executed even after a
-   * Stop.
+   * Sends a command. Shows a refusal as a message. `ends`: the command moves no board, and the agent executes it even
+   * after a Stop.
    */
   async command<T = unknown>(what: string, method: string, path: string, body?: unknown, ends = false): Promise<{ value: T } | undefined> {
-    // The timeout is long, because boards answer in sequence and a running job first ends its own operation. After a
-    // Stop that this page had not yet shown, a command has no effect, even if it arrives late.
+    // The timeout is long, because boards answer one after the other and a running job first ends its own operation. A
+    // command has no effect after a Stop that this page had not yet shown, even if the command arrives late.
     return this.session.command<T>(what, method, path, { ...(body === undefined ? {} : { body }), moves: !ends, ends, within: 30_000 });
   }
 
@@ -163,7 +165,7 @@ export class ChainPage {
   }
 
   async stop(): Promise<void> {
-    // The Stop is sent before all other steps. The messages follow.
+    // The page sends the Stop before all other steps, and then shows the messages.
     const sent = this.session.stop();
     const at = this.session.stopState.at;
     this.halts += 1;
@@ -225,7 +227,7 @@ export class ChainPage {
     this.views = boards.map((board) => {
       const beat = board.heartbeat_age_s == null ? undefined : at - board.heartbeat_age_s * 1000;
       const last = before.get(board.number)?.beat;
-      // If the times differ only by the delay of the messages, this is the same heartbeat, received twice.
+      // If the times differ only by the delay of the messages, both messages report one heartbeat.
       return { board, at, beat: beat !== undefined && last !== undefined && Math.abs(beat - last) < BEAT_MS ? last : beat };
     });
     if (this.chosen === undefined || !boards.some((board) => board.number === this.chosen)) this.chosen = boards[0]?.number;
@@ -250,7 +252,7 @@ export class ChainPage {
       this.#traces.set(values.board, trace);
     }
     const row = values.outputs.map((output) => (typeof output.value === 'number' ? output.value : typeof output.value === 'boolean' ? Number(output.value) : NaN));
-    // The times always increase, so that a delayed message does not put a value before an earlier one.
+    // The times always increase, so that a delayed message does not place a value before an earlier value.
     trace.last = Math.max(trace.last + 0.001, Date.now() / 1000 - (values.age_s ?? 0));
     trace.history.push([trace.last, ...row]);
   }
@@ -259,7 +261,7 @@ export class ChainPage {
   #lose(): void {
     this.known = false;
     this.halts += 1;
-    // The plots show a gap instead of a line.
+    // The plots show a gap here instead of a line.
     for (const trace of this.#traces.values()) {
       const row = new Array<number>(trace.history.channels).fill(NaN);
       row[0] = trace.last = Math.max(trace.last + 0.001, Date.now() / 1000);
@@ -271,7 +273,7 @@ export class ChainPage {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
-        // The result of a Stop is shown until the next job.
+        // The page shows the result of a Stop until the next job.
         if (isNew && !this.#stop) {
           this.#say('', false);
           this.session.forgetStop();
@@ -305,7 +307,7 @@ export class ChainPage {
         break;
       }
       case 'state': {
-        // Inputs and outputs from before a restart are no longer valid.
+        // Inputs and outputs from before a restart of the board are outdated.
         const view = this.view(event.board);
         if (view && event.state === 'exloader' && this.#newest.delete(event.board)) this.values = new Map(this.#newest);
         break;
@@ -319,8 +321,8 @@ export class ChainPage {
     if (!job) return;
     if (job.chain) this.found = job;
     const own = this.course?.number === number && this.course.own;
-    // No message is shown for a cancelled job, which the user already knows about, or for an update while the update
-    // page shows its outcome.
+    // The page shows no message for a cancelled job, because the user already knows about it. The page also shows no
+    // message for an update while the update tab shows the outcome.
     if (!own || job.stage === 'cancelled' || (job.update && this.tab === 'update')) return;
     if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
     else if (job.stage === 'finished' && !job.chain) this.session.toast({ tone: 'good', title: jobWords(job.what), text: jobResult(job) });
@@ -336,7 +338,10 @@ export class ChainPage {
     }
   }
 
-  /** Reads the values of a board that sends none. If the agent does not know its names, it asks the board itself. */
+  /**
+   * Reads the values of a board that sends no outputs. If the agent does not know the names of its signals, the agent
+   * asks the board.
+   */
   async readValues(number: number): Promise<void> {
     await this.session.attempt(`Values of board ${number}`, async () => {
       const values = await this.session.api.get<Values>(`/api/boards/${number}/values`);
@@ -354,7 +359,7 @@ export class ChainPage {
     this.values = new Map(this.#newest);
   }
 
-  /** Returns the state of a board as text. An outdated state is shown as unknown. */
+  /** Returns the state of a board as text. For an outdated state, the text says that the state is unknown. */
   boardWords(board: BoardObject): ReturnType<typeof boardWords> {
     return this.known ? boardWords(board) : { tone: 'lost', word: 'Not known', detail: 'Nothing is received from the agent.' };
   }

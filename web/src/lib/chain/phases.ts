@@ -1,10 +1,11 @@
-// Progress of an update. The image is transferred twice: to check it and to write it. Then it is read back.
+// Progress of an update. The agent transfers the image twice: first to check it, then to write it. The
+// agent then reads the image's identity back.
 import type { Course } from './chain.svelte.ts';
 
 export interface Phase {
-  /** Current phase. 0: the image is checked, 1: it is written, 2: it is read back. */
+  /** Number of the current phase. 0: the image is checked, 1: it is written, 2: it is read back. */
   at: number;
-  /** Share of the whole transfer to these boards, 0 to 1. */
+  /** Share of the whole transfer to these boards that is complete, 0 to 1. */
   share: number;
   words: string;
 }

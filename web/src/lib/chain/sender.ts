@@ -1,4 +1,5 @@
-// Sends an input while a slider is moved. Sends the newest value at a limited rate, one request at a time.
+// Sender for an input while the user moves a slider. The sender sends the newest value at a limited rate, one
+// request at a time.
 
 export interface Wires<T> {
   send(value: T): Promise<void>;
@@ -10,7 +11,7 @@ export interface Wires<T> {
   never(handle: unknown): void;
 }
 
-/** Time between the answer to one value and the next, ms. */
+/** Time between the answer to one value and the sending of the next value, ms. */
 export const EVERY_MS = 100;
 
 export class Sender<T> {
@@ -30,7 +31,7 @@ export class Sender<T> {
     this.#go();
   }
 
-  /** Drops the waiting value. Called after a Stop, and if the state is unknown. */
+  /** Drops the waiting value. Called after a Stop, and when the state becomes unknown. */
   drop(): void {
     this.#next = undefined;
     this.#wires.never(this.#timer);
@@ -54,13 +55,13 @@ export class Sender<T> {
     void this.#wires
       .send(value)
       .catch((error: unknown) => {
-        // Later values of the same drag would be refused as well.
+        // The agent would also refuse later values of this drag.
         this.#next = undefined;
         this.#wires.refused(error);
       })
       .finally(() => {
         this.#sending = false;
-        // The interval begins at the end of the request, because the first request may have taken the lease before.
+        // The interval begins at the end of the request, because the first request may have waited for the lease.
         this.#sent = this.#wires.now();
         if (!this.#next) this.#wires.changed(false);
         this.#go();

@@ -2,27 +2,29 @@
 import { number, parse } from '../format.ts';
 import type { Value } from './types.ts';
 
-/** Splits a name such as "position [0.01 deg]". Boards put the step of the word in brackets. */
+/** Splits a name such as "position [0.01 deg]". Boards send the size of a step of the word in brackets. */
 export function nameParts(name: string): { name: string; step: string } {
   const found = /^(.*?)\s*\[([^\]]*)\]\s*$/.exec(name);
   return found ? { name: found[1] ?? name, step: found[2] ?? '' } : { name, step: '' };
 }
 
-/** Returns the unit of a value from the signal table, or else the step of its word that the board has sent. */
+/**
+ * Returns the unit of a value from the signal table. Without a table, returns the step size that the board has sent.
+ */
 export function unitWords(value: Value): string {
   if (value.unit) return value.unit;
   const { step } = nameParts(value.name);
   return step === '' ? '' : /^[\d.]/.test(step) ? `× ${step}` : step;
 }
 
-/** Returns a number from a text of the agent with a true minus sign. */
+/** Returns a number in a text of the agent with a true minus sign. */
 export function minus(text: string): string {
   return text.replace(/^-(?=[\d.])/, '\u2212');
 }
 
 export type Form = 'number' | 'switch' | 'word';
 
-/** Returns the form in which a value is set. Bits of the signal table are not a number. */
+/** Returns the form in which the page sets a value. Bits of the signal table are not a number. */
 export function formOf(value: Value): Form {
   if (typeof value.value === 'boolean') return 'switch';
   return typeof value.value === 'string' ? 'word' : 'number';
@@ -32,11 +34,11 @@ export interface Range {
   min: number;
   max: number;
   step: number;
-  /** Source of the range: the signal table, the user, or none. */
+  /** Source of the range: the signal table, the user, or no source. */
   by: 'table' | 'page' | 'nobody';
 }
 
-/** Returns a step that divides a range into about a thousand, and is not finer than a word. */
+/** Returns a step that divides a range into about a thousand steps, and is not finer than one step of the word. */
 export function stepOf(min: number, max: number, whole: boolean): number {
   const step = 10 ** Math.floor(Math.log10(Math.max(1e-9, (max - min) / 500)));
   return whole ? Math.max(1, step) : step;
@@ -45,8 +47,8 @@ export function stepOf(min: number, max: number, whole: boolean): number {
 const WORD = { min: -32768, max: 65535 };
 
 /**
- * Returns the range of a slider. Without a signal table it is a small part of the range of a word, so that a touch does
- * not send the largest value.
+ * Returns the range of a slider. Without a signal table, this range is a small part of the range of a word, so that a
+ * touch does not send the largest value.
  */
 export function rangeOf(value: Value, chosen: { min: number; max: number } | undefined): Range {
   const whole = !value.unit;
@@ -68,15 +70,15 @@ export function text(value: number, step: number, unit: string | null | undefine
 }
 
 /**
- * Returns a number in the form that the agent expects. If there is a unit it is included, because a number without a
- * unit could mean another value.
+ * Returns a number in the form that the agent expects. If the signal has a unit, the form contains the unit, because a
+ * number without a unit could mean another value.
  */
 export function given(value: number, step: number, unit: string | null | undefined): number | string {
   const plain = value.toFixed(digitsOf(step));
   return unit ? `${plain} ${unit}` : Number(plain);
 }
 
-/** Parses typed text: a number, or any other text that the agent understands, such as 0x05DC, 15deg or on. */
+/** Parses typed text: a number, or any other text that the agent accepts, such as 0x05DC, 15deg or on. */
 export function typed(input: string, unit: string | null | undefined): number | string | undefined {
   const trimmed = input.trim();
   if (trimmed === '') return undefined;

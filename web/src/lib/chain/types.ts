@@ -1,4 +1,5 @@
-// Types of a chain's agent, from its OpenAPI description, and the messages of its stream, which OpenAPI does not cover.
+// Types of the API of a chain's agent, from its OpenAPI description. The messages of the agent's stream are also
+// declared here, because OpenAPI does not cover them.
 import type { Entry } from '../connection.ts';
 import type { SessionStatus } from '../session.svelte.ts';
 import type { BoardObject, ChainEvent, StatusObject, ValueObject } from './api-types.ts';

@@ -1,4 +1,4 @@
-// The form of an update. Its contents are kept while another tab is shown.
+// Contents of the update form. The contents stay while another tab is shown.
 import type { UpdateRequest } from './types.ts';
 
 export interface Picked {
@@ -18,14 +18,14 @@ export async function pick(file: File): Promise<Picked> {
 }
 
 /**
- * Returns the format of a file. Raw bytes are accepted only with the ending `.bin`, so that a text is never flashed as
- * raw bytes by mistake.
+ * Returns the format of an image file. The page accepts raw bytes only in `.bin` files, so that a text is never flashed
+ * as raw bytes by mistake.
  */
 export function formatOf(name: string): UpdateRequest['format'] {
   return /\.bin$/i.test(name) ? 'bin' : undefined;
 }
 
-/** Parses a number such as 0x4B3F or 19263. Undefined: the text is invalid. */
+/** Parses a number such as 0x4B3F or 19263. Undefined: the text is not a valid number. */
 export function word(text: string): number | undefined {
   const trimmed = text.trim();
   if (!/^(0x[0-9a-f]{1,4}|\d{1,5})$/i.test(trimmed)) return undefined;
@@ -35,7 +35,7 @@ export function word(text: string): number | undefined {
 
 class UpdateForm {
   boards = $state<number[]>([]);
-  /** Flash numbers of the boards when they were chosen. The boards must still have the same flash numbers when the update is sent. */
+  /** Flash numbers of the boards when the user chose the boards. The boards must still have the same flash numbers when the update is sent. */
   #flash = new Map<number, number>();
   image = $state.raw<Picked | undefined>(undefined);
   second = $state.raw<Picked | undefined>(undefined);

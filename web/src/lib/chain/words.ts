@@ -1,4 +1,4 @@
-// Reports of boards and bus as text: state, cause, and next step.
+// Texts for the reports of boards and bus: state, cause, and next step.
 import { count } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
 import type { BoardObject, ChainEvent, JobObject, Status } from './types.ts';
@@ -58,7 +58,10 @@ export interface BusWords {
   step?: Step;
 }
 
-/** Returns the state of the bus and its boards as text. The worst problem takes precedence. */
+/**
+ * Returns the state of the bus and its boards as text. If there are several problems, the text describes the worst
+ * problem.
+ */
 export function busWords(status: Status, boards: readonly BoardObject[], job: string | undefined): BusWords {
   const controller = status.controller;
   if (controller?.bus_off) {
@@ -188,12 +191,13 @@ export function jobResult(job: JobObject): string {
   return job.stage === 'finished' ? 'Finished.' : job.stage === 'running' ? 'Goes on.' : 'Failed.';
 }
 
-/** Returns the result of a Stop, according to the confirmations of the boards. */
+/** Returns the result of a Stop as text, according to the confirmations of the boards. */
 export function stoppedWords(event: Extract<ChainEvent, { kind: 'stopped' }>, ran = true): { text: string; failed: boolean; why: string } {
   const { boards, not_stopped } = event;
   const done = boards.length === 0 ? '' : ran ? `Stopped: ${boardList(boards)} confirmed it.` : `Stop was sent. No board was running; ${boardList(boards)} confirmed it.`;
   if (not_stopped.length > 0) {
-    // Only the boards are listed, because the reasons are long and the next step must come first.
+    // The text lists only the boards, because the reasons are long and the next step must come
+    // first.
     const which = not_stopped.map((each) => /^(board \d+):/.exec(each)?.[1] ?? each);
     const rest = boards.length === 0 ? 'No board confirmed it.' : `${count(boards.length, 'board')} confirmed it.`;
     return { text: `NOT STOPPED: ${which.join(', ')}. Use the emergency stop. ${rest}`, failed: true, why: not_stopped.join('; ') };
@@ -201,7 +205,7 @@ export function stoppedWords(event: Extract<ChainEvent, { kind: 'stopped' }>, ra
   return { text: done || 'Stop was sent. No board was running.', failed: false, why: '' };
 }
 
-/** Returns an event as text. Undefined: the event is not shown. */
+/** Returns an event as text. Undefined: the page does not show the event. */
 export function eventWords(event: ChainEvent): { text: string; tone: EventTone; of: string } | undefined {
   const line = (text: string, tone: EventTone, of: string) => ({ text, tone, of });
   switch (event.kind) {

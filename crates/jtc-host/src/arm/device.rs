@@ -73,7 +73,9 @@ impl Arm {
         for (name, (file, device)) in
             GRAVITY_SETTINGS.into_iter().zip(own.gravity.into_iter().zip(device.gravity))
         {
-            compare(name, None, file, device, "m/s²");
+            if self.gravity.is_some() {
+                compare(name, None, file, device, "m/s²");
+            }
         }
         for joint in Joint::ALL {
             for row in TABLE.iter().filter(|row| self.gives_joint(row, joint)) {
@@ -148,11 +150,13 @@ mod tests {
         );
     }
 
-    /// An arm file without gravity does not differ from a controller that has the default gravity.
+    /// An arm file without gravity does not differ from a controller with any gravity, because the controller uses its own value.
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
         assert!(arm.device_differences(&Config::avena()).is_empty());
+        let on_a_wall = Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() };
+        assert!(arm.device_differences(&on_a_wall).is_empty());
     }
 
     /// A URDF file cannot contain a rotor inertia. The rotor inertia of a URDF arm is unknown and not 0, so it is not reported as a

@@ -22,7 +22,9 @@ fn narrow(values: &[f32]) -> String {
 
 /// Formats a text as a TOML string.
 fn quoted(text: &str) -> String {
-    serde_json::to_string(text).expect("a string is JSON, and TOML has the same escapes")
+    let json = serde_json::to_string(text).expect("a string is JSON, and TOML has the same escapes");
+    // TOML also escapes the character DEL.
+    json.replace('\u{7f}', "\\u007F")
 }
 
 fn escaped(text: &str) -> String {

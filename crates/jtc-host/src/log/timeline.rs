@@ -79,18 +79,19 @@ impl Timeline {
                 .collect();
         };
         let at = &self.events[first];
+        // A damaged log can contain two starts of a controller, and then the ticks are not in order.
         let mut lines = vec![format!("first: {:.3} s: {}", at.time_s, at.text)];
         for event in &self.events[first + 1..] {
-            lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
+            lines.push(format!("{}: {}", after(event.tick.saturating_sub(at.tick)), event.text));
         }
         // The event nearest to the error is listed first. The number of listed events is limited.
-        let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
+        let near = |event: &&Event| at.tick.saturating_sub(event.tick) <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
             lines.push("before this error, the latest event first:".to_owned());
         }
         for event in before {
-            lines.push(format!("{} before: {}", span(at.tick - event.tick), event.text));
+            lines.push(format!("{} before: {}", span(at.tick.saturating_sub(event.tick)), event.text));
         }
         lines
     }

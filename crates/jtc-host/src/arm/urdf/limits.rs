@@ -64,7 +64,7 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     if degrees.is_empty() {
         return Ok(false);
     }
-    if (-TWO_TURNS..-TURN).contains(&lower) && (TURN..TWO_TURNS).contains(&upper) {
+    if lower >= -TWO_TURNS && lower < -TURN && upper > TURN && upper <= TWO_TURNS {
         return Ok(true);
     }
     let problem = format!(

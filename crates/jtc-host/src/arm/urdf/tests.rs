@@ -344,6 +344,11 @@ fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
         ("lower=\"-3.1416\" upper=\"3.1416\"", (-2.9905, 2.9905), (file, file)),
         ("lower=\"-6.2832\" upper=\"6.2832\"", (-2.9905, 2.9905), (file, file)),
         ("lower=\"-6.9813\" upper=\"6.9813\"", (-2.9905, 2.9905), (proposed, proposed)),
+        (
+            "lower=\"-12.566370614359172\" upper=\"12.566370614359172\"",
+            (-2.9905, 2.9905),
+            (proposed, proposed),
+        ),
         ("lower=\"-1\" upper=\"inf\"", (-1.0, 2.9905), (file, proposed)),
         ("lower=\"-inf\" upper=\"1\"", (-2.9905, 1.0), (proposed, file)),
         ("lower=\"-inf\" upper=\"inf\"", (-2.9905, 2.9905), (proposed, proposed)),

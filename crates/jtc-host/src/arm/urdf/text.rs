@@ -80,7 +80,7 @@ pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
 /// Adds the velocity 0 to each `limit` element without a velocity, because the XML reader requires a velocity. Velocity 0 means that the
 /// velocity is not limited.
 pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
-    let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
+    let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !has_attribute(tag, &["velocity"]);
     let places: Vec<usize> = tags(text).filter(lacks).map(|tag| tag.begin + "<limit".len()).collect();
     if places.is_empty() {
         return Cow::Borrowed(text);
@@ -115,7 +115,7 @@ pub(super) fn without_ranges(text: &str) -> Vec<String> {
 
 /// Returns `true` if a tag has one of the attributes `keys`.
 fn has_attribute(tag: &Tag, keys: &[&str]) -> bool {
-    tag.text.split('=').any(|head| keys.iter().any(|key| head.trim_end().ends_with(key)))
+    tag.text.split('=').any(|head| head.split_whitespace().last().is_some_and(|name| keys.contains(&name)))
 }
 
 /// Finds the element that causes an error of the XML reader, because the XML reader does not report the position. Returns an error that

@@ -63,7 +63,8 @@ impl BitCodec for Continued {
 impl Transfer {
     /// Prepares a change of the control mode, at which only the torque of the model may step.
     pub(super) fn change_mode(&mut self) {
-        self.next = Some(Continued::Correction);
+        // If the model changes in the same tick, no torque may step.
+        self.next.get_or_insert(Continued::Correction);
     }
 
     /// Prepares a change of the model, at which no torque may step.
@@ -155,6 +156,22 @@ mod tests {
         let mut torque = [JointTorque::default(); JOINTS];
         transfer.blend(before, &mut torque, &nodes, &Config::avena());
         torque.map(|torque| torque.blend)
+    }
+
+    /// If the model and the control mode change in the same tick, no torque has a step, in either order of the changes.
+    #[test]
+    fn j44_a_change_of_the_mode_does_not_cancel_a_change_of_the_model() {
+        let changes: [fn(&mut Transfer); 2] = [Transfer::change_model, Transfer::change_mode];
+        for order in [[0, 1], [1, 0]] {
+            let mut transfer = Transfer::default();
+            order.iter().for_each(|&i| changes[i](&mut transfer));
+            let last = [JointTorque { model: 5.0, ..JointTorque::default() }; JOINTS];
+            let before = transfer.begin(&last);
+            let mut torque = [JointTorque::default(); JOINTS];
+            let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+            transfer.blend(before, &mut torque, &nodes, &Config::avena());
+            assert_eq!(torque.map(|torque| torque.blend), [5.0; JOINTS], "{order:?}");
+        }
     }
 
     /// The excess torque of a joint that begins to yield falls within 10 ms. The torque of the other joints is blended out as at any other

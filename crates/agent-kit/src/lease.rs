@@ -268,16 +268,16 @@ impl<P: Clone> Leases<P> {
 
     /// Returns the key of the client that waits for the lease, if this client is registered and not silent.
     fn first(&self, now: Duration) -> Option<&String> {
-        self.held.as_ref()?.first(|key| {
-            let client = self.clients.get(key);
-            client.is_some_and(|client| {
-                Presence { lasts: Some(client.lasts), seen: client.seen }.is_present(now)
-            })
-        })
+        self.held.as_ref()?.first(|key| self.presence(key), now)
+    }
+
+    fn presence(&self, key: &str) -> Option<Presence> {
+        let client = self.clients.get(key)?;
+        Some(Presence { lasts: Some(client.lasts), seen: client.seen })
     }
 
     fn pass_on(&mut self, held: &Lease<String>, now: Duration) {
-        self.held = held.next(|next| self.clients.get(next).map(|client| Some(client.lasts)), now);
+        self.held = held.next(|next| self.presence(next), now);
         // The new lease holder is treated as if it had just sent a request, so that the agent does not remove it too
         // early.
         let next = self.held.as_ref().and_then(|held| self.clients.get_mut(&held.holder));

@@ -50,9 +50,10 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         self.until.is_some_and(|until| now >= until)
     }
 
-    /// Returns the client that waits for the lease, if this client still sends messages.
-    pub fn first(&self, is_present: impl Fn(&Id) -> bool) -> Option<&Id> {
-        self.wanted_by.as_ref().filter(|first| is_present(first))
+    /// Returns the client that waits for the lease, if this client still sends messages. `presence` returns `None` for a
+    /// client that has disconnected.
+    pub fn first(&self, presence: impl Fn(&Id) -> Option<Presence>, now: Duration) -> Option<&Id> {
+        self.wanted_by.as_ref().filter(|first| presence(first).is_some_and(|first| first.is_present(now)))
     }
 
     /// Registers a client that waits for the lease. Only one client can wait for the lease at a time. The first waiting
@@ -61,8 +62,13 @@ impl<Id: Clone + PartialEq> Lease<Id> {
     /// # Errors
     ///
     /// The client that already waits for the lease.
-    pub fn want(&mut self, client: Id, is_present: impl Fn(&Id) -> bool) -> Result<(), Id> {
-        match self.first(is_present).filter(|first| **first != client) {
+    pub fn want(
+        &mut self,
+        client: Id,
+        presence: impl Fn(&Id) -> Option<Presence>,
+        now: Duration,
+    ) -> Result<(), Id> {
+        match self.first(presence, now).filter(|first| **first != client) {
             Some(first) => Err(first.clone()),
             None => {
                 self.wanted_by = Some(client);
@@ -71,11 +77,10 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         }
     }
 
-    /// Returns the lease of the waiting client, which follows this lease. `lasts` returns the duration of a client's
-    /// lease, and `None` for a client that has disconnected.
-    pub fn next(&self, lasts: impl Fn(&Id) -> Option<Option<Duration>>, now: Duration) -> Option<Self> {
-        let next = self.wanted_by.clone()?;
-        let lasts = lasts(&next)?;
-        Some(Self::begin(next, lasts, now))
+    /// Returns the lease of the waiting client, which follows this lease. A client that has become silent does not
+    /// receive the lease.
+    pub fn next(&self, presence: impl Fn(&Id) -> Option<Presence>, now: Duration) -> Option<Self> {
+        let next = self.first(&presence, now)?;
+        Some(Self::begin(next.clone(), presence(next)?.lasts, now))
     }
 }

@@ -104,7 +104,7 @@ impl SharedLine {
         let lease = self.lease.take_if(|lease| lease.holder == client).ok_or(Denied::NotHolder)?;
         // If a client releases the lease during a motion, the motion continues.
         self.bequeath(self.name(client), Policy::Continue);
-        self.set_lease(lease.next(|next| self.lasts(*next), now));
+        self.set_lease(lease.next(|next| self.presence(*next), now));
         Ok(())
     }
 
@@ -121,19 +121,18 @@ impl SharedLine {
             return Err(Denied::Viewer);
         };
         let clients = &self.clients;
-        let is_present =
-            |id: &ClientId| clients.get(id).is_some_and(|client| client.presence.is_present(now));
+        let presence = |id: &ClientId| clients.get(id).map(|client| client.presence);
         let lease = self.lease.as_mut().ok_or(Denied::NotHolder)?;
-        let (holder, wanted) = (lease.holder, lease.want(client, is_present));
+        let (holder, wanted) = (lease.holder, lease.want(client, presence, now));
         wanted.map_err(|first| Denied::Awaited { holder: self.name(holder), by: self.name(first) })?;
         self.show(client, now);
         self.deliver(holder, Delivery::LeaseWanted(name));
         Ok(())
     }
 
-    /// Returns the duration of a client's lease. The outer `None` means that the client has disconnected.
-    fn lasts(&self, id: ClientId) -> Option<Option<Duration>> {
-        self.clients.get(&id).map(|client| client.presence.lasts)
+    /// Returns the presence of a client; `None` if the client has disconnected.
+    fn presence(&self, id: ClientId) -> Option<Presence> {
+        self.clients.get(&id).map(|client| client.presence)
     }
 
     /// Records that the client is active at `now`.
@@ -156,7 +155,7 @@ impl SharedLine {
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         if self.lease.is_none() {
-            self.set_lease(Some(Lease::begin(id, self.lasts(id).flatten(), now)));
+            self.set_lease(Some(Lease::begin(id, self.presence(id).and_then(|client| client.lasts), now)));
         }
         Ok(())
     }
@@ -184,7 +183,7 @@ impl SharedLine {
     pub fn renew(&mut self, id: ClientId, now: Duration) {
         self.end_lapsed(now);
         self.show(id, now);
-        let lasts = self.lasts(id).flatten();
+        let lasts = self.presence(id).and_then(|client| client.lasts);
         if let Some(lease) = self.lease.as_mut().filter(|lease| lease.holder == id) {
             lease.renew(lasts, now);
         }
@@ -208,7 +207,7 @@ impl SharedLine {
 
     /// Ends the lease of `holder`, and applies the policy of this client.
     pub(super) fn end_lease(&mut self, holder: ClientId, policy: Policy, now: Duration) {
-        let next = self.lease.as_ref().and_then(|lease| lease.next(|next| self.lasts(*next), now));
+        let next = self.lease.as_ref().and_then(|lease| lease.next(|next| self.presence(*next), now));
         self.set_lease(next);
         self.bequeath(self.name(holder), policy);
         let Some(command) = policy.command() else { return };

@@ -64,7 +64,7 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     if degrees.is_empty() {
         return Ok(false);
     }
-    if lower >= -TWO_TURNS && lower < -TURN && upper > TURN && upper <= TWO_TURNS {
+    if [-lower, upper].iter().all(|limit| (TURN..=TWO_TURNS).contains(limit)) {
         return Ok(true);
     }
     let problem = format!(

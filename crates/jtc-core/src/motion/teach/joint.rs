@@ -240,8 +240,9 @@ impl TaughtJoint {
     }
 
     /// Returns the dry friction torque of a slow joint. The dry friction fades out between the speed at which damping balances the dry
-    /// friction and three times that speed. The joint therefore stops against any lower torque, and the sum of damping and dry friction
-    /// never decreases with the speed.
+    /// friction and four times that speed. The joint therefore stops against any lower torque. The dry friction decreases at most half as
+    /// fast as the damping torque increases, so the torque against the motion never decreases with the speed, even with the friction
+    /// compensation.
     fn dry_friction(
         &mut self,
         position: f64,
@@ -257,7 +258,7 @@ impl TaughtJoint {
         }
         let slow = (breakaway / damping.max(f64::MIN_POSITIVE)).clamp(STANDING, SLOW);
         let gripped =
-            if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (2.0 * slow)) } else { 1.0 };
+            if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (3.0 * slow)) } else { 1.0 };
         let grip = f64::from(self.grip);
         self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
         // The spring slips when it is extended by its full torque. If the joint is fast, the anchor of the spring moves with the joint.

@@ -154,7 +154,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::ControllerState;
+
     use super::*;
+    use crate::Config;
+    use crate::nodes::Nodes;
 
     const HELD: Found = Found {
         errors: 0,
@@ -174,6 +178,130 @@ mod tests {
                 Some((Reaction::Release, StopKind::Unstable, joint_error::TORQUE))
             );
             assert_eq!(reaction(&HELD, mode, false, true), None, "it has to be so again");
+        }
+    }
+
+    const NO_JOINT: [bool; JOINTS] = [false; JOINTS];
+
+    /// Returns a controller that holds an arm at rest.
+    fn holding() -> Controller<[RawPoint; 4]> {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        controller.state = ControllerState::HoldPos;
+        controller
+    }
+
+    /// Returns `found` for joint 2, and no findings for the other joints.
+    const fn second(found: Found) -> [Found; JOINTS] {
+        [HELD, found, HELD, HELD, HELD, HELD]
+    }
+
+    /// Begins a trial of gains that are half as high as the present gains. Returns the present gains.
+    fn try_gains(controller: &mut Controller<[RawPoint; 4]>) -> [PidGains; JOINTS] {
+        let before = controller.parameters.pid;
+        controller.parameters.pid.iter_mut().for_each(|gains| gains.kp *= 0.5);
+        controller.parameters.trial.begin(&before, &controller.parameters.pid);
+        before
+    }
+
+    /// A failed trial of gains is the cause of a joint that yields, or that lowers its load before it has settled. The gains before the
+    /// trial return. A settled joint with too much load has another cause.
+    #[test]
+    fn j66_j71_a_joint_that_yields_during_a_trial_of_gains_gets_the_gains_before_the_trial() {
+        let overloaded = Found { overloaded: true, ..HELD };
+        for (found, kind, yields) in [
+            (Found { pushed: true, ..HELD }, StopKind::Gains, true),
+            (Found { unstable: true, ..HELD }, StopKind::Gains, true),
+            (Found { settled: false, ..overloaded }, StopKind::Gains, true),
+            (overloaded, StopKind::Overload, true),
+            (Found { errors: joint_error::VELOCITY, ..HELD }, StopKind::Velocity, false),
+        ] {
+            let mut controller = holding();
+            let before = try_gains(&mut controller);
+            assert_eq!(controller.react(ControlMode::Hold, &second(found)), [0; JOINTS], "{found:?}");
+            assert_eq!(controller.last_stop.cause.kind, kind, "{found:?}");
+            assert_eq!(controller.last_stop.cause.joint, 2, "{found:?}");
+            assert_eq!(controller.parameters.pid == before, kind == StopKind::Gains, "{found:?}");
+            let yielding: [bool; JOINTS] = core::array::from_fn(|j| controller.motion.law.yields(j));
+            assert_eq!(yielding, [false, yields, false, false, false, false], "{found:?}");
+        }
+    }
+
+    /// The torque of a joint that yields is limited, so its instability counts only shortly after another one.
+    #[test]
+    fn j66_a_joint_that_yields_is_unstable_only_again() {
+        for (again, released) in [(false, 0), (true, joint_error::TORQUE)] {
+            let mut controller = holding();
+            let mut yields = NO_JOINT;
+            yields[1] = true;
+            controller.motion.begin_yields(&yields, &NO_JOINT, &controller.config);
+            if again {
+                let gains = controller.parameters.pid;
+                controller.parameters.trial.fails(0b10, 0b10, &gains, controller.config.delay_ticks);
+            }
+            let release = controller.react(ControlMode::Hold, &second(Found { unstable: true, ..HELD }));
+            assert_eq!(release, [0, released, 0, 0, 0, 0], "{again}");
+            assert!(!controller.errors.held_stop(), "{again}");
+        }
+    }
+
+    /// An overload on the path stops the arm if the path cannot be slowed down any more.
+    #[test]
+    fn j66_j75_an_overload_in_motion_stops_the_arm_if_holding_back_does_not_help() {
+        let overloaded = second(Found { overloaded: true, ..HELD });
+        let mut controller = holding();
+        assert!(!controller.hold_back(), "no path is executed");
+        controller.react(ControlMode::Follow, &overloaded);
+        assert!(controller.errors.held_stop());
+        assert_eq!(controller.last_stop.cause.kind, StopKind::Overload);
+        assert!(
+            !controller.motion.law.any_yields(),
+            "the arm stops and the joint keeps its position control"
+        );
+    }
+
+    /// The gains of a trial that ends early do not hold the arm. The gains before the trial return, and the host sees the cause.
+    #[test]
+    fn j71_a_trial_of_gains_that_ends_early_restores_the_gains_before_it() {
+        let mut controller = holding();
+        controller.end_trial();
+        assert_eq!(controller.last_stop.cause, StopCause::default(), "no gains are on trial");
+        let before = try_gains(&mut controller);
+        controller.end_trial();
+        assert_eq!(controller.parameters.pid, before);
+        assert_eq!(controller.last_stop.cause.kind, StopKind::Gains);
+        assert!(!controller.parameters.trial.is_on());
+    }
+
+    /// The cause of a held stop stays while a joint yields, or while the arm still comes to rest.
+    #[test]
+    fn j69_a_held_stop_is_not_cleared_during_its_reaction() {
+        let all = [false, true];
+        for yields in all {
+            for held_stop in all {
+                for executes in all {
+                    for jogs in all {
+                        let mut controller = holding();
+                        if yields {
+                            controller.motion.begin_yields(&[true; JOINTS], &NO_JOINT, &controller.config);
+                        }
+                        if held_stop {
+                            controller.errors.hold_joints(&[joint_error::TORQUE; JOINTS], true);
+                        }
+                        if executes {
+                            controller.trajectory = TrajectoryState::Execute;
+                        }
+                        if jogs {
+                            controller.motion.set.jog(&[0.1; JOINTS], &[1.0; JOINTS], &controller.config);
+                        }
+                        assert_eq!(
+                            controller.is_reacting(),
+                            yields || (held_stop && (executes || jogs)),
+                            "yields {yields}, held stop {held_stop}, executes {executes}, jogs {jogs}"
+                        );
+                    }
+                }
+            }
         }
     }
 

@@ -37,31 +37,35 @@ const HEADER: &str = "| | j1 | j2 | j3 | j4 | j5 | j6 |\n|---|---|---|---|---|--
 const INTRODUCTION: &str = "\
 # Tracking
 
-This page shows how accurately the arm follows its path. The page compares the control law of the existing firmware with ours, on the same
-simulated arm, drives and bus, and with the same gains, model and friction. `cargo xtask bench tracking` writes this page. The simulation uses
-virtual time, so each run of the command gives the same figures.
+This page shows how accurately the arm follows its path. The page compares the control law of the existing firmware with the control law of
+this project. Both control laws run on the same simulated arm, drives and bus, and with the same gains, model and friction. The command
+`cargo xtask bench tracking` writes this page. The simulation uses virtual time, so each run of the command gives the same figures.
 
-`xtask/examples/tracking/existing.rs` contains the existing law, written after the firmware that was published in April 2022. This law:
+The *existing law* is the control law of the existing firmware. The file `xtask/examples/tracking/existing.rs` contains a copy of this control
+law, which follows the firmware that was published in April 2022. The existing law:
 
 - computes inverse dynamics, PID and friction, and multiplies their sum by 1.3;
 - joins the points of a trajectory by straight lines;
 - compares the measured position, which is two milliseconds old, with the present set position;
 - changes the sign of the friction torque in one step.
 
-“Ours” is the controller itself.
+“Ours” is the control law of this project. The comparison runs the controller itself.
 
 The figures have these meanings:
 
-- The figures are RMS values over the path, and medians of ten arms. The masses of these arms differ from the model of both controllers by up to
-  ±10 %, and the friction by up to ±20 %, at random. Gravity has the direction of the existing arm, which hangs from above. The friction of the
-  arm changes its sign within 0.01 rad/s (ours compensates it within 0.02 rad/s), unless a section states another width.
+- Each figure is an RMS value over the path, and the median of ten arms. The masses of these arms differ from the model of both controllers by
+  up to ±10 %, and the friction by up to ±20 %, at random. Gravity acts in the same direction as on the existing arm, which hangs from above. The
+  friction of the arm changes its sign within 0.01 rad/s, unless a section states another width. (The controller of this project changes the sign
+  of its friction compensation within 0.02 rad/s.)
 - *Commanded − true*, mrad: the set position of a tick minus the true position at the time when the torque of that tick begins to act.
-- *Commanded − measured*, mrad: the error that each law uses. Ours uses the set position of the time of the measurement (J-62).
+- *Commanded − measured*, mrad: the position error that each control law uses. The controller of this project uses the set position of the time at
+  which the measurement was taken (J-62).
 - *Roughness*, N·m: the change of the torque at the joint from one millisecond to the next.
-- *Goal*: the largest permitted commanded − true for ideal drives, for drives that deliver 1/1.3 and for sharper friction. The goal is a fifth of
-  the value of the existing firmware, but at least 0.04 mrad. (A step of the encoder is 0.096 mrad, which alone causes 0.03 mrad RMS.)
-- The *demo path* is that of `jtc demo`. The *recorded path* was recorded with the existing arm (`TrajectoryInt.csv`). The recording lacks five
-  points, after points 184, 358, 544, 726 and 906; the comparison adds them.
+- *Goal*: the largest permitted commanded − true of the controller of this project. Only three conditions have a goal: ideal drives, drives that
+  deliver 1/1.3, and sharper friction. The goal is a fifth of the value of the existing firmware, but at least 0.04 mrad. (A step of the encoder
+  is 0.096 mrad. This step alone causes an error of 0.03 mrad RMS.)
+- The *demo path* is the path of `jtc demo`. The *recorded path* was recorded with the existing arm (`TrajectoryInt.csv`). The recording lacks five
+  points, after points 184, 358, 544, 726 and 906; the comparison adds these points.
 ";
 
 impl Comparison {
@@ -79,14 +83,14 @@ impl Comparison {
     pub(crate) fn verdict(&self) -> String {
         if self.ours.finished < self.existing.finished {
             return format!(
-                "Ours stops in {} of {} runs: {}.",
+                "The controller of this project stops in {} of {} runs: {}.",
                 self.existing.finished - self.ours.finished,
                 self.existing.finished,
                 self.ours.errors.join("; ")
             );
         }
         if !self.condition.judged {
-            return "This condition has no goal.".to_owned();
+            return "The comparison sets no goal for this condition.".to_owned();
         }
         let missed = self.missed();
         if missed.is_empty() {
@@ -122,9 +126,10 @@ impl Comparison {
         if !self.bounds.is_empty() {
             let _ = write!(
                 page,
-                "\nThe next table shows what limits the accuracy: our commanded − true, mrad, with a controller that has better values of this arm. If\n\
-                 the friction value is wrong, the torque has an error that steps when a joint reverses, and only the integral compensates this step. A\n\
-                 friction sign that changes over another speed range than that of the arm has the same effect.\n\n{HEADER}"
+                "\nThe next table shows what limits the accuracy of the controller of this project. The table has the commanded − true, mrad, of\n\
+                 this controller if it has better values of this arm. If the friction value of a joint is wrong, the torque has an error that steps when the\n\
+                 joint reverses. Only the integral part of the controller compensates this step. If the sign of the compensated friction changes over another\n\
+                 speed range than the friction of the arm, the effect is the same.\n\n{HEADER}"
             );
             for (name, error) in &self.bounds {
                 row(page, name, error, 3);
@@ -161,8 +166,8 @@ fn reference(page: &mut String, all: &[Comparison]) {
     let here = [ideal.own_error, ideal.true_error, ideal.roughness, weak.own_error];
     let _ = write!(
         page,
-        "\n## The existing law, and the existing firmware\n\nThe firmware's own code, compiled for a PC, was run on this plant earlier (demo path). Our \
-         implementation of its law gives the same figures:\n\n{HEADER}"
+        "\n## The existing law, and the existing firmware\n\nThe original code of the existing firmware, compiled for a PC, was run earlier \
+         on the same simulated arm (demo path). The copy of this control law in `existing.rs` gives nearly the same figures:\n\n{HEADER}"
     );
     let mut most = 0.0f64;
     for ((name, reference), here) in REFERENCE.iter().zip(&here) {

@@ -104,7 +104,7 @@ keys! {
     endian: Endian = Endian::Little, Word, "endian", "little", "little or big", _,
         "D-10: byte order of 16-bit fields.";
     dlc_strict: bool = false, YesNo, "dlc.strict", "no", "yes or no", _,
-        "D-12: boards also refuse messages with surplus bytes.";
+        "D-12: receivers also refuse messages with surplus bytes.";
     addr_first: u32 = 1, Number, "addr.first", "1", "0 or 1", 0..=1,
         "D-04: number of the first board.";
     addr_broadcast: Broadcast = Broadcast::Zero, Word, "addr.broadcast", "0", "0, 31 or none", _,

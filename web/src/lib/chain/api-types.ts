@@ -776,7 +776,7 @@ export interface components {
              */
             parameters: components["schemas"]["ValueObject"][];
             /**
-             * @description `true` if the outputs are not current: they are older than 0.5 s, or the board is late, lost or not in its control
+             * @description `true` if the outputs are not current: they are older than 0.5 s, or the board is late, lost, rebooted or not in its control
              *     loop.
              */
             stale: boolean;

@@ -18,7 +18,7 @@ pub(crate) struct ValuesObject {
     /// Age of its outputs, s; missing before the first outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_s: Option<f64>,
-    /// `true` if the outputs are not current: they are older than 0.5 s, or the board is late, lost or not in its control
+    /// `true` if the outputs are not current: they are older than 0.5 s, or the board is late, lost, rebooted or not in its control
     /// loop.
     pub stale: bool,
     /// Sensor outputs; empty before the first outputs.

@@ -66,7 +66,7 @@ pub(crate) use variables::VARIABLES;
 pub(crate) struct Cli {
     /// Print JSON instead of text.
     ///
-    /// A stream has one object per line
+    /// A command with continuous output, such as `jtc monitor`, prints one object per line
     #[arg(long, global = true, env = "JTC_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     /// Set the serial port, before the command
@@ -86,7 +86,7 @@ pub(crate) struct Cli {
 pub(crate) struct LinkArgs {
     /// Use this serial port, or the agent at http://HOST:PORT.
     ///
-    /// Default: the only port found
+    /// Default: the serial port that the command finds, if it finds only one
     #[arg(long, env = "JTC_PORT", value_name = "PATH", help_heading = "Link")]
     pub port: Option<String>,
     /// Use this token file of the agent.
@@ -94,9 +94,10 @@ pub(crate) struct LinkArgs {
     /// `jtc serve` creates the file if the file does not exist. Default: the token file of an agent on this computer
     #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
     pub token_file: Option<std::path::PathBuf>,
-    /// Trust these certificates, PEM, for an agent at https://.
+    /// Trust the certificates in this PEM file for https:// agents.
     ///
-    /// Default: the agent's own certificate if the agent runs on this computer, else the certificates of the system
+    /// Default: for an agent on this computer, the certificate of this agent; otherwise, the certificates of the operating
+    /// system
     #[arg(long, env = "JTC_TLS_CA", value_name = "FILE", help_heading = "Link")]
     pub tls_ca: Option<std::path::PathBuf>,
     /// Set the rate of the port, Bd (300 to 15000000)
@@ -133,20 +134,20 @@ pub(crate) enum Command {
         jtc sim --serial /tmp/jtc --faults faults.toml\n  \
         jtc sim --serial /tmp/jtc --record sim.mcap\n  \
         jtc sim --serial /tmp/jtc --support stand --gear-stiffness 20000\n\n\
-        --record writes up to 40 MB per minute as .mcap, or 50 MB as .csv. The simulator opens the file \
-        before it starts. You can read the file while it grows. If the simulator is killed, the file can \
-        lack the last 0.2 s. If the disk is full, the simulator reports this at once, continues, and ends \
-        with exit code 5.\n\n\
+        --record writes up to 40 MB per minute as .mcap, or 50 MB per minute as .csv. The simulator opens \
+        the file before it starts. You can read the file during the recording. If the simulator is killed, \
+        the last 0.2 s can be missing from the file. If the disk is full, the simulator reports the full \
+        disk at once, continues, and ends with exit code 5.\n\n\
         The simulator accepts these events as lines on stdin:\n  \
         push 3 12 0.5    push joint 3 (counted from 1) with 12 N·m for 0.5 s\n  \
-        hand lead.csv    in Teaching, a simulated hand leads the arm along a trajectory file")]
+        hand lead.csv    in Teaching, a simulated hand moves the arm along a trajectory file")]
     Sim(SimArgs),
     /// Share the port of a controller among many clients
     #[command(
         after_help = "Many clients can read at the same time. Only one client at a time can move the arm or \
             change settings. Every client can stop the arm.\n\n\
-            With --port http://…, every other command uses the agent. Without this option, a command also \
-            uses the agent if an agent of this user has its port.\n\n\
+            With --port http://…, every other command connects to the agent. A command also connects to an \
+            agent of this user if this agent has opened the serial port of the command.\n\n\
             On this computer, reading, Stop and Pause need no token. All other requests need the operator's \
             token from the token file. Only the owner of this file can read it.\n\n\
             Examples:\n  \
@@ -155,9 +156,10 @@ pub(crate) enum Command {
             jtc status --port http://127.0.0.1:8780\n  \
             curl -X POST http://127.0.0.1:8780/api/stop\n  \
             jtc serve --sim --record recordings --record-limit 500MB\n\n\
-            --record writes each motion to a file of its own. The file is NAME.part.mcap during the motion, \
-            and NAME.mcap afterwards. You can read both files at any time. A full disk never delays a \
-            command. The agent reports the full disk, and records again when the disk has space."
+            --record writes each motion to a separate file. The name of the file is NAME.part.mcap during \
+            the motion, and NAME.mcap afterwards. You can read the file at any time. A full disk never \
+            delays a command. The agent reports the full disk, and records again when the disk has free \
+            space."
     )]
     Serve(ServeArgs),
     /// List serial ports, with the reason if a port cannot be used
@@ -169,11 +171,11 @@ pub(crate) enum Command {
     /// Show one decoded status
     #[command(after_help = "Examples:\n  jtc status\n  jtc --json status | jq .joints[0].position_rad")]
     Status(LinkArgs),
-    /// Show firmware, arm, missing parameters, cause of last start
+    /// Show firmware, arm, missing parameters and boot cause
     #[command(
-        after_help = "The hash covers all parameters that decide how the arm moves: model, gains, friction \
-            and settings. For a controller without extensions, the command shows only the values of a \
-            status.\n\n\
+        after_help = "The hash covers all parameters that determine how the arm moves: model, gains, \
+            friction and settings. If the controller has no extensions, the command shows only the values of \
+            its status.\n\n\
             Examples:\n  \
             jtc info\n  \
             jtc --json info | jq -r .hash"
@@ -181,9 +183,10 @@ pub(crate) enum Command {
     Info(LinkArgs),
     /// Show a live view of the controller and the joints
     #[command(
-        after_help = "The terminal needs at least 40 columns and 12 rows. The view shows problems and the next command \
-            first.\n\n\
-            Press s to stop a motion on its path, and q to quit. Arrows, PageUp, PageDown, Home and End scroll.\n\n\
+        after_help = "The terminal needs at least 40 columns and 12 rows. At the top, the view shows \
+            problems and the command to use next.\n\n\
+            Press s to stop a motion on its path, and q to quit. The arrow keys, PageUp, PageDown, Home and \
+            End scroll the view.\n\n\
             Examples:\n  \
             jtc monitor\n  \
             jtc --json monitor --count 100 > statuses.jsonl"
@@ -195,7 +198,7 @@ pub(crate) enum Command {
     /// Send and show friction, gains and arm model
     #[command(subcommand)]
     Params(ParamsCommand),
-    /// Set joints absent for work on a bench
+    /// Declare joints absent, for work on a bench
     #[command(subcommand)]
     Bench(BenchCommand),
     /// List, flash and verify the firmware of the boards
@@ -206,24 +209,28 @@ pub(crate) enum Command {
     Payload(PayloadCommand),
     /// Plan the fastest motion through waypoints; nothing is sent
     #[command(
-        after_help = "A waypoint file is CSV, or JSON with the same keys (see `jtc help files`). Give each waypoint \
-            by joint positions, by a pose, or by position and orientation of the flange. The columns are:\n  \
+        after_help = "A waypoint file is CSV, or JSON with the same keys (see `jtc help files`). Define each \
+            waypoint by joint positions, by a named pose, or by position and orientation of the flange. The \
+            columns are:\n  \
             q1..q6 or q1_deg..q6_deg       joint positions, rad or degrees\n  \
             pose                           name of a pose from the arm file\n  \
             x,y,z                          position of the flange, m\n  \
             qx,qy,qz,qw or roll,pitch,yaw  orientation of the flange, rad\n  \
-            leg                            line, via or arc: motion to this waypoint\n  \
-            t                              time, s, if the file gives times\n\n\
-            The arm stops at each waypoint. --blend rounds a corner if this is faster than a stop. Legs are \
-            straight in joint space. With --line, or if the column `leg` requests it, the flange follows \
-            straight lines and arcs. --blend-m rounds the corners between lines and arcs.\n\n\
-            The motion uses at most 98 % of the limits of velocity and acceleration. By the arm model, the \
-            torque of each joint stays below its limit minus --margin. The jerk limit lets the acceleration \
-            rise from 0 to its limit in 100 ms. The planned trajectory has passed the check of `jtc traj \
-            check`.\n\n\
-            The margin is for masses and friction that the model does not know. If gravity and friction \
-            leave less torque than the margin, the motion uses a quarter of the remaining torque. A note \
-            then names the joint. A margin below 10 % gives a warning.\n\n\
+            leg                            path to this waypoint: joint, line, via or arc\n  \
+            t                              time of the waypoint, s (optional)\n\n\
+            By default, the arm stops at each waypoint. --blend rounds a corner if a rounded corner is \
+            faster than a stop. By default, the path between two waypoints is a straight line in joint \
+            space. With --line, or with `line` in the column `leg`, the flange moves along a straight line. \
+            With `arc` in the column `leg`, the flange moves along an arc. --blend-m rounds the corners \
+            between lines and arcs.\n\n\
+            The motion uses at most 98 % of the limits of velocity and acceleration. According to the arm \
+            model, the torque of each joint stays below its torque limit minus the margin of --margin. By \
+            default, the jerk limit allows the acceleration to rise from 0 to its limit in 100 ms. The \
+            planned trajectory has passed the check of `jtc traj check`.\n\n\
+            The margin is a reserve for masses and friction that the arm model does not contain. If gravity \
+            and friction leave less torque than the margin, the motion uses a quarter of the remaining \
+            torque. A note then names the joint. If the margin is below 10 %, the command prints a \
+            warning.\n\n\
             Examples:\n  \
             jtc plan waypoints.csv -o cycle.csv\n  \
             jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
@@ -233,12 +240,13 @@ pub(crate) enum Command {
     Plan(PlanArgs),
     /// Move to joint positions, a named pose or a flange pose
     #[command(
-        after_help = "The arm moves from its present position, straight in joint space. With --line the flange follows a \
-            straight line. The command checks the limits of velocity, acceleration, jerk and torque before \
-            it sends anything. The command does not check for obstacles.\n\n\
-            The command runs and ends like `jtc traj run`. On a terminal, press space to pause and resume, s to \
-            stop, + and - to change the speed. Ctrl-C stops the arm on its path. --margin works as in `jtc \
-            plan`.\n\n\
+        after_help = "The arm moves from its present position to the target on a straight line in joint \
+            space. With --line, the flange moves along a straight line. The command checks the limits of \
+            velocity, acceleration, jerk and torque before it sends anything. The command does not check for \
+            obstacles.\n\n\
+            The command executes the motion and ends like `jtc traj run`. On a terminal, press space to \
+            pause and resume, s to stop, and + and - to change the speed. Ctrl-C stops the arm on its path. \
+            --margin works as in `jtc plan`.\n\n\
             Examples:\n  \
             jtc move --to home --arm my-arm.toml\n  \
             jtc move --to 0,0.5,-1,0,0.5,0\n  \
@@ -268,10 +276,10 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  jtc clear\n  jtc clear --occurred")]
     Clear(ClearArgs),
     /// Reset nodes of the joint bus; the arm loses torque
-    #[command(after_help = "The arm loses torque, also if you name only one joint.\n\n\
+    #[command(after_help = "The whole arm loses its torque, even if you name only one joint.\n\n\
             Examples:\n  \
             jtc reset --joints 3          joint 3 only\n  \
-            jtc reset --joints 1,3 --yes  do not ask, also if the arm is held\n  \
+            jtc reset --joints 1,3 --yes  do not ask, even if the controller holds the arm\n  \
             jtc reset --gripper\n  \
             jtc reset --all")]
     Reset(ResetArgs),
@@ -281,8 +289,9 @@ pub(crate) enum Command {
     /// Switch off the torque at rest; an arm without brakes falls
     #[command(
         after_help = "The controller returns to Init, and you must send the parameters again. An arm without \
-            holding brakes falls: support it first. On a terminal, the command asks before it acts. --yes \
-            answers this question. Without a terminal, the command is refused unless you use --yes.\n\n\
+            holding brakes falls: support it first. On a terminal, the command first asks for confirmation. \
+            With --yes, the command does not ask. Without a terminal, the command refuses to switch off the \
+            torque unless you use --yes.\n\n\
             Examples:\n  \
             jtc disable\n  \
             jtc disable --yes"
@@ -296,11 +305,11 @@ pub(crate) enum Command {
     },
     /// Jog joints with keys, or one joint while the command runs
     #[command(
-        after_help = "On a terminal, the keys 1 to 6 select a joint. Hold the left or right arrow to move it. The up and \
-            down arrows change the rate, and q quits.\n\n\
+        after_help = "On a terminal, the keys 1 to 6 select a joint. Hold the left or right arrow key to \
+            move the selected joint. The up and down arrow keys change the rate, and q quits.\n\n\
             The arm begins to stop 0.2 s after the last key press, or 0.2 s after the last message of this \
-            command. The stop takes at most 0.52 s if the torque suffices. Joints stop before the ends of \
-            their ranges. You can jog only in HoldPos, and not while a motion is paused.\n\n\
+            command. The stop takes at most 0.52 s if the drives have enough torque. Joints stop before the \
+            ends of their ranges. You can jog only in HoldPos, and not while a motion is paused.\n\n\
             Examples:\n  \
             jtc jog\n  \
             jtc jog 3 0.1                  joint 3 at 0.1 rad/s until Ctrl-C\n  \
@@ -309,15 +318,15 @@ pub(crate) enum Command {
     Jog(JogArgs),
     /// Recover to HoldPos, reporting each step
     #[command(
-        after_help = "The command reports the source of the parameters that each step uses. The recovery does not resume \
-            a motion.\n\n\
+        after_help = "The command reports the source of the parameters that each step uses. The command does \
+            not resume an interrupted motion.\n\n\
             If the controller does not hold the arm, --arm FILE sends friction, gains and arm model of that \
-            file. These replace the parameters of the controller. If the controller holds the arm, its \
-            present parameters stay in use, and the command reports this.\n\n\
-            --defaults uses the default parameters of the controller, but only if some are missing. These are the \
-            parameters of the stored arm, or of the built-in arm if none is stored. Without --arm and \
-            --defaults, a controller that has friction, gains and model keeps them. If one of them is \
-            missing, the command is refused.\n\n\
+            file. These values replace the parameters of the controller. If the controller holds the arm, it \
+            keeps its present parameters, and the command reports that these parameters stay in use.\n\n\
+            With --defaults, the controller uses its default parameters, but only if it lacks parameters. \
+            The default parameters are the parameters of the stored arm, or of the built-in arm if no arm is \
+            stored. Without --arm and --defaults, the controller keeps its friction, gains and model. If \
+            friction, gains or model are missing, the command refuses the recovery.\n\n\
             Examples:\n  \
             jtc recover\n  \
             jtc recover --arm my-arm.toml\n  \
@@ -326,9 +335,10 @@ pub(crate) enum Command {
     Recover(RecoverArgs),
     /// Compute the dynamics of an arm for each line of stdin
     #[command(
-        after_help = "Each line of numbers on stdin gives one line of numbers on stdout. An input line has \
-            q1..q6 qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²). For forward, the last six numbers are torques \
-            (N·m). For mass, the line has only q1..q6. Results have 17 significant digits.\n\n\
+        after_help = "For each line of numbers on stdin, the command prints one line of numbers to stdout. \
+            An input line has q1..q6 qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²). With `forward`, the last six \
+            numbers are torques (N·m). With `mass`, the line has only q1..q6. Results have 17 significant \
+            digits.\n\n\
             Examples:\n  \
             echo 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 | jtc dynamics inverse\n  \
             echo 0 0.5 0 0 0 0 | jtc dynamics mass --arm my-arm.urdf"

@@ -10,13 +10,14 @@ use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 #[derive(Debug, Subcommand)]
 pub(crate) enum ArmCommand {
     /// Make an arm file from a robot description (URDF)
-    #[command(after_help = "The command lists all frames that it turned and all values that it guessed.\n\n\
-            The arm must be a chain of six revolute or continuous joints. If more joints move (a gripper, a \
-            seventh axis, a second arm), select the six joints with --joints or --tip. The other joints stay \
-            at position 0.\n\n\
+    #[command(after_help = "The command lists all frames that it has rotated, and all values that it has \
+        guessed.\n\n\
+            The arm must be a chain of six revolute or continuous joints. If the robot has more movable \
+            joints (a gripper, a seventh axis, a second arm), select the six joints with --joints or --tip. \
+            The other joints stay at position 0.\n\n\
             A URDF does not contain rotor inertia, gains, acceleration limits and other parameters. The \
-            command computes starting values for them by rules. The arm file contains these rules, and marks \
-            these values as proposed.\n\n\
+            command uses rules to compute starting values for these parameters. The arm file contains these \
+            rules, and marks the starting values as proposed.\n\n\
             Examples:\n  \
             jtc arm import ur5.urdf -o ur5.toml\n  \
             jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
@@ -27,8 +28,9 @@ pub(crate) enum ArmCommand {
         after_help = "The command also checks that the drives can hold the arm and that the controller \
             accepts it.\n\n\
             Exit code 0 means that the controller would accept the arm. Exit code 4 means that the \
-            controller would refuse it. With exit code 0, the command can still show warnings. Examples are \
-            proposed values, and poses in which gravity is more than a drive can hold.\n\n\
+            controller would refuse it. With exit code 0, the command can still show warnings. Examples of \
+            warnings are proposed values, and poses in which a drive cannot hold the arm against \
+            gravity.\n\n\
             Examples:\n  \
             jtc arm check ur5.toml\n  \
             jtc --json arm check ur5.toml | jq .findings[].what"
@@ -39,8 +41,8 @@ pub(crate) enum ArmCommand {
     },
     /// Show all parameters of an arm, with unit, range and source
     #[command(
-        after_help = "The command shows each value with its unit, range, default and source. Without a file, the values are \
-        those of the controller's arm.\n\n\
+        after_help = "The command shows each value with its unit, range, default and source. Without a file, \
+            the command shows the values of the controller's arm.\n\n\
         Examples:\n  \
         jtc arm show ur5.toml\n  \
         jtc arm show ur5.toml --deg\n  \
@@ -60,13 +62,14 @@ pub(crate) enum ArmCommand {
     /// Send a complete arm to the controller, and verify it
     #[command(after_help = "The command sends settings, gains, friction, model and name, reads them back, \
             and compares them with the file.\n\n\
-            Settings can change only while the controller is in Init or Error. `jtc disable` switches off \
-            the torque.\n\n\
-            With --store, the controller keeps the arm after a loss of power. After storing, the controller \
-            is in Init. Run `jtc params use-defaults` or `jtc recover --defaults` to use the stored arm.\n\n\
-            A controller without extensions accepts only friction, gains and model. If its own limits, \
-            gravity or rotor inertia differ from the file, the command sends nothing unless you use \
-            --accept-device-limits.\n\n\
+            The controller accepts new settings only in Init or Error. Switch off the torque first with `jtc \
+            disable`.\n\n\
+            With --store, the controller keeps the arm after a loss of power. After the controller has \
+            stored the arm, the controller is in Init. Run `jtc params use-defaults` or `jtc recover \
+            --defaults` to use the stored arm.\n\n\
+            A controller without extensions accepts only friction, gains and model. If the limits, gravity \
+            or rotor inertia of such a controller differ from the file, the command sends nothing unless you \
+            use --accept-device-limits.\n\n\
             Examples:\n  \
             jtc arm push my-arm.toml\n  \
             jtc arm push my-arm.toml --store")]

@@ -8,23 +8,24 @@ use super::LinkArgs;
 /// `jtc bench …`
 #[derive(Debug, Subcommand)]
 pub(crate) enum BenchCommand {
-    /// Set these joints absent, and all others present
+    /// Declare these joints absent, and all other joints present
     #[command(
-        after_help = "Name each absent joint, counted from 1, with the angle that it has in the model. The \
-            controller accepts this only in Init or Error. Switch off the torque first with `jtc \
-            disable`.\n\n\
-            The controller does not wait for nodes at these joints, and their torque is zero. While a joint \
-            is absent, the controller does not execute trajectories, and you cannot teach. The controller \
-            holds the other joints, and you can jog them. The controller computes their torque from the \
-            model of the whole arm: push a model of the arm that is on the bench.\n\n\
-            A drive that answers at an absent joint is an error. The setting is not stored: after a power \
-            cycle, the controller expects all joints again.\n\n\
+        after_help = "For each absent joint, write its number, counted from 1, and the angle that the joint \
+            has in the model. The controller accepts this command only in Init or Error. Switch off the \
+            torque first with `jtc disable`.\n\n\
+            The controller does not wait for the nodes of absent joints, and the torque of absent joints is \
+            zero. While a joint is absent, the controller does not execute trajectories, and teaching is not \
+            possible. The controller holds the other joints, and you can jog these joints. The controller \
+            computes the torque of these joints from the model of the whole arm. Therefore, push a model of \
+            the arm that is on the bench.\n\n\
+            If a drive answers at an absent joint, the controller reports an error. The setting is not \
+            stored: after a power cycle, the controller expects all joints again.\n\n\
             Examples:\n  \
             jtc bench absent 3=0.5 4=0\n  \
             jtc bench absent 2=90 3=-45 --deg"
     )]
     Absent {
-        /// Joint and its angle in rad, as 3=0.5
+        /// Joint and its angle in rad, for example 3=0.5
         #[arg(required = true, value_name = "JOINT=RAD", value_parser = joint)]
         joints: Vec<(Joint, f64)>,
         /// Read the angles as degrees
@@ -33,8 +34,8 @@ pub(crate) enum BenchCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Set all joints present
-    #[command(after_help = "The controller accepts this only in Init or Error.\n\n\
+    /// Declare all joints present
+    #[command(after_help = "The controller accepts this command only in Init or Error.\n\n\
         Examples:\n  \
         jtc bench present")]
     Present {

@@ -13,10 +13,12 @@ pub(crate) enum LogCommand {
     #[command(
         after_help = "The report shows the first error, and the events before and after this error.\n\n\
             The flight recorder records every tick, and stops 0.3 s after the first error. The log survives \
-            a reset and stays until `jtc log clear`. Clearing errors does not clear the log. You can read \
-            the log while the arm moves, but the recording pauses meanwhile.\n\n\
-            The command replays the ticks with the program of the controller and with its present arm. If \
-            the controller recorded the log with another arm, name the file of that arm with --arm.\n\n\
+            a reset, and stays in the controller until `jtc log clear`. Clearing errors does not clear the \
+            log. You can read the log while the arm moves, but the flight recorder pauses while you \
+            read.\n\n\
+            The command replays the ticks with the program of the controller and with the present arm of the \
+            controller. If the controller recorded the log with another arm, name the file of that arm with \
+            --arm.\n\n\
             -o writes a recording that Foxglove and PlotJuggler can plot. The file also contains the log, for \
             `jtc log replay`.\n\n\
             Examples:\n  \

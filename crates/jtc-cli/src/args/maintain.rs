@@ -29,7 +29,7 @@ pub(crate) struct ClearArgs {
 /// Options of `jtc reset`.
 #[derive(Args, Debug)]
 pub(crate) struct ResetArgs {
-    /// Reset these joints, counted from 1, as 2 or 1,3
+    /// Reset these joints, counted from 1, for example 2 or 1,3
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub joints: Vec<u8>,
     /// Reset the gripper
@@ -86,7 +86,7 @@ pub(crate) struct RecoverArgs {
 pub(crate) struct JogArgs {
     /// Joint, counted from 1 (1 to 6).
     ///
-    /// Without a joint, you jog with keys on the terminal
+    /// Without a joint number, you jog with the keys of the terminal
     #[arg(value_name = "JOINT", value_parser = clap::value_parser!(u8).range(1..=6), requires = "rate")]
     pub joint: Option<u8>,
     /// Velocity, rad/s

@@ -7,16 +7,17 @@ use clap::{Args, Subcommand};
 use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
 /// Help text of `jtc run` and `jtc traj run`.
-pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of the speed in the file. The \
-    speed of an approach is --speed percent of the limits, but at most 50 %. Without --speed, the approach \
-    runs at 10 % of the limits, and at 25 % in a simulator.\n\n\
+pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of the speed in the file. An \
+    approach runs at --speed percent of the limits, but at most at 50 %. Without --speed, the approach runs \
+    at 10 % of the limits, or at 25 % in a simulator.\n\n\
     On a terminal, press space to pause and resume, and s to stop. Press + and - to change the speed if the \
     controller has extensions. Ctrl-C stops the arm on its path, then ends the command. A second Ctrl-C ends \
     the command at once.\n\n\
-    The command opens output files before anything moves, and writes a recording while the arm moves. If the \
-    program is killed, the recording can lack the last 0.2 s. If the recording cannot be written before the \
-    motion starts, nothing moves. If writing fails during the motion (full disk), the command reports this \
-    at once. The motion continues unchanged, and the command ends with exit code 5.\n\n\
+    The command opens its output files before the arm moves, and writes the recording while the arm moves. \
+    If the program is killed, the last 0.2 s can be missing from the recording. If the command cannot write \
+    the recording before the motion starts, the arm does not move. If the command cannot write the recording \
+    during the motion (full disk), it reports the failure at once. The motion continues unchanged, and the \
+    command ends with exit code 5.\n\n\
     Examples:\n  \
     jtc run motion.csv --approach\n  \
     jtc traj run motion.csv --speed 10 --record run.mcap\n  \
@@ -24,10 +25,11 @@ pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of t
 
 /// Help text of `jtc stop` and `jtc traj stop`.
 pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agent or another program of this \
-    user has the port. Without --port or JTC_PORT, the command stops every arm whose port such a program \
-    has. If no such program runs, the command uses the only port found.\n\n\
-    The command ends with exit code 0 when the arm is at rest, also if nothing was moving. The command does \
-    not replace the emergency stop.\n\n\
+    user has opened the serial port. Without --port or JTC_PORT, the command stops every arm whose serial \
+    port is open in such a program. If no such program runs, the command uses the serial port that it finds, \
+    if it finds only one.\n\n\
+    The command ends with exit code 0 when the arm is at rest, even if the arm was not moving. The command \
+    does not replace the emergency stop.\n\n\
     Examples:\n  \
     jtc stop\n  \
     jtc traj stop --port /dev/ttyUSB0";
@@ -37,18 +39,18 @@ pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agen
 pub(crate) struct CheckArgs {
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
-    /// Default: the built-in arm. Before a motion, the command uses the arm of the controller instead, if the controller
-    /// has extensions
+    /// Default: the built-in arm, until the command connects to a controller with extensions. From then on, the command
+    /// uses the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Set the speed in percent of the file's speed (1 to 200).
     ///
-    /// Default: 100. With 50, the motion takes twice the time on the same path
+    /// Default: 100. With 50, the motion follows the same path in twice the time
     #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
     pub speed: Option<f64>,
     /// Read the numbers of the file as degrees.
     ///
-    /// Use this option for files that do not name their unit. A CSV header names degrees with q1_deg..q6_deg
+    /// Use this option for files that do not name their unit. In a CSV header, the columns q1_deg..q6_deg are in degrees
     #[arg(long)]
     pub deg: bool,
 }
@@ -65,9 +67,10 @@ impl CheckArgs {
 pub(crate) enum TrajCommand {
     /// Check the limits of a trajectory; nothing is sent
     #[command(
-        after_help = "The check covers the limits at and between points, and the torques by the arm model. \
-            The torque margin is the smallest share of a torque limit that the motion does not use. A margin \
-            below 10 % gives a warning.\n\n\
+        after_help = "The command checks the limits at the points and between the points. The command \
+            computes the torques with the arm model. The torque margin is the smallest share of a torque \
+            limit that the motion does not use. If the margin is below 10 %, the command prints a \
+            warning.\n\n\
             Examples:\n  \
             jtc traj check motion.csv\n  \
             jtc --json traj check motion.yaml --arm my-arm.toml\n  \
@@ -104,15 +107,16 @@ pub(crate) enum TrajCommand {
     Run(RunArgs),
     /// Run the trajectory or the measured path of a recording
     #[command(
-        after_help = "This command works like `jtc traj run`, which also accepts recordings. `jtc traj \
-            replay` refuses all other files.\n\n\
+        after_help = "This command works like `jtc traj run` with a recording, but refuses all files that \
+            are not recordings.\n\n\
             An MCAP file of `traj run` or `move` contains the whole trajectory. The command runs the whole \
-            trajectory, also if the recorded run was interrupted. `jtc traj continue` runs only the \
+            trajectory, even if the recorded run was interrupted. `jtc traj continue` runs only the \
             remainder. From other recordings, the command runs the recorded part of the last execution, \
             along the commanded path.\n\n\
-            --measured uses the positions that were measured every 40 ms, because a motion by hand has no \
-            commanded path. If the measured path exceeds the limits or ends in motion, the command plans the \
-            path again, at no higher speed. A note reports this.\n\n\
+            With --measured, the command uses the positions that were measured every 40 ms. Use --measured \
+            for a motion by hand, because such a motion has no commanded path. If the measured path exceeds \
+            the limits or does not end at rest, the command plans a new motion along the path, at the same \
+            or a lower speed. A note reports the new motion.\n\n\
             Examples:\n  \
             jtc traj replay run.mcap --approach\n  \
             jtc traj replay run.csv --speed 50 --record again.mcap\n  \
@@ -123,19 +127,21 @@ pub(crate) enum TrajCommand {
         run: RunArgs,
         /// Run the measured path.
         ///
-        /// The command uses the last motion by hand, or else the last execution
+        /// The command uses the last motion by hand in the recording. If the recording has no motion by hand, the command
+        /// uses the last execution
         #[arg(long)]
         measured: bool,
     },
     /// Continue an interrupted run
     #[command(
-        after_help = "An error, a stop or a lost link interrupts a run. The recording of the run shows the \
-            position that the arm reached. An MCAP file also contains the whole trajectory. For a CSV file, \
-            name the trajectory with --trajectory.\n\n\
-            The remainder begins at the last confirmed position. This is the last position in the recording. \
-            If the motion continued after the end of the recording, this is the later position that the \
-            controller reports. If the arm is at another position (after an error, or a restart of the \
-            controller), an approach moves it there.\n\n\
+        after_help = "An error, a stop or a lost link interrupts a run. The recording of the run contains \
+            the position that the arm reached. An MCAP file also contains the whole trajectory. For a CSV \
+            file, name the trajectory with --trajectory.\n\n\
+            The remainder of the trajectory begins at the last confirmed position. This is the last position \
+            in the recording. If the motion continued after the end of the recording, the last confirmed \
+            position is the later position that the controller reports. If the arm is at another position \
+            (after an error, or a restart of the controller), an approach moves the arm to the last \
+            confirmed position.\n\n\
             The remainder starts from rest and follows the original path. After the remainder of a run with \
             --repeat, the command runs the missing repetitions.\n\n\
             Examples:\n  \
@@ -148,11 +154,11 @@ pub(crate) enum TrajCommand {
     #[command(after_help = "Examples:\n  jtc traj pause")]
     Pause(LinkArgs),
     /// Resume a paused motion
-    #[command(after_help = "The command is refused if no motion is paused.\n\n\
+    #[command(after_help = "If no motion is paused, the command ends with an error.\n\n\
             If settings or payload changed during the pause, the remainder of the motion can exceed a limit. \
             Name the paused trajectory with --trajectory. The command then checks the remainder with the new \
             settings and payload before it sends anything. Without --trajectory, a note reports that the \
-            remainder is not checked.\n\n\
+            command does not check the remainder.\n\n\
             Examples:\n  \
             jtc traj resume\n  \
             jtc traj resume --trajectory motion.csv\n  \
@@ -198,8 +204,8 @@ pub(crate) struct RunArgs {
     pub points_per_segment: Option<usize>,
     /// Run the trajectory this number of times (1 to 100000).
     ///
-    /// The command keeps figures of the last 1000 runs and samples of the last run. A path that does not end at its
-    /// first point needs --approach
+    /// The command keeps statistics of the last 1000 runs, and the samples of the last run. If the path does not end at its
+    /// first point, you also need --approach
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
     #[command(flatten)]
@@ -211,7 +217,7 @@ pub(crate) struct RunArgs {
 pub(crate) struct ResumeArgs {
     /// Check the remainder of this trajectory before the motion.
     ///
-    /// Name the trajectory file of the run, or an MCAP recording of the run, which contains the trajectory
+    /// Name the trajectory file of the run, or an MCAP recording of the run. An MCAP recording contains the trajectory
     #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     #[command(flatten)]
@@ -233,12 +239,12 @@ pub(crate) struct ContinueArgs {
     pub trajectory: Option<PathBuf>,
     /// Set the total number of runs (1 to 100000).
     ///
-    /// The number includes finished runs. Default: the number in the recording (MCAP)
+    /// This number includes the runs that have already finished. Default: the number in the recording (MCAP)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: Option<u32>,
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
-    /// Default: the arm of the controller
+    /// Default: the arm of the controller, or the built-in arm if the controller has no extensions
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
@@ -248,10 +254,10 @@ pub(crate) struct ContinueArgs {
 /// Options of every command that executes a motion.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExecuteArgs {
-    /// Set the reaction of the motion to the loss of this program.
+    /// Set what the motion does if this program disconnects.
     ///
-    /// The motion continues, pauses or stops if this program is killed or loses its agent. This option needs an agent
-    /// (`jtc serve`)
+    /// If this program is killed or loses its connection to the agent, the motion continues, pauses or stops. This option
+    /// needs an agent (`jtc serve`)
     #[arg(long, value_name = "POLICY", value_parser = ["continue", "pause", "stop"])]
     pub when_gone: Option<String>,
     #[command(flatten)]
@@ -270,7 +276,7 @@ pub(crate) struct RunFiles {
     pub record: Option<PathBuf>,
     /// Write the report page to this .html file.
     ///
-    /// After several runs the page shows the last run
+    /// After several runs, the page shows only the last run
     #[arg(long, env = "JTC_RUN_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
@@ -282,7 +288,7 @@ pub(crate) struct RunFiles {
 pub(crate) enum TeachCommand {
     /// Start teaching, to move the arm by hand
     #[command(after_help = "During teaching, the controller compensates gravity and part of the friction, \
-        and damps the motion. The controller does not hold a position against the hand.\n\n\
+        and damps the motion. The controller does not push the arm back to an earlier position.\n\n\
         Examples:\n  \
         jtc teach on")]
     On(LinkArgs),
@@ -291,12 +297,13 @@ pub(crate) enum TeachCommand {
     Off(LinkArgs),
     /// Record a motion by hand as a trajectory, until Ctrl-C
     #[command(
-        after_help = "The command writes the file while you lead the arm. If the program is killed, the file \
-            contains the motion up to that time. If the file cannot be written (full disk), the recording \
-            ends at once, the controller holds the arm, and the exit code is 5.\n\n\
-            With --waypoints, the file contains as few positions as possible, for `jtc plan`. All other \
-            recorded positions are within --tolerance of the straight legs between the waypoints. Until the \
-            recording ends, the file contains the complete motion.\n\n\
+        after_help = "The command writes the file while you move the arm by hand. If the program is killed, \
+            the file contains the motion up to that time. If the file cannot be written (full disk), the \
+            recording ends at once, the controller holds the arm, and the exit code is 5.\n\n\
+            With --waypoints, the final file contains as few positions as possible, for `jtc plan`. All \
+            other recorded positions are within --tolerance of the straight lines between the waypoints. The \
+            command selects the waypoints when the recording ends. Before that time, the file contains all \
+            positions of the motion.\n\n\
             Examples:\n  \
             jtc teach record motion.csv\n  \
             jtc teach record motion.csv --duration 20\n  \
@@ -317,7 +324,8 @@ pub(crate) enum TeachCommand {
         waypoints: bool,
         /// Set the tolerance of the waypoints, rad (default 0.01).
         ///
-        /// This is the largest distance of a joint between the motion and the straight legs
+        /// The tolerance is the largest distance of a joint between the recorded motion and the straight lines between the
+        /// waypoints
         #[arg(long, value_name = "RAD", requires = "waypoints")]
         tolerance: Option<f64>,
     },

@@ -51,7 +51,7 @@ pub(crate) struct ExampleArgs {
     ///
     /// Without a name, or with `list`, the command lists all examples
     pub name: Option<String>,
-    /// Write to this directory (default: the current one)
+    /// Write to this directory (default: the current directory)
     #[arg(short = 'o', long = "out", env = "JTC_EXAMPLE_DIR", value_name = "DIR")]
     pub dir: Option<PathBuf>,
     #[command(flatten)]
@@ -70,7 +70,7 @@ pub(crate) struct HelpArgs {
 pub(crate) struct ReportArgs {
     /// Recording, .mcap or .csv
     pub file: PathBuf,
-    /// Write this page (default: next to the recording)
+    /// Write this report page (default: next to the recording)
     #[arg(long, env = "JTC_REPORT_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
     #[command(flatten)]

@@ -15,10 +15,11 @@ pub(crate) enum ParamsCommand {
             FricPolynomialCoeffs.csv   friction coefficients, one row per joint\n  \
             FricTableJointN.csv        friction tables, six files\n  \
             PidParamJointN.csv         gains, six files\n\n\
-            You can name several files. In a directory, the command searches for these files. The command \
-            uses files of single joints only if it has all six of them.\n\n\
-            This command does not send the limits, gravity and rotor inertia of an arm file. If they differ \
-            from the values of the controller, the command sends nothing unless you use \
+            You can name several files. If you name a directory, the command searches the directory for \
+            these files. The command uses files of single joints only if it finds the files of all six \
+            joints.\n\n\
+            This command does not send the limits, gravity and rotor inertia of an arm file. If these values \
+            differ from the values of the controller, the command sends nothing unless you use \
             --accept-device-limits.\n\n\
             Examples:\n  \
             jtc params push my-arm.toml\n  \
@@ -41,7 +42,7 @@ pub(crate) enum ParamsCommand {
     /// Show the parameters of a file or of the built-in arm
     #[command(
         after_help = "Without a file, the command shows the built-in arm. With --port, the command also \
-        shows the parameters that the controller lacks.\n\n\
+            shows which parameters are missing in the controller.\n\n\
         Examples:\n  \
         jtc params show\n  \
         jtc params show my-arm.urdf"
@@ -50,7 +51,7 @@ pub(crate) enum ParamsCommand {
         /// Files or directories
         #[arg(value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// Ask the controller at this port which parameters it lacks
+        /// Ask the controller at this port for its missing parameters
         #[arg(long, env = "JTC_PORT", value_name = "PATH")]
         port: Option<String>,
         /// Set the rate of the port, Bd
@@ -73,8 +74,8 @@ pub enum FrictionKind {
 pub(crate) struct AcceptArgs {
     /// Continue even if limits, gravity or rotor inertia differ.
     ///
-    /// The controller then uses its own values instead of those of the arm file. For a motion on a controller with
-    /// extensions, the option accepts every difference, also in masses, gains and friction
+    /// The controller then uses its own values instead of the values of the arm file. For a motion on a controller with
+    /// extensions, the option accepts every difference, including differences in masses, gains and friction
     #[arg(long)]
     pub accept_device_limits: bool,
 }

@@ -18,18 +18,18 @@ pub(crate) struct PlanArgs {
     pub out: PathBuf,
     /// Round corners within this distance, rad (0 to 0.5).
     ///
-    /// The joint that is furthest from the waypoint counts. With --deg, the distance is in degrees (0 to 28.6). With 0, the
-    /// arm stops at each waypoint
+    /// The distance is measured at the joint that is furthest from the waypoint. With --deg, the distance is in degrees (0
+    /// to 28.6). With 0, the arm stops at each waypoint
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
     /// Keep the flange on straight lines.
     ///
-    /// This applies to each leg for which the file has no value of `leg`
+    /// The option applies to each leg without a value in the column `leg`
     #[arg(long)]
     pub line: bool,
     /// Round corners of lines and arcs, m (0 to 0.5).
     ///
-    /// This is the largest distance from the waypoint. With 0, the arm stops at the waypoint
+    /// The value is the largest distance of the flange from the waypoint. With 0, the arm stops at the waypoint
     #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
     /// Set the speed in percent of the allowed speed (1 to 100)
@@ -57,7 +57,7 @@ pub(crate) struct PlanArgs {
     /// X,Y,Z is its position in the flange frame, m
     #[arg(long, value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
     pub payload: Option<jtc_core::Payload>,
-    /// Set the lowest bearing temperature of the runs, °C.
+    /// Set the lowest expected bearing temperature, °C.
     ///
     /// Cold bearings need more torque
     #[arg(long, value_name = "C", default_value_t = 20.0, allow_hyphen_values = true)]
@@ -105,14 +105,15 @@ pub(crate) struct MoveArgs {
     pub deg: bool,
     /// Set the speed in percent of the allowed speed (1 to 100).
     ///
-    /// Default: 10, and 25 in a simulator
+    /// Default: 10, or 25 in a simulator
     #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
     pub speed: Option<f64>,
     #[command(flatten)]
     pub margin: MarginArgs,
     /// Use poses, limits and masses of this arm file.
     ///
-    /// Default: the arm of the controller
+    /// Default: the arm of the controller, or the built-in arm if the controller has no extensions. A named pose needs this
+    /// option
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
@@ -124,7 +125,7 @@ pub(crate) struct MoveArgs {
 pub(crate) struct MarginArgs {
     /// Reserve torque, in percent of each limit (0 to 50).
     ///
-    /// The reserve is for masses and friction that the model does not know
+    /// The reserve is for masses and friction that the arm model does not contain
     #[arg(
         long = "margin",
         alias = "torque-margin",
@@ -181,8 +182,8 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 pub(crate) enum PoseCommand {
     /// Save the present position in the arm file
     #[command(
-        after_help = "The arm must be at rest. The command is refused during a trajectory or a jog. The \
-            other contents of the file stay unchanged, including comments.\n\n\
+        after_help = "The arm must be at rest. The command does not save a pose during a trajectory or a \
+            jog. All other contents of the file stay unchanged, including comments.\n\n\
             Examples:\n  \
             jtc pose save home --arm my-arm.toml\n  \
             jtc pose save above-table --arm my-arm.toml --overwrite"
@@ -190,7 +191,7 @@ pub(crate) enum PoseCommand {
     Save {
         /// Name of the pose.
         ///
-        /// A name is a letter, then letters, digits and the characters . _ -
+        /// A name starts with a letter, and can continue with letters, digits and the characters . _ -
         name: String,
         #[command(flatten)]
         arm: PoseArm,

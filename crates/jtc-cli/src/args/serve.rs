@@ -18,8 +18,8 @@ pub(crate) struct ServeArgs {
     pub sim: bool,
     /// Use this arm, TOML or URDF (default: the built-in arm).
     ///
-    /// With --sim, the agent simulates this arm. If the file is complete, the arm is also the stored arm of the simulated
-    /// controller. Without --sim, the agent uses this arm for a controller that cannot report its arm
+    /// With --sim, the agent simulates this arm. If the file is complete, the simulated controller also has this arm as its
+    /// stored arm. Without --sim, the agent uses this arm for a controller that cannot report its arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Listen at this address.
@@ -53,24 +53,24 @@ pub(crate) struct ServeArgs {
     pub link_with_token: bool,
     /// Append each command to this file.
     ///
-    /// A line of the file has the client, the command, the time and the result
+    /// Each line of the file contains the client, the command, the time and the result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
     /// Limit the size of the command log.
     ///
-    /// At half of this size, the agent renames the log to FILE.1
+    /// When the log reaches half of this size, the agent renames the log to FILE.1
     #[arg(long, env = "JTC_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
     /// Keep trajectories in this directory.
     ///
-    /// Each file name contains the number of the trajectory, as 7-pick.csv. Without this option, the agent keeps
+    /// Each file name contains the number of the trajectory, for example 7-pick.csv. Without this option, the agent keeps
     /// trajectories only while it runs
     #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
     pub trajectories: Option<PathBuf>,
-    /// Use TLS with this certificate chain, PEM
+    /// Use TLS with the certificate chain in this PEM file
     #[arg(long, env = "JTC_TLS_CERT", value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
-    /// Use this private key of the certificate, PEM.
+    /// Use the private key in this PEM file for the certificate.
     ///
     /// Only the owner and the group may have access to the file
     #[arg(long, env = "JTC_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
@@ -80,7 +80,7 @@ pub(crate) struct ServeArgs {
     pub record: Option<PathBuf>,
     /// Limit the size of the recordings.
     ///
-    /// The agent deletes the oldest recordings first, but only recordings that agents made in this directory
+    /// The agent deletes the oldest recordings first. The agent deletes only recordings that agents made in this directory
     #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = record_size)]
     pub record_limit: u64,
     /// Let a PLC drive the arm by Modbus TCP at this address.

@@ -71,12 +71,12 @@ pub(crate) struct DemoArgs {
 pub(crate) struct SimArgs {
     /// Make this path a symbolic link to the pseudo-terminal.
     ///
-    /// By default the command prints the name of the pseudo-terminal
+    /// By default, the command prints the name of the pseudo-terminal
     #[arg(long, env = "JTC_SERIAL", value_name = "PATH")]
     pub serial: Option<PathBuf>,
     /// Simulate this arm, TOML or URDF (default: the built-in arm).
     ///
-    /// If the file is complete, the arm is also the stored arm of the simulated controller
+    /// If the file is complete, the simulated controller also has this arm as its stored arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Attach a payload that the controller does not know.
@@ -104,7 +104,7 @@ pub(crate) struct SimArgs {
     pub store: Option<PathBuf>,
     /// Set the rate of the simulated line, Bd (300 to 15000000).
     ///
-    /// The line needs as much time per byte as a real line
+    /// The simulated line takes as much time per byte as a real serial line
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200,
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
     pub baud: u32,
@@ -116,7 +116,7 @@ pub(crate) struct SimArgs {
     pub speed: SimSpeed,
     /// Set the seed of random numbers.
     ///
-    /// Equal seeds give equal bytes
+    /// Simulations with the same seed produce the same bytes
     #[arg(long, env = "JTC_SEED", value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Inject the faults of this TOML file.
@@ -131,7 +131,7 @@ pub(crate) struct SimArgs {
     pub bus: Option<String>,
     /// Record every millisecond from power-up, .mcap or .csv.
     ///
-    /// The recording has commanded and measured positions, velocities, torques and states
+    /// The recording contains commanded and measured positions, velocities, torques and states
     #[arg(long, env = "JTC_SIM_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]

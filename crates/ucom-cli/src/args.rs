@@ -47,7 +47,7 @@ pub(crate) use variables::VARIABLES;
 pub(crate) struct Cli {
     /// Print JSON instead of text.
     ///
-    /// A stream has one object per line
+    /// A command with continuous output, such as `ucom so`, prints one object per line
     #[arg(long, global = true, env = "UCOM_JSON", value_parser = on_off, help_heading = "Common")]
     pub json: bool,
     #[command(flatten)]
@@ -60,7 +60,7 @@ pub(crate) struct Cli {
 /// Options that select the bus and the profile of its boards.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct LinkArgs {
-    /// Use this bus, as socketcan:can0.
+    /// Use this bus, for example socketcan:can0.
     ///
     /// Another example is socketcand:127.0.0.1:29536/can0
     #[arg(long, global = true, env = "UCOM_BUS", value_name = "URL", help_heading = "Common")]
@@ -73,8 +73,8 @@ pub(crate) struct LinkArgs {
     pub profile: Option<PathBuf>,
     /// Use this signal table, TOML.
     ///
-    /// The table has type, scale and unit of inputs, outputs and parameters (see `ucom help edges`). Default:
-    /// ucom-edges.toml, if it exists
+    /// The table contains type, scale and unit of inputs, outputs and parameters (see `ucom help edges`). Default:
+    /// ucom-edges.toml, if this file exists
     #[arg(long, global = true, env = "UCOM_EDGES", value_name = "FILE", help_heading = "Common")]
     pub edges: Option<PathBuf>,
 }
@@ -109,7 +109,7 @@ pub(crate) enum Command {
             files.")]
     Sim(SimArgs),
     /// List the boards on the bus, without changing them
-    #[command(after_help = "The command sends only requests that change nothing.\n\n\
+    #[command(after_help = "The command sends only requests that do not change the boards.\n\n\
         Examples:\n  \
         ucom scan\n  \
         ucom --json scan | jq '.boards | length'")]
@@ -119,8 +119,8 @@ pub(crate) enum Command {
         Examples:\n  \
         ucom init\n  \
         ucom init --inventory head.toml\n\n\
-        If the inventory already exists, the command compares the boards with it. A board at another \
-        position is an error.")]
+        If the inventory already exists, the command compares the boards with it. If a board is at another \
+        position than in the inventory, the command reports an error.")]
     Init(InitArgs),
     /// Show the information that boards report
     #[command(after_help = "Examples:\n  ucom info\n  ucom info 3\n  ucom --json info 1-4")]
@@ -133,10 +133,10 @@ pub(crate) enum Command {
         ucom status 1 --raw 00:40\n\n\
         The bits are MSTART ASTART MCARUN EXLRUN INIT PROG OPINIT IPINIT. MCARUN, EXLRUN and IPINIT cannot be \
         set.\n\n\
-        --raw sends one PC_SETSTATUS unchanged: new = (old & ~MASK) | VALUE. Value bits outside the mask are \
-        therefore set too. The command does not repeat the frame, and `all` is one broadcast frame. The \
-        command shows the expected result and the actual result. If they differ, the exit code is 1. Running \
-        boards need --force.")]
+        --raw sends one PC_SETSTATUS unchanged: new = (old & ~MASK) | VALUE. Therefore, the board also sets \
+        the bits of VALUE that are outside MASK. The command does not repeat the frame, and `all` is one \
+        broadcast frame. The command shows the expected result and the actual result. If the two results \
+        differ, the exit code is 1. For running boards, you must use --force.")]
     Status(StatusArgs),
     /// Reset boards; outputs become safe, and numbers are lost
     #[command(
@@ -170,28 +170,32 @@ pub(crate) enum Command {
             ucom update 3 app.hex --exloader loader.hex\n  \
             ucom update 3 program.hex --data data.hex\n  \
             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
-            Image formats are raw binary, Intel HEX and Motorola S-record. The command recognises them by their \
-            content. The command detects the unit of the addresses (bytes or words) if the records follow \
-            each other without gaps in only one unit. --addresses sets this unit. `prog.plan` of the profile \
-            decides if the command sends two files (see `ucom help profile`).\n\n\
-            `all` means the boards that answer and the boards of the inventory. The command reports a \
+            Image formats are raw binary, Intel HEX and Motorola S-record. The command recognises Intel HEX \
+            and S-records from the content of the file. Raw binary needs a .bin file, or --raw. The addresses \
+            in records count bytes or words. If the records follow each other without gaps in only one of \
+            these units, the command uses this unit. --addresses sets the unit. The key `prog.plan` of the \
+            profile determines whether the command sends two files (see `ucom help profile`).\n\n\
+            `all` means the boards that answer and the boards of the inventory. The command reports each \
             missing board.\n\n\
-            A board shows only its Program ID and date, not its load address or other memories. A board is \
-            up to date only if the inventory also says that an update wrote the same bytes to the same \
-            address. The date may differ unless you use --date.\n\n\
-            Without such an entry, the board is program-up-to-date: the command sends nothing and verifies \
-            nothing. --rewrite writes the image, and --unverified accepts this state. With --data, \
-            --exloader or --second, the command always writes the image.\n\n\
+            A board reports only its Program ID and flash date. A board does not report its load address or \
+            the contents of other memories. A board is up to date only if the inventory also records that an \
+            update wrote the same bytes to the same address. The flash date may differ unless you use \
+            --date.\n\n\
+            If the board reports this program, but the inventory has no valid record of an update, the board \
+            is program-up-to-date. The command then sends nothing and verifies nothing. With --rewrite, the \
+            command writes the image. With --unverified, the command accepts this state. If the inventory \
+            records other bytes or another address, the command writes the image. With --data, --exloader or \
+            --second, the command always writes the image.\n\n\
             Exit codes:\n  \
             0  verified, already up to date, or accepted by --unverified\n  \
             1  the board reported an error before anything was erased\n  \
             3  no answer\n  \
             4  refused, program-up-to-date, or cancelled before anything was erased\n  \
             5  failed or cancelled after something was erased, or written but not verified\n\n\
-            An image is written but not verified if the profile leaves nothing to verify. A bus failure \
-            gives exit code 3 before something was erased, and exit code 5 afterwards.\n\n\
-            The report has the outcome of each board: not-started, cancelled, up-to-date, program-up-to-date, \
-            incomplete, unknown, written, verified or running."
+            If the profile leaves nothing to verify, the image is written but not verified. If the bus \
+            fails, the exit code is 3 before something was erased, and 5 afterwards.\n\n\
+            The report contains the outcome of each board: not-started, cancelled, up-to-date, \
+            program-up-to-date, incomplete, unknown, written, verified or running."
     )]
     Update(UpdateArgs),
     /// Restore the number of one board that no longer answers
@@ -199,8 +203,9 @@ pub(crate) enum Command {
         Examples:\n  \
         ucom repair 3\n  \
         ucom repair 3 --flash-id 0x63\n\n\
-        Meanwhile, the command sets the pins of all other boards low, so that no other board can take the \
-        number. The board must have the flash number from --flash-id or from the inventory.\n\n\
+        During the repair, the command switches off the outgoing init pins of all other boards, except the \
+        pin of the board directly before the repaired board. Therefore, no other board can take the number. \
+        The board must have the flash number from --flash-id or from the inventory.\n\n\
         Exit codes:\n  \
         0  done\n  \
         2  the flash number of the board is not known\n  \
@@ -222,8 +227,8 @@ pub(crate) enum Command {
             ucom ci 1\n  \
             ucom ci 1 set_position=1500\n  \
             ucom ci 1 set_position=1500 --for 3\n\n\
-            With --for, the board runs under supervision for this time, and moves. `ucom run` has more \
-            options.")]
+            With --for, the command starts the board and supervises it for this time. The board moves. `ucom \
+            run` has more options.")]
     Ci(CiArgs),
     /// Show the names of parameters, or set parameters by name
     #[command(after_help = "Examples:\n  \
@@ -250,9 +255,9 @@ pub(crate) enum Command {
             ucom run all --params head.yaml --active\n\n\
             The command accepts these lines on stdin: `ci 1 set_position=-500`, `par 1 kp=80`, `active on`, \
             `active off`, `stop`.\n\n\
-            Ctrl-C stops control, then applications, in reverse order. If no board remains in its control \
-            loop, the run ends after 3 s with exit code 5. With --on-lost report, the run does not end while \
-            a board is lost.")]
+            Ctrl-C stops all control loops at once, and then the applications in reverse order of the \
+            boards. If no board remains in its control loop, the run ends after 3 s with exit code 5. With \
+            --on-lost report, the run does not end while a board is lost.")]
     Run(RunArgs),
     /// Share the bus among many clients by HTTP
     #[command(after_help = "Only one client at a time can move or change boards. Every client can stop the \
@@ -262,8 +267,8 @@ pub(crate) enum Command {
         ucom serve --sim --boards 3\n  \
         curl http://127.0.0.1:8781/api/boards\n  \
         curl -X POST http://127.0.0.1:8781/api/stop\n\n\
-        The other commands of `ucom` do not use the agent. On the bus of an agent, they report the agent as \
-        a competing master.\n\n\
+        The other commands of `ucom` do not use the agent. If these commands use the bus of an agent, they \
+        report the agent as a competing master.\n\n\
         Ctrl-C stops everything that the agent has started.\n\n\
         Exit codes:\n  \
         0  ended\n  \
@@ -275,8 +280,9 @@ pub(crate) enum Command {
         Examples:\n  \
         ucom monitor\n  \
         ucom --json monitor --count 5\n\n\
-        Press s to stop the control loops of all boards, r to ask the boards again, and q to quit. Arrows, \
-        PageUp, PageDown, Home and End scroll. The terminal needs 40 columns and 12 rows.\n\n\
+        Press s to stop the control loops of all boards, r to ask the boards again, and q to quit. The arrow \
+        keys, PageUp, PageDown, Home and End scroll the view. The terminal needs at least 40 columns and 12 \
+        rows.\n\n\
         On a narrow terminal, the view shows status bits as letters, and a dot for a bit that is not set. \
         Wider terminals show the names of the bits. The letters are:\n  \
         M MSTART, A ASTART, R MCARUN, X EXLRUN, I INIT, P PROG, o OPINIT, i IPINIT")]
@@ -320,15 +326,15 @@ pub(crate) enum Command {
             ucom conformance 1 --run\n  \
             ucom conformance 1 --flash-id 0x21 --program firmware.hex\n  \
             ucom --json conformance all --init --only D-T1,D-T4\n\n\
-            Without options, the command sends only requests that change nothing, and does not disturb \
-            running applications. Each test is an acceptance test of the project. A test shows the frames \
-            that it sent, the expected result and the actual result.\n\n\
-            With --init, --run and --program, the command restores the boards afterwards, also after Ctrl-C \
+            Without options, the command sends only requests that do not change the boards, and does not \
+            disturb running applications. Each test is an acceptance test of the project. A test shows the \
+            frames that it sent, the expected result and the actual result.\n\n\
+            With --init, --run or --program, the command restores the boards afterwards, even after Ctrl-C \
             or an error. The command restores numbers, ASTART and applications (with the parameters of a \
             start). --run takes about 80 s per board.\n\n\
             Exit codes:\n  \
             0  all tests passed or were skipped\n  \
-            1  some tests failed, or a board is not restored\n  \
+            1  some tests failed, or a board was not restored\n  \
             3  a board does not answer\n  \
             4  refused\n  \
             5  cancelled")]
@@ -342,7 +348,8 @@ pub(crate) enum Command {
     )]
     Explain(ExplainArgs),
     /// Write a DBC file for other CAN tools
-    #[command(after_help = "The file has the names of inputs, outputs and parameters of the boards.\n\n\
+    #[command(after_help = "The file contains the names of inputs, outputs and parameters of the \
+        boards.\n\n\
             Examples:\n  \
             ucom dbc --out chain.dbc\n  \
             ucom dbc 1-4 > chain.dbc\n  \

@@ -30,7 +30,8 @@ pub(crate) struct UpdateArgs {
     pub image: PathBuf,
     /// Read files of any name as raw bytes.
     ///
-    /// The command never reads records as raw bytes, and reads text as raw bytes only from a .bin file
+    /// Even with this option, the command never reads Intel HEX or S-records as raw bytes. The command reads text as raw
+    /// bytes only from a .bin file
     #[arg(long)]
     pub raw: bool,
     /// Set the unit of the addresses in Intel HEX and S-records.
@@ -61,24 +62,24 @@ pub(crate) struct UpdateArgs {
     /// Then no other board accepts the image
     #[arg(long, conflicts_with = "group")]
     pub name_target: bool,
-    /// Program the named boards by one broadcast transfer.
+    /// Program the named boards with one broadcast transfer.
     ///
     /// Without this option, the command programs one board after the other
     #[arg(long)]
     pub group: bool,
     /// Send this exloader for RAM.
     ///
-    /// The profile must have `prog.plan` exloader-app
+    /// The profile must set `prog.plan` to exloader-app
     #[arg(long, value_name = "FILE")]
     pub exloader: Option<PathBuf>,
     /// Write this image of data memory.
     ///
-    /// The profile must have `prog.plan` pmem-xmem
+    /// The profile must set `prog.plan` to pmem-xmem
     #[arg(long, value_name = "FILE")]
     pub data: Option<PathBuf>,
     /// Send this file in the second cycle (default: IMAGE again).
     ///
-    /// The profile must have `prog.plan` raw
+    /// The profile must set `prog.plan` to raw
     #[arg(long, value_name = "FILE")]
     pub second: Option<PathBuf>,
     /// Require this Program ID at the end.
@@ -88,7 +89,7 @@ pub(crate) struct UpdateArgs {
     pub expect_program_id: Option<u16>,
     /// Accept an update that cannot be verified.
     ///
-    /// The exit code is then 0 for `program-up-to-date`, and for a profile that leaves nothing to compare
+    /// The exit code is then 0 for `program-up-to-date`, and for a profile that leaves nothing to verify
     #[arg(long)]
     pub unverified: bool,
     /// Write even if the board already shows this program.
@@ -96,9 +97,9 @@ pub(crate) struct UpdateArgs {
     /// The option does not skip any check
     #[arg(long)]
     pub rewrite: bool,
-    /// Read the flash numbers from this inventory of `ucom init`.
+    /// Read the flash numbers from this inventory file.
     ///
-    /// Each update records the written image in this file
+    /// `ucom init` writes this file. Each update records the written image in it
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]
@@ -116,7 +117,9 @@ pub(crate) struct RepairArgs {
     /// Default: the flash number in the inventory
     #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
-    /// Read the flash numbers from this inventory of `ucom init`
+    /// Read the flash numbers from this inventory file.
+    ///
+    /// `ucom init` writes this file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]

@@ -17,10 +17,10 @@ pub(crate) struct SimArgs {
     /// Default: the boards of the chain file
     #[arg(long, env = "UCOM_BOARDS", value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub boards: Option<u8>,
-    /// Set the flash numbers along the chain, as 0x21,0x42
+    /// Set flash numbers along the chain, for example 0x21,0x42
     #[arg(long, env = "UCOM_FLASH_IDS", value_name = "LIST", value_delimiter = ',', value_parser = flash_id)]
     pub flash_ids: Vec<u16>,
-    /// Listen here for clients of the socketcand protocol.
+    /// Listen at this address for socketcand clients.
     ///
     /// With port 0, the simulator selects a free port
     #[arg(long, env = "UCOM_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:29536")]
@@ -43,7 +43,7 @@ pub(crate) struct SimArgs {
 /// Options of `ucom init`.
 #[derive(Args, Debug)]
 pub(crate) struct InitArgs {
-    /// Write this inventory; compare with it if it exists
+    /// Write this inventory; if it exists, first compare with it
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Write a new inventory without comparing it to the old one.
@@ -69,7 +69,7 @@ pub(crate) struct StatusArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Set these bits, as ASTART,OPINIT
+    /// Set these bits, for example ASTART,OPINIT
     #[arg(long, value_name = "BITS", value_parser = bits)]
     pub set: Option<ucom::Status>,
     /// Clear these bits
@@ -123,7 +123,7 @@ pub(crate) struct IoArgs {
     pub boards: Boards,
     /// Write a template of a signal table to this TOML file.
     ///
-    /// The template has all names. With -, the command writes to stdout
+    /// The template contains all names. With -, the command writes to stdout
     #[arg(long, env = "UCOM_TEMPLATE", value_name = "FILE")]
     pub template: Option<PathBuf>,
     #[command(flatten)]
@@ -138,10 +138,10 @@ pub(crate) struct IoArgs {
 /// Options of the cache of descriptions.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CacheArgs {
-    /// Ask the board even if its descriptions are known
+    /// Ask the boards even if the cache has their descriptions
     #[arg(long, env = "UCOM_FRESH", value_parser = on_off)]
     pub fresh: bool,
-    /// Keep known descriptions in this directory.
+    /// Keep the cache of descriptions in this directory.
     ///
     /// Default: ucom in the user's cache directory
     #[arg(long, env = "UCOM_CACHE", value_name = "DIR")]
@@ -185,10 +185,10 @@ pub(crate) struct ParArgs {
     pub values: Vec<Assignment>,
     /// Write a parameter file, YAML; - writes to stdout.
     ///
-    /// The file has the values that this tool wrote last, and all other names as comments
+    /// The file contains the values that this tool wrote last, and all other names as comments
     #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
     pub save: Option<PathBuf>,
-    /// Write the parameters of this parameter file.
+    /// Write the parameters of this file to the boards.
     ///
     /// The command first checks the file against the boards
     #[arg(long, value_name = "FILE")]
@@ -196,7 +196,7 @@ pub(crate) struct ParArgs {
     /// Check everything with --apply, but write nothing
     #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
-    /// Read the names of the boards from this inventory
+    /// Read the names of the boards from this inventory file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]
@@ -254,7 +254,7 @@ pub(crate) struct RunArgs {
     /// `ucom help params` shows the format
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
-    /// Read the names of the boards from this inventory
+    /// Read the names of the boards from this inventory file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Set the action for a lost board.
@@ -341,7 +341,7 @@ pub(crate) struct SendArgs {
 pub(crate) struct DecodeArgs {
     /// Recording, or - for stdin.
     ///
-    /// On stdin the command reads a candump log or bare frames
+    /// On stdin, the command reads a candump log, or frames without time and bus, such as 141#2100
     #[arg(default_value = "-")]
     pub file: PathBuf,
     /// Decode the live bus instead
@@ -368,7 +368,7 @@ pub(crate) struct ProbeArgs {
     /// The outputs stay safe
     #[arg(long)]
     pub alive: bool,
-    /// Find the checksum of Program IDs with this image.
+    /// Find the checksum algorithm of Program IDs with this image.
     ///
     /// A board must have this image in its flash
     #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
@@ -405,15 +405,17 @@ pub(crate) struct ConformanceArgs {
     /// Default: the flash number in the inventory
     #[arg(long, value_name = "ID", value_parser = super::boards::flash_id)]
     pub flash_id: Option<u16>,
-    /// Read the flash numbers from this inventory of `ucom init`
+    /// Read the flash numbers from this inventory file.
+    ///
+    /// `ucom init` writes this file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// Run only these tests, as D-T10,D-T11
+    /// Run only these tests, for example D-T10,D-T11
     #[arg(long, value_name = "TESTS", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Test even if another PC is on the bus.
     ///
-    /// Running boards are never tested with --init, --run or --program
+    /// Even with --force, the command does not test running boards with --init, --run or --program
     #[arg(long)]
     pub force: bool,
 }

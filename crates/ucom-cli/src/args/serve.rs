@@ -27,7 +27,7 @@ pub(crate) struct ServeArgs {
     pub listen: SocketAddr,
     /// Keep the tokens of the agent in this TOML file.
     ///
-    /// The agent creates a missing file. Default: openjtc/ucom-tokens.toml in $XDG_STATE_HOME or
+    /// If the file does not exist, the agent creates it. Default: openjtc/ucom-tokens.toml in $XDG_STATE_HOME or
     /// ~/.local/state
     #[arg(long, env = "UCOM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
@@ -44,23 +44,23 @@ pub(crate) struct ServeArgs {
     pub link_with_token: bool,
     /// Append each command to this file.
     ///
-    /// A line of the file has the client, the command, the time and the result
+    /// Each line of the file contains the client, the command, the time and the result
     #[arg(long, env = "UCOM_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
-    /// Read the flash numbers from this inventory of `ucom init`.
+    /// Read the flash numbers from this inventory file.
     ///
-    /// Each update records the written image in this file
+    /// `ucom init` writes this file. Each update records the written image in it
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Limit the size of the command log.
     ///
-    /// At half of this size, the agent renames the log to FILE.1
+    /// When the log reaches half of this size, the agent renames the log to FILE.1
     #[arg(long, env = "UCOM_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
-    /// Use TLS with this certificate chain, PEM
+    /// Use TLS with the certificate chain in this PEM file
     #[arg(long, env = "UCOM_TLS_CERT", value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
-    /// Use this private key of the certificate, PEM.
+    /// Use the private key in this PEM file for the certificate.
     ///
     /// Only the owner and the group may have access to the file
     #[arg(long, env = "UCOM_TLS_KEY", value_name = "FILE", requires = "tls_cert")]

@@ -25,36 +25,55 @@ use live::{Live, Speed};
 use log::DefmtLog;
 use pty::Pty;
 
-/// Boots the firmware of the controller board in an emulator, with simulated drives and arm on the joint bus and one of its
-/// serial ports on a pseudo-terminal: `JTC_PORT=PATH jtc status` and all other commands work with it.
+/// Emulate the controller board with simulated drives and arm.
+///
+/// The program boots the firmware of the controller board in an emulator. The drives and the arm on the joint bus are
+/// simulated. A pseudo-terminal is connected to one serial port of the board: `JTC_PORT=PATH jtc status` and all other
+/// commands of `jtc` work with this pseudo-terminal.
 #[derive(Parser)]
 #[command(version)]
 struct Args {
-    /// The firmware, as `cargo build --release` in firmware/ makes it.
+    /// Firmware of the board, an ELF file.
+    ///
+    /// `cargo build --release` in firmware/ builds this file
     elf: PathBuf,
-    /// Symbolic link that names the pseudo-terminal; without it the name of the terminal itself is printed.
+    /// Make this path a symbolic link to the pseudo-terminal.
+    ///
+    /// By default, the program prints the name of the pseudo-terminal
     #[arg(long, value_name = "PATH")]
     serial: Option<PathBuf>,
-    /// Serial port of the board: 2 or 3 (that of the ST-LINK).
+    /// Use this serial port of the board, 2 or 3 (ST-LINK).
+    ///
+    /// USART3 is the serial port that the ST-LINK of the board connects to USB
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(2..=3))]
     usart: u8,
-    /// Rate of the host's side of the line, bit/s; without it always that of the firmware.
+    /// Set the bit rate of the host, bit/s.
+    ///
+    /// By default, the host always has the same bit rate as the firmware
     #[arg(long, value_name = "BD")]
     baud: Option<u32>,
-    /// Virtual time follows the clock, or runs as fast as it can.
+    /// Set the speed of virtual time.
+    ///
+    /// `realtime` follows the clock of this computer, and `max` runs as fast as this computer can
     #[arg(long, value_name = "SPEED", default_value = "realtime")]
     speed: SpeedArg,
-    /// Seed of the arm's deviations and of what RAM holds at first.
+    /// Set the seed of random numbers.
+    ///
+    /// The seed determines the deviations of the simulated arm, and the contents of the RAM at power-up
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The arm that is on the bus, as an arm file; without it the default one.
+    /// Simulate the arm of this file (default: the built-in arm)
     #[arg(long, value_name = "FILE")]
     arm: Option<PathBuf>,
-    /// File that bank 2 of the flash is kept in, where the stored arm is: read at the start when it is there, written at the
-    /// end, as if the power had gone then.
+    /// Keep bank 2 of the flash in this file.
+    ///
+    /// Bank 2 contains the stored arm. If the file exists, the program reads it at the start. At the end, the program writes
+    /// the contents of bank 2 to the file, as after a power failure at that time
     #[arg(long, value_name = "FILE")]
     bank2: Option<PathBuf>,
-    /// Print the firmware's defmt log on stderr; needs the program defmt-print.
+    /// Print the defmt log of the firmware to stderr.
+    ///
+    /// This option needs the program `defmt-print`
     #[arg(long)]
     defmt: bool,
 }

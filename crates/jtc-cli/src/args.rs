@@ -172,25 +172,21 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  jtc status\n  jtc --json status | jq .joints[0].position_rad")]
     Status(LinkArgs),
     /// Show firmware, arm, missing parameters and boot cause
-    #[command(
-        after_help = "The hash covers all parameters that determine how the arm moves: model, gains, \
+    #[command(after_help = "The hash covers all parameters that determine how the arm moves: model, gains, \
             friction and settings. If the controller has no extensions, the command shows only the values of \
             its status.\n\n\
             Examples:\n  \
             jtc info\n  \
-            jtc --json info | jq -r .hash"
-    )]
+            jtc --json info | jq -r .hash")]
     Info(LinkArgs),
     /// Show a live view of the controller and the joints
-    #[command(
-        after_help = "The terminal needs at least 40 columns and 12 rows. At the top, the view shows \
+    #[command(after_help = "The terminal needs at least 40 columns and 12 rows. At the top, the view shows \
             problems and the command to use next.\n\n\
             Press s to stop a motion on its path, and q to quit. The arrow keys, PageUp, PageDown, Home and \
             End scroll the view.\n\n\
             Examples:\n  \
             jtc monitor\n  \
-            jtc --json monitor --count 100 > statuses.jsonl"
-    )]
+            jtc --json monitor --count 100 > statuses.jsonl")]
     Monitor(MonitorArgs),
     /// Import, check, show and transfer arm files
     #[command(subcommand)]

@@ -376,16 +376,30 @@ mod tests {
                 leases.admit("b", ("bob", s(5), ()), true, s(0)).expect("he may wait");
                 leases.command(Some("a"), s(30)).expect("she commands");
                 leases.lapse(s(let_go - 1));
-                let had = leases.clients.contains_key("b");
+                // A waiting client that is silent for the duration of its own lease does not receive the lease.
+                let had = let_go < 5;
                 leases.release("a", s(let_go));
                 assert_eq!(leases.lapse(s(let_go + 4)), None);
                 assert_eq!(leases.lease().map(|lease| lease.holder), had.then(|| "bob".into()), "{let_go}");
                 let lapsed = leases.lapse(s(looked)).map(|client| client.name);
                 assert_eq!(lapsed, had.then(|| "bob".into()), "{let_go}");
                 // The former lease holder may take the lease again, like every other client.
-                assert!(looked > let_go + 5 || leases.command(Some("b"), s(looked)).is_ok() == had);
+                let known = leases.clients.contains_key("b");
+                assert!(looked > let_go + 5 || known || !had, "{let_go}");
+                assert_eq!(leases.command(Some("b"), s(looked)).is_ok(), known, "{let_go}");
             }
         }
+    }
+
+    /// A refused command shows that the waiting client is still present, so the client receives the lease later.
+    #[test]
+    fn a_waiting_client_that_sends_requests_receives_the_lease() {
+        let mut leases = Leases::default();
+        leases.admit("a", ("anna", s(60), ()), false, s(0)).expect("nobody has it");
+        leases.admit("b", ("bob", s(5), ()), true, s(0)).expect("he may wait");
+        assert!(leases.command(Some("b"), s(28)).is_err());
+        leases.release("a", s(30));
+        assert_eq!(leases.lease().map(|lease| lease.holder), Some("bob".into()));
     }
 
     #[test]

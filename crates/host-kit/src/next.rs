@@ -145,6 +145,8 @@ actions! {
     BoardStatus: "ucom status {number}", "GET /api/boards/{number}", "ucom status {number}";
     /// Start the application of a board.
     BoardStart: "ucom start {number}", "Start (POST /api/boards/{number}/start)", "ucom start {number}";
+    /// Start the control loop of a board.
+    BoardRun: "ucom run {number}", "Run (POST /api/run)", "ucom run {number}";
     /// End the application of a board.
     BoardStop: "ucom stop {number}", "Stop application (POST /api/boards/{number}/stop)", "ucom stop {number}";
     /// Write an image to a board.
@@ -261,6 +263,8 @@ impl Next {
             Part::Action { action, boards, .. } => {
                 let name = action.name(front_end);
                 let name = match (boards, front_end) {
+                    // A request names one board.
+                    (Some(boards), FrontEnd::Agent) if boards.contains(',') => name.into(),
                     (Some(boards), _) => Cow::from(name.replace(NUMBER, boards)),
                     (None, FrontEnd::Agent) => name.into(),
                     (None, _) => name.replace(NUMBER, "N").into(),
@@ -346,7 +350,9 @@ mod tests {
         let start = start.of_board(2);
         assert_eq!(start.to_string(), "`ucom start 2` first");
         assert_eq!(start.plain(FrontEnd::Agent), "Start (POST /api/boards/2/start) first");
-        assert_eq!(Next::from(Action::BoardStop).of_boards(&[1, 3]).to_string(), "`ucom stop 1,3`");
+        let stop = Next::from(Action::BoardStop).of_boards(&[1, 3]);
+        assert_eq!(stop.to_string(), "`ucom stop 1,3`");
+        assert_eq!(stop.plain(FrontEnd::Agent), "Stop application (POST /api/boards/{number}/stop)");
         let block = Next::from(Action::TeachOff).sentence(FrontEnd::Python);
         assert_eq!(block, "end the block `with robot.teach():`");
     }

@@ -31,7 +31,7 @@ fn the_bus_off_controller_is_named() {
     sim.fault("disturbed share=1 for_s=60");
     let output = sim.ucom(&["info", "1"]).ends(3);
     assert!(output.err.contains("the CAN controller of this computer is bus-off"), "{}", output.err);
-    assert!(output.err.contains("next: check the bus with ucom doctor"), "{}", output.err);
+    assert!(output.err.contains("next: check the bus with `ucom doctor`"), "{}", output.err);
     let output = sim.json(&["info", "1"], 3);
     assert!(output["error"]["message"].as_str().unwrap().contains("was bus-off meanwhile"), "{output}");
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom doctor"), "{output}");

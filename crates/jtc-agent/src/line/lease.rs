@@ -181,8 +181,8 @@ impl SharedLine {
 
     /// Records that the client is active at `now`, and renews the lease if the client holds it.
     pub fn renew(&mut self, id: ClientId, now: Duration) {
-        self.end_lapsed(now);
         self.show(id, now);
+        self.end_lapsed(now);
         let lasts = self.presence(id).and_then(|client| client.lasts);
         if let Some(lease) = self.lease.as_mut().filter(|lease| lease.holder == id) {
             lease.renew(lasts, now);

@@ -113,15 +113,16 @@ fn record(
             }
         }
     });
-    if let Err(Error::State(StateError::TeachingEnded { .. })) = &recorded {
-        // The controller holds the arm, and the user can release it.
+    if let Err(Error::State(StateError::TeachingEnded { .. } | StateError::TeachingFault { .. })) = &recorded
+    {
+        // The controller does not let the user guide the arm any longer.
         teaching.store(false, Ordering::Relaxed);
     }
     // The command completes the recording first, even if the link is lost.
     let written = lost.map_or_else(|| finish(taught, thin, out), Err);
     recorded.map_err(still_teaching)?;
     if !was_on {
-        session.teach(false)?;
+        session.teach(false).map_err(still_teaching)?;
         teaching.store(false, Ordering::Relaxed);
     }
     written

@@ -18,6 +18,9 @@ use crate::sample::{JointSample, Sample};
 pub struct Event {
     /// Number of ticks since the start of the device.
     pub tick: u64,
+    /// Number of the start of the device.
+    #[serde(skip)]
+    pub boots: u32,
     /// Time from the start of the device to the event, s.
     pub time_s: f64,
     /// Text that describes the event.
@@ -62,7 +65,10 @@ impl Timeline {
     /// Returns the first error and all errors in the same tick, as the failure of a report.
     pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
         let first = self.events.get(self.first?)?;
-        let with = self.events.iter().filter(|event| event.error && event.tick == first.tick);
+        let with = self
+            .events
+            .iter()
+            .filter(|event| event.error && (event.boots, event.tick) == (first.boots, first.tick));
         let causes = with.map(|event| event.text.clone()).collect();
         Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
@@ -79,13 +85,16 @@ impl Timeline {
                 .collect();
         };
         let at = &self.events[first];
-        // A damaged log can contain two starts of a controller, and then the ticks are not in order.
         let mut lines = vec![format!("first: {:.3} s: {}", at.time_s, at.text)];
         for event in &self.events[first + 1..] {
-            lines.push(format!("{}: {}", after(event.tick.saturating_sub(at.tick)), event.text));
+            let delay = event.tick.checked_sub(at.tick).filter(|_| event.boots == at.boots);
+            // The delay between events of two starts is unknown.
+            let when = delay.map_or_else(|| format!("{:.3} s after a later start", event.time_s), after);
+            lines.push(format!("{when}: {}", event.text));
         }
         // The event nearest to the error is listed first. The number of listed events is limited.
-        let near = |event: &&Event| at.tick.saturating_sub(event.tick) <= BEFORE_MS;
+        let near =
+            |event: &&Event| event.boots == at.boots && at.tick.saturating_sub(event.tick) <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
             lines.push("before this error, the latest event first:".to_owned());
@@ -138,7 +147,14 @@ struct Narrator<'a> {
 impl Narrator<'_> {
     fn push(&mut self, tick: &Tick, error: bool, text: impl Into<String>) {
         let time_s = tick.tick as f64 * 1e-3;
-        self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
+        self.events.push(Event {
+            tick: tick.tick,
+            boots: tick.boots,
+            time_s,
+            text: text.into(),
+            error,
+            joints: Vec::new(),
+        });
     }
 
     /// Adds an event of a joint. If several joints have the same event in one tick, the timeline contains one event for all these joints.
@@ -146,7 +162,11 @@ impl Narrator<'_> {
         let text = text.into();
         let same =
             |event: &&mut Event| event.error == error && event.text == text && !event.joints.is_empty();
-        let now = self.events.iter_mut().rev().take_while(|event| event.tick == tick.tick);
+        let now = self
+            .events
+            .iter_mut()
+            .rev()
+            .take_while(|event| (event.boots, event.tick) == (tick.boots, tick.tick));
         if let Some(event) = now.into_iter().find(same) {
             event.joints.push(joint);
             return;
@@ -161,7 +181,8 @@ impl Narrator<'_> {
     /// often follow each other, so such frames share one event.
     fn host_sends(&mut self, tick: &Tick, kind: FrameType) {
         let before = self.sent.replace((kind, tick.tick));
-        let goes_on = before.is_some_and(|(last, at)| last == kind && tick.tick - at <= SAME_MS);
+        let goes_on =
+            before.is_some_and(|(last, at)| last == kind && tick.tick.saturating_sub(at) <= SAME_MS);
         if !goes_on {
             self.push(tick, false, format!("a host sends: {}", labels::request(kind)));
         }
@@ -182,6 +203,7 @@ impl Narrator<'_> {
 
     fn between(&mut self, last: &Tick, tick: &Tick) {
         if tick.boots != last.boots {
+            (self.silent, self.sent) = ([0; 6], None);
             self.push(tick, false, format!("start number {} of the device", tick.boots));
         } else if tick.tick > last.tick + 1 {
             let missing = tick.tick - last.tick - 1;

@@ -31,14 +31,12 @@ impl<P: Port> Session<P> {
                 return Err(StateError::TeachingFault { status: Box::new(status) }.into());
             }
             let time = self.now() - start;
-            if ended(time) {
-                break;
-            }
-            if status.state != ControllerState::Teaching {
+            if status.state == ControllerState::Teaching {
+                if sample(time, status.positions()).is_break() {
+                    break;
+                }
+            } else if !ended(time) {
                 return Err(StateError::TeachingEnded { state: status.state }.into());
-            }
-            if sample(time, status.positions()).is_break() {
-                break;
             }
         }
         Ok(())

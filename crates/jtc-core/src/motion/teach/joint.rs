@@ -240,9 +240,9 @@ impl TaughtJoint {
     }
 
     /// Returns the dry friction torque of a slow joint. The dry friction fades out between the speed at which damping balances the dry
-    /// friction and four times that speed. The joint therefore stops against any lower torque. The dry friction decreases at most half as
-    /// fast as the damping torque increases, so the torque against the motion never decreases with the speed, even with the friction
-    /// compensation.
+    /// friction and four times that speed. The joint therefore stops against any lower torque. If the speed at which damping balances the
+    /// dry friction is at most [`SLOW`], the dry friction decreases at most half as fast as the damping torque increases. The torque against
+    /// the motion then never decreases with the speed, even with the friction compensation.
     fn dry_friction(
         &mut self,
         position: f64,

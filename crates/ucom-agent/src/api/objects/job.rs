@@ -100,7 +100,7 @@ impl UpdateObject {
             attempts: result.attempts,
             time_s: result.time_us as f64 * 1e-6,
             error: result.failure.as_ref().map(|failure| {
-                Problem::new("update", failure.to_string(), failure.hint())
+                Problem::new("update", failure.to_string(), failure.diagnosis().next.of_board(result.board))
                     .kind(failure.kind())
                     .with(Facts::default().at_board(result.board))
             }),

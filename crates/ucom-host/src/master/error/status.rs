@@ -66,7 +66,7 @@ impl Diagnose for StatusError {
             Self::AdminRefused { board, .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "admin-refused",
-                next!("outputs need a running control loop: {}", BoardStart).of_board(*board),
+                next!("outputs need a running control loop: {}", BoardRun).of_board(*board),
             ),
         }
     }

@@ -180,7 +180,7 @@ impl SharedLine {
     }
 
     /// Sends a Stop or a Pause of a client before all other frames. Repeats the Stop or Pause until the controller
-    /// confirms it. Drops all frames that need the lease and of which no byte was written yet. The clients of the
+    /// confirms it. Drops all frames that need the lease, if no byte of them was written yet. The clients of the
     /// dropped frames receive a notice that `name` stopped the arm.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(client, client, name, command, now);

@@ -1,6 +1,6 @@
 //! Recorder of the motions of all clients. The recorder is itself a client of the agent, with read-only access.
 //!
-//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the serial line, and [`Recorder`] reads the statuses. One thread
+//! The type [`Prepared`] opens the directory, [`Witness`] receives the frames on the serial line, and [`Recorder`] reads the statuses. A thread
 //! reads the statuses and another thread writes the recordings. A slow disk therefore delays only the thread that writes the recordings.
 //! The two threads of the recorder do not delay the serial line. If the queue between these threads is full, samples are dropped, and the
 //! recording contains the number of dropped samples.

@@ -199,7 +199,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     }
     cell.plc.left(&connection);
     let mut client = cell.connect();
-    // One packet contains the start command, Stop coil on and Stop coil off.
+    // A single packet contains the start command, Stop coil on and Stop coil off.
     for _ in 0..3 {
         let start = order(Command::Start, client.next());
         client.send(&[&start, &PRESS, &LET_GO]);

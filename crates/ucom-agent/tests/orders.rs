@@ -314,7 +314,7 @@ fn the_lease_is_not_let_go_while_a_run_begins() {
     assert_eq!(served.board(1)["active"], true);
 }
 
-/// Waits until the agent is no longer the master, because no client holds the lease and no board runs.
+/// Waits until the agent is not the master any more, because no client holds the lease and no board runs.
 fn heartbeats_end(served: &Served) {
     until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }

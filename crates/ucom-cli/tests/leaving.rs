@@ -63,7 +63,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
     move |event| event["event"] == name && event["board"] == board
 }
 
-/// One board receives no heartbeats of the PC (D-50) and leaves its control loop, while the other board continues.
+/// A board receives no heartbeats of the PC (D-50) and leaves its control loop, while the other board continues.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

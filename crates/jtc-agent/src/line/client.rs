@@ -105,7 +105,7 @@ pub enum PutOut {
     /// The client sent bytes that are not a host frame.
     #[error("the client sent bytes that are not a frame of this protocol")]
     NoFrame,
-    /// The client sent so many bytes or frames that it would disturb the other clients.
+    /// The client sent too many bytes or frames, which would disturb the other clients.
     #[error(
         "the client sent more than {FRAMES_PER_S} frames per second, or has more than {FRAMES_WAITING} \
          frames or {WAITING_MAX} bytes in the queue"

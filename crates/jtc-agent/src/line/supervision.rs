@@ -46,7 +46,7 @@ impl Supervision {
         }
     }
 
-    /// Processes a status of the controller. In Start and Init, the stored timeout is no longer valid, because the
+    /// Processes a status of the controller. In Start and Init, the stored timeout is not valid any more, because the
     /// controller may have restarted with other settings.
     pub(super) fn take_status(&mut self, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {

@@ -40,7 +40,7 @@ pub struct Notice {
     pub what: &'static str,
     /// Details of the notice in JSON.
     pub facts: Value,
-    /// Warning for the user; `None` if there is no problem.
+    /// Warning for the user; `None` without a problem.
     pub warning: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! Agent for a simulated controller in this process, and functions with which a test sends requests of a client.
+//! Agent for a simulated controller in this process, and functions that send requests of a client.
 
 pub(crate) mod program;
 

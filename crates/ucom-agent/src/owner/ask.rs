@@ -84,7 +84,7 @@ impl Shared {
         asked: Option<Asked>,
     ) -> Result<&'a mut Worker, Problem> {
         // A thread that holds the lock of the leases may also call this closure to refuse the request. `turn` therefore takes the
-        // lock of the leases only below, where it runs in the owner's thread.
+        // lock of the leases only below, when it runs in the owner's thread.
         let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),

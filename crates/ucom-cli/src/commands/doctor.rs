@@ -18,7 +18,7 @@ use crate::shape::board_value;
 /// Time for which the command only listens before its first request.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Checks the bus and all boards. The exit code is 0 if there is no problem, 3 if no frame was received, and 1 otherwise.
+/// Checks the bus and all boards. The exit code is 0 without a problem, 3 if no frame was received, and 1 otherwise.
 pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));

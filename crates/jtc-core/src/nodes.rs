@@ -110,6 +110,12 @@ impl Nodes {
         }
     }
 
+    /// Sets the velocity that the answers of the last 5 ms of a joint show, rad/s.
+    #[cfg(test)]
+    pub(crate) fn move_at(&mut self, joint: usize, velocity: f64) {
+        self.nodes[joint].measured.move_at(velocity);
+    }
+
     /// Returns nodes with every joint enabled at these positions (rad) and velocities (rad/s).
     #[cfg(test)]
     pub(crate) fn enabled_at(position: [f64; JOINTS], velocity: [f64; JOINTS]) -> Self {

@@ -178,3 +178,206 @@ impl Limiter {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use jtc_dynamics::Dynamics;
+
+    use super::super::law::ControlParameters;
+    use super::*;
+    use crate::config::Config;
+    use crate::nodes::Nodes;
+    use crate::{Parameters, PidGains};
+
+    const GAINS: PidGains = PidGains { kp: 100.0, ki: 0.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
+
+    /// Limiter of an arm at position 0 with a torque of the control law that the test sets. All joints have the same values.
+    struct Bench {
+        config: Config,
+        law: ControlLaw,
+        set: SetValues,
+        limiter: Limiter,
+    }
+
+    impl Bench {
+        /// Creates a limiter for joints that have settled at position 0, and do not answer late.
+        fn settled() -> Self {
+            let mut set = SetValues::default();
+            set.begin_at(&[0.0; JOINTS]);
+            set.hold_for_test();
+            set.catch.iter_mut().for_each(|catch| catch.calm_down());
+            let config = Config { delay_ticks: 0, ..Config::avena() };
+            Self { config, law: ControlLaw::default(), set, limiter: Limiter::default() }
+        }
+
+        /// Sets the feedback torque of joint 2 to `shares` times its permitted share.
+        fn with_feedback(mut self, shares: f64) -> Self {
+            self.law.torque[1].pid.p =
+                shares * self.config.yield_torque_share * self.config.joints[1].torque_max;
+            self
+        }
+
+        /// Sets the set velocity of joint 2 to a share of its velocity limit. Returns the set velocity, rad/s.
+        fn set_velocity(&mut self, share: f64) -> f64 {
+            self.set.point.velocity[1] = share * self.config.joints[1].velocity_max;
+            self.set.point.velocity[1]
+        }
+
+        /// Executes ticks while joint 2 is at `position` (rad) and moves at `velocity` (rad/s). Returns the torque and the findings of
+        /// joint 2 in the last tick.
+        fn run(
+            &mut self,
+            ticks: u16,
+            (mode, braking, held_back): (ControlMode, bool, bool),
+            (position, velocity): (f64, f64),
+        ) -> (f64, Found) {
+            let (mut q, mut v) = ([0.0; JOINTS], [0.0; JOINTS]);
+            (q[1], v[1]) = (position, velocity);
+            let mut nodes = Nodes::enabled_at(q, v);
+            nodes.move_at(1, velocity);
+            let dynamics = Dynamics::new(&Parameters::avena().model, self.config.gravity);
+            let mut limited = Limited::default();
+            for _ in 0..ticks {
+                self.set.commanded.put(&self.set.point);
+                let parameters = ControlParameters {
+                    dynamics: &dynamics,
+                    pid: &[GAINS; JOINTS],
+                    polynomial: &[[0.0; 6]; JOINTS],
+                    table: None,
+                    on_trial: false,
+                };
+                let inputs = LawInputs { mode, braking, nodes: &nodes, config: &self.config, parameters };
+                limited = Limited::default();
+                self.limiter.step(&inputs, &self.law, &mut self.set, held_back, &mut limited);
+            }
+            (limited.torque[1], limited.found.map_or_else(Found::default, |found| found[1]))
+        }
+    }
+
+    const HOLD: (ControlMode, bool, bool) = (ControlMode::Hold, false, false);
+    const FOLLOW: (ControlMode, bool, bool) = (ControlMode::Follow, false, false);
+    const REST: (ControlMode, bool, bool) = (ControlMode::Rest, false, false);
+    const STILL: (f64, f64) = (0.0, 0.0);
+
+    #[test]
+    fn j66_a_torque_that_is_not_a_number_is_an_error_and_is_not_commanded() {
+        let mut bench = Bench::settled();
+        bench.law.torque[1].model = f64::NAN;
+        let (torque, found) = bench.run(1, HOLD, STILL);
+        assert_eq!((torque, found.errors), (0.0, joint_error::TORQUE));
+        assert_eq!(Bench::settled().run(1, HOLD, STILL), (0.0, Found::default()));
+    }
+
+    /// A settled joint is pushed if its feedback torque exceeds its share in more than 20 ticks.
+    #[test]
+    fn j66_a_settled_joint_with_too_much_feedback_torque_is_pushed() {
+        for (shares, ticks, pushed) in
+            [(1.01, 21, true), (-1.01, 21, true), (1.01, 20, false), (0.99, 60, false)]
+        {
+            let (_, found) = Bench::settled().with_feedback(shares).run(ticks, HOLD, STILL);
+            assert_eq!(found.pushed, pushed, "{shares} {ticks}");
+        }
+        // A joint that has not settled may need its feedback torque to catch a load.
+        let mut bench = Bench::settled().with_feedback(1.5);
+        bench.set.catch = [crate::motion::catch::Catch::begin(&bench.config); JOINTS];
+        assert!(!bench.run(60, HOLD, STILL).1.pushed);
+        assert!(
+            !Bench::settled().with_feedback(1.5).run(60, (ControlMode::Teach, false, false), STILL).1.pushed
+        );
+    }
+
+    /// The permitted feedback torque rises with the commanded speed to twice its value at 20 % of the velocity limit.
+    #[test]
+    fn j66_a_fast_joint_may_use_more_feedback_torque() {
+        for (speed, shares, pushed) in [
+            (0.0, 1.01, true),
+            (0.1, 1.45, false),
+            (0.1, 1.55, true),
+            (0.2, 1.95, false),
+            (0.2, 2.05, true),
+            (-0.2, 1.95, false),
+            (0.8, 2.05, true),
+        ] {
+            let mut bench = Bench::settled().with_feedback(shares);
+            let velocity = bench.set_velocity(speed);
+            assert_eq!(bench.run(21, FOLLOW, (0.0, velocity)).1.pushed, pushed, "{speed} {shares}");
+        }
+    }
+
+    /// While the arm brakes, a feedback torque against the motion is no push. On a joint at rest it is a push.
+    #[test]
+    fn j33_j66_feedback_torque_that_brakes_a_joint_is_no_push() {
+        for (braking, velocity, pushed) in
+            [(true, -0.06, false), (true, -0.04, true), (true, 0.06, true), (false, -0.06, true)]
+        {
+            let mut bench = Bench::settled().with_feedback(1.5);
+            let (_, found) = bench.run(21, (ControlMode::Hold, braking, false), (0.0, velocity));
+            assert_eq!(found.pushed, pushed, "{braking} {velocity}");
+        }
+    }
+
+    /// A joint that comes to rest after Teaching has met a person if it is slower than 0.7 times its set velocity, and its feedback torque
+    /// has the direction of the motion. The joint need not have settled.
+    #[test]
+    fn j25_j66_a_joint_that_lags_on_the_way_to_rest_is_pushed() {
+        for (mode, shares, share, pushed) in [
+            (REST, 3.0, 0.65, true),
+            (REST, 3.0, 0.75, false),
+            (REST, -3.0, 0.65, false),
+            (HOLD, 3.0, 0.65, false),
+        ] {
+            for sign in [1.0, -1.0] {
+                let mut bench = Bench::settled().with_feedback(sign * shares);
+                bench.set.catch = [crate::motion::catch::Catch::begin(&bench.config); JOINTS];
+                let set = bench.set_velocity(sign * 0.3);
+                assert_eq!(
+                    bench.run(21, mode, (0.0, share * set)).1.pushed,
+                    pushed,
+                    "{mode:?} {shares} {share} {sign}"
+                );
+            }
+        }
+    }
+
+    /// A joint with weak gains shows a push only by its speed: 20 % of its velocity limit above the commanded speed, and more than 1 mrad
+    /// ahead of its set position.
+    #[test]
+    fn j66_a_joint_that_runs_ahead_of_its_set_values_is_shoved_at_once() {
+        let most = Config::avena().joints[1].velocity_max;
+        for (mode, position, velocity, pushed) in [
+            (HOLD, 1.1e-3, 0.21 * most, true),
+            (HOLD, -1.1e-3, -0.21 * most, true),
+            (HOLD, 0.9e-3, 0.21 * most, false),
+            (HOLD, 1.1e-3, 0.19 * most, false),
+            // A joint that returns to its set position is not pushed.
+            (HOLD, -1.1e-3, 0.21 * most, false),
+            ((ControlMode::Teach, false, false), 1.1e-3, 0.21 * most, false),
+        ] {
+            let (_, found) = Bench::settled().run(1, mode, (position, velocity));
+            assert_eq!(found.pushed, pushed, "{mode:?} {position} {velocity}");
+            assert!(!found.strained);
+        }
+    }
+
+    /// A change of the rate of path time adds an acceleration, and so does an arm that a hand has moved. An arm that brakes with its whole
+    /// torque on the path may also deviate from the path.
+    #[test]
+    fn j33_j66_errors_of_the_set_values_are_excused_where_the_controller_causes_them() {
+        let (position, acceleration) = (joint_error::POSITION_ERROR, joint_error::ACCELERATION);
+        for (mode, errors) in [
+            (FOLLOW, position | acceleration),
+            ((ControlMode::Follow, false, true), position),
+            ((ControlMode::Follow, true, false), 0),
+            ((ControlMode::Approach, true, false), 0),
+            (REST, position),
+            ((ControlMode::Hold, true, false), position | acceleration),
+        ] {
+            let mut bench = Bench::settled();
+            let limits = &bench.config.joints[1];
+            bench.set.point.acceleration[1] = 1.01 * limits.acceleration_max;
+            let ahead = 1.01 * limits.position_error_max;
+            let found = bench.run(1, mode, (ahead, 0.0)).1;
+            assert_eq!(found.errors & (position | acceleration), errors, "{mode:?}");
+        }
+    }
+}

@@ -257,6 +257,11 @@ impl Measurement {
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
     }
 
+    #[cfg(test)]
+    pub(super) fn move_at(&mut self, velocity: f64) {
+        (self.rate, self.used.velocity) = (velocity, velocity);
+    }
+
     /// Returns the jump of the encoder that is subtracted from each answer, rad.
     pub(super) fn taken_off(&self) -> f64 {
         self.jumps.taken_off()

@@ -304,7 +304,7 @@ mod tests {
         }
     }
 
-    /// While the arm brakes, a feedback torque against the motion is no push. On a joint at rest it is a push.
+    /// While the arm brakes, a feedback torque against the motion does not count as a push. On a joint at rest, the same torque is a push.
     #[test]
     fn j33_j66_feedback_torque_that_brakes_a_joint_is_no_push() {
         for (braking, velocity, pushed) in

@@ -40,6 +40,14 @@ pub struct Timeline {
     pub first: Option<usize>,
 }
 
+impl Event {
+    /// Returns the time from another event to this event, ms. Returns `None` if the other event is later or belongs to another start of the
+    /// device, because the time between two starts is unknown.
+    fn ms_after(&self, other: &Self) -> Option<u64> {
+        self.tick.checked_sub(other.tick).filter(|_| self.boots == other.boots)
+    }
+}
+
 impl Timeline {
     /// Builds the timeline of a replayed log.
     pub fn of(log: &Replayed) -> Self {
@@ -65,10 +73,7 @@ impl Timeline {
     /// Returns the first error and all errors in the same tick, as the failure of a report.
     pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
         let first = self.events.get(self.first?)?;
-        let with = self
-            .events
-            .iter()
-            .filter(|event| event.error && (event.boots, event.tick) == (first.boots, first.tick));
+        let with = self.events.iter().filter(|event| event.error && event.ms_after(first) == Some(0));
         let causes = with.map(|event| event.text.clone()).collect();
         Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
@@ -87,20 +92,19 @@ impl Timeline {
         let at = &self.events[first];
         let mut lines = vec![format!("first: {:.3} s: {}", at.time_s, at.text)];
         for event in &self.events[first + 1..] {
-            let delay = event.tick.checked_sub(at.tick).filter(|_| event.boots == at.boots);
-            // The delay between events of two starts is unknown.
-            let when = delay.map_or_else(|| format!("{:.3} s after a later start", event.time_s), after);
+            let when = event
+                .ms_after(at)
+                .map_or_else(|| format!("{:.3} s after a later start", event.time_s), after);
             lines.push(format!("{when}: {}", event.text));
         }
         // The event nearest to the error is listed first. The number of listed events is limited.
-        let near =
-            |event: &&Event| event.boots == at.boots && at.tick.saturating_sub(event.tick) <= BEFORE_MS;
-        let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
+        let ago = self.events[..first].iter().rev().map_while(|event| Some((at.ms_after(event)?, event)));
+        let before: Vec<(u64, &Event)> = ago.take_while(|(ms, _)| *ms <= BEFORE_MS).take(BEFORE).collect();
         if !before.is_empty() {
             lines.push("before this error, the latest event first:".to_owned());
         }
-        for event in before {
-            lines.push(format!("{} before: {}", span(at.tick.saturating_sub(event.tick)), event.text));
+        for (ms, event) in before {
+            lines.push(format!("{} before: {}", span(ms), event.text));
         }
         lines
     }
@@ -380,4 +384,39 @@ impl Narrator<'_> {
 /// Returns the torque that the control law computed, before the torque limit is applied.
 fn computed(s: &JointSample) -> f64 {
     s.torque_model + s.torque_p + s.torque_i + s.torque_d + s.torque_friction
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A damaged log can contain two starts of the device. The times between events of two starts are unknown, so only the events of the
+    /// start with the error get a delay.
+    #[test]
+    fn j56_events_of_two_starts_are_listed_without_a_delay_between_them() {
+        let event = |boots, tick: u64, error| Event {
+            tick,
+            boots,
+            time_s: tick as f64 * 1e-3,
+            text: format!("{boots}/{tick}"),
+            error,
+            joints: Vec::new(),
+        };
+        let events = vec![
+            event(1, 900, false),
+            event(2, 10, false),
+            event(2, 50, true),
+            event(2, 60, false),
+            event(3, 5, false),
+        ];
+        let lines = Timeline { events, first: Some(2) }.lines();
+        let expected = [
+            "first: 0.050 s: 2/50",
+            "10 ms later: 2/60",
+            "0.005 s after a later start: 3/5",
+            "before this error, the latest event first:",
+            "40 ms before: 2/10",
+        ];
+        assert_eq!(lines, expected);
+    }
 }

@@ -166,8 +166,8 @@ enum Part {
         action: Action,
         /// Command with all arguments, which the command line shows instead of the name.
         command: Option<String>,
-        /// Numbers of the boards that the name contains.
-        boards: Option<String>,
+        /// Boards whose numbers replace the placeholder in the name; empty if they are not known.
+        boards: Vec<u8>,
     },
 }
 
@@ -232,10 +232,9 @@ impl Next {
     /// Sets the boards of all actions of the sentence that concern boards.
     #[must_use]
     pub fn of_boards(mut self, numbers: &[u8]) -> Self {
-        let list = numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(",");
         for part in &mut self.0 {
             if let Part::Action { boards, .. } = part {
-                *boards = Some(list.clone());
+                *boards = numbers.to_vec();
             }
         }
         self
@@ -250,7 +249,7 @@ impl Next {
 
     /// Creates a next step from an action and its command with all arguments.
     pub fn typed(action: Action, command: impl Into<String>) -> Self {
-        Self(vec![Part::Action { action, command: Some(command.into()), boards: None }])
+        Self(vec![Part::Action { action, command: Some(command.into()), boards: Vec::new() }])
     }
 
     /// Returns the sentence for a front end, with commands, requests and expressions in backticks.
@@ -261,16 +260,15 @@ impl Next {
                 format!("`{command}`").into()
             }
             Part::Action { action, boards, .. } => {
-                let name = action.name(front_end);
-                let name = match (boards, front_end) {
+                let numbers = match (boards.as_slice(), front_end) {
                     // A request names one board.
-                    (Some(boards), FrontEnd::Agent) if boards.contains(',') => name.into(),
-                    (Some(boards), _) => Cow::from(name.replace(NUMBER, boards)),
-                    (None, FrontEnd::Agent) => name.into(),
-                    (None, _) => name.replace(NUMBER, "N").into(),
+                    ([] | [_, _, ..], FrontEnd::Agent) => NUMBER.to_owned(),
+                    ([], _) => "N".to_owned(),
+                    (boards, _) => boards.iter().map(u8::to_string).collect::<Vec<_>>().join(","),
                 };
+                let name = action.name(front_end).replace(NUMBER, &numbers);
                 // Some names are words that contain an expression in backticks.
-                if name.contains('`') { name } else { format!("`{name}`").into() }
+                if name.contains('`') { name.into() } else { format!("`{name}`").into() }
             }
         });
         parts.collect()
@@ -296,7 +294,7 @@ impl Serialize for Next {
 
 impl From<Action> for Next {
     fn from(action: Action) -> Self {
-        Self(vec![Part::Action { action, command: None, boards: None }])
+        Self(vec![Part::Action { action, command: None, boards: Vec::new() }])
     }
 }
 

@@ -34,7 +34,7 @@ impl BusOff {
     }
 }
 
-/// Returns the command that ends the bus-off or shows its cause. Only the kernel's CAN interfaces stay off the bus until a command restarts
+/// Returns the next step, which ends the bus-off or shows its cause. Only the kernel's CAN interfaces stay off the bus until a command restarts
 /// them.
 pub fn next(url: &str) -> Next {
     match url.strip_prefix("socketcan:") {

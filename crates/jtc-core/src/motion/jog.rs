@@ -230,6 +230,9 @@ impl JointJog {
 mod tests {
     extern crate std;
 
+    mod joint;
+    mod whole;
+
     use super::*;
     use crate::config::limits::check_set;
     use crate::motion::Ramp;

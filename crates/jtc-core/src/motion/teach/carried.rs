@@ -112,3 +112,6 @@ impl Carried {
 fn explains(torque: f64, against: f64) -> bool {
     against >= EXPLAINED.0 * torque.abs() && against <= EXPLAINED.1 * torque.abs()
 }
+
+#[cfg(test)]
+mod tests;

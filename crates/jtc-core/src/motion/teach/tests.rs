@@ -199,3 +199,136 @@ fn j25_each_round_computes_all_that_changes_slowly() {
     assert_eq!((of(round(), Turn::Judge), of(round(), Turn::Ramp), of(round(), Turn::Joints)), (6, 1, 57));
     assert_eq!([0, 1, 2].map(Turn::of), [Turn::Begin, Turn::Mass, Turn::Ramp]);
 }
+
+/// The mass explains a part of the load that depends on the torque of 1 kg on all joints together. The part is zero up to 2 N·m and complete
+/// from 6 N·m on. In between, the part increases smoothly with the square of the torque, here from 4 to 36: 5/32 at a quarter of this range,
+/// 1/2 at the half, and 27/32 at three quarters.
+#[test]
+fn j25_a_mass_that_hardly_loads_the_arm_explains_a_part_of_the_load() {
+    let unit = dynamics().flange_torque(&Q).map(|u| u * u).iter().sum::<f64>().sqrt();
+    for (square, part) in [
+        (1.0, 0.0),
+        (4.0, 0.0),
+        (12.0, 5.0 / 32.0),
+        (20.0, 0.5),
+        (28.0, 27.0 / 32.0),
+        (36.0, 1.0),
+        (49.0, 1.0),
+    ] {
+        // The torque of 1 kg is proportional to gravity.
+        let gravity = Config::avena().gravity.map(|g| g * f64::sqrt(square) / unit);
+        let dynamics = Dynamics::new(&Parameters::avena().model, gravity);
+        let loads = dynamics.flange_torque(&Q).map(|u| 2.0 * u);
+        let mut taught = Taught::begin(&Q, &loads, &Config::avena());
+        taught.fit(&Q, &dynamics);
+        assert!((f64::from(taught.mass) - 2.0 * part).abs() < 1e-4, "{} kg at {square}", taught.mass);
+        assert_eq!(taught.found, taught.mass);
+        for (carried, load) in taught.carried.iter().zip(loads) {
+            let rest = f64::from(carried.rest);
+            assert!((rest - (1.0 - part) * load).abs() < 1e-4, "{rest} N·m of {load} N·m at {square}");
+        }
+    }
+    assert_eq!(begun([5.0; JOINTS], &[f64::NAN; JOINTS]).mass, 0.0, "an invalid pose gives no mass");
+}
+
+/// The ramp computes the inertia of the whole arm in tick 2, and in the last slow tick of each round. A round has 76 ticks and begins at
+/// tick 9, so this tick is 9 + 76 - 4 = 81.
+#[test]
+fn j25_one_tick_before_the_first_round_and_one_tick_of_each_round_belong_to_the_ramp() {
+    for turn in 0..FIRST + TURNS {
+        let taught = Taught { turn, ..Taught::default() };
+        assert_eq!(taught.is_turn_of_ramp(), [2, 81].contains(&turn), "tick {turn}");
+    }
+}
+
+/// The excess is the flange speed above the limit, as a share of the limit, on a smooth ramp. With a limit of 0.5 m/s, the ramp begins at
+/// 0.5 m/s and is complete at 1 m/s.
+#[test]
+fn j25_the_excess_of_the_tool_speed_is_a_share_of_its_limit() {
+    let (dynamics, direction) = (dynamics(), [0.1, 0.2, -0.3, 0.1, 0.0, 0.2]);
+    let unit = dynamics.flange_speed(&Q, &direction);
+    let config = Config { tool_speed_max: 0.5, ..Config::avena() };
+    for (speed, excess) in [
+        (0.25, 0.0),
+        (0.5, 0.0),
+        (0.625, 5.0 / 32.0),
+        (0.75, 0.5),
+        (0.875, 27.0 / 32.0),
+        (1.0, 1.0),
+        (2.0, 1.0),
+    ] {
+        // The eighth tick of a round compares the load with the motion.
+        let mut taught = Taught { turn: FIRST + 8, ..Taught::default() };
+        let computed =
+            taught.look(&Q, &direction.map(|v| v * speed / unit), &dynamics, &config, |_, _| (0.0, 0.0));
+        assert!(
+            computed && (f64::from(taught.haste) - excess).abs() < 1e-5,
+            "{} at {speed} m/s",
+            taught.haste
+        );
+    }
+}
+
+/// At 0.5 rad/s, a joint moves 0.006 rad in 12 ms. This motion is 0.02 times the distance of 0.3 rad, so 0.98 times the load remains.
+#[test]
+fn j25_a_load_without_a_mass_fades_only_above_the_speed_of_a_led_joint() {
+    for (velocity, left) in [(0.0, 1.0), (-LED, 1.0), (LED, 1.0), (0.5, 0.98), (-0.5, 0.98)] {
+        let mut taught = Taught::begin(&Q, &[8.0; JOINTS], &Config::avena());
+        taught.judge(&[0.0, 0.0, velocity, 0.0, 0.0, 0.0]);
+        for carried in taught.carried {
+            assert!((f64::from(carried.rest) - left * 8.0).abs() < 1e-5, "{} at {velocity}", carried.rest);
+        }
+    }
+}
+
+/// Returns the state of Teaching in which 1 kg causes 10 N·m on joint 2. Damping and friction of joint 2 are `against`, N·m.
+fn with_mass(found: f32, mass: f32, against: f64) -> Taught {
+    let mut taught = Taught::begin(&Q, &[0.0; JOINTS], &Config::avena());
+    (taught.found, taught.mass, taught.unit[1]) = (found, mass, 10.0);
+    taught.joints[1].set_against(against);
+    taught
+}
+
+/// Each comparison counts 12 ms. The eighth comparison is at 96 ms, and the ninth is at 108 ms.
+#[test]
+fn j25_a_missed_mass_returns_by_its_missing_part() {
+    // 1.5 kg of 2 kg are missing, which is 15 N·m. The joint sinks at 0.2 rad/s.
+    let mut taught = with_mass(2.0, 0.5, 15.0);
+    let sinks = [0.0, -0.2, 0.0, 0.0, 0.0, 0.0];
+    (0..8).for_each(|_| taught.judge(&sinks));
+    assert_eq!((taught.mass, taught.sinks_ms), (0.5, 96));
+    // In 12 ms, a return with a time constant of 0.5 s adds 0.024 times 1.5 kg, which is 0.036 kg.
+    taught.judge(&sinks);
+    assert!((taught.mass - 0.536).abs() < 1e-5 && taught.found == 2.0, "{} kg", taught.mass);
+    // If the joint no longer sinks, the time begins again.
+    taught.judge(&[0.0; JOINTS]);
+    assert!((taught.mass - 0.536).abs() < 1e-5 && taught.sinks_ms == 0, "{} kg", taught.mass);
+}
+
+/// The comparison 83 is at 996 ms, and the comparison 84 is at 1,008 ms.
+#[test]
+fn j25_a_mass_that_drives_the_arm_goes_by_a_part_of_itself() {
+    // A mass of 2 kg causes 20 N·m, which moves the joint at 0.3 rad/s.
+    let mut taught = with_mass(2.0, 2.0, 20.0);
+    let driven = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
+    (0..83).for_each(|_| taught.judge(&driven));
+    assert_eq!((taught.mass, taught.driven_ms), (2.0, 996));
+    // In 12 ms, a removal with a time constant of 1.5 s removes 0.008 times 2 kg, which is 0.016 kg.
+    taught.judge(&driven);
+    assert!((taught.mass - 1.984).abs() < 1e-5 && taught.found == 2.0, "{} kg", taught.mass);
+}
+
+/// The integral takes over the torques of the load and of the dry friction. The mass of 0.5 kg causes 5 N·m of the load torque. The other
+/// part is 12 N·m. The dry friction is at most 3 % of 200 N·m, which is 6 N·m, at an extension of 5 mrad.
+#[test]
+fn j25_the_holding_torque_is_the_sum_of_load_and_dry_friction() {
+    let mut config = Config::avena();
+    config.joints[1].torque_max = 200.0;
+    let mut taught = Taught::begin(&[0.0; JOINTS], &[12.0; JOINTS], &config);
+    (taught.mass, taught.unit[1]) = (0.5, 10.0);
+    taught.each(1, |joint| joint.set_inertia(3.0));
+    for (position, expected) in [(0.0, 17.0), (0.0025, 14.0), (-0.0025, 20.0), (0.01, 11.0), (-0.01, 23.0)] {
+        let held = taught.held(1, position, &config.joints[1], &config);
+        assert!((held - expected).abs() < 1e-5, "{held} N·m at {position} rad, expected {expected} N·m");
+    }
+}

@@ -1,0 +1,195 @@
+//! Tests of one jogged joint: its approach to a velocity, its stopping distance and its behaviour at the ends of its range (J-58).
+use super::*;
+
+/// Returns limits with which a jogged joint has at most 2 rad/s² and 20 rad/s³.
+fn limits() -> JointConfig {
+    JointConfig { velocity_max: 2.0, acceleration_max: 10.0, ..Config::avena().joints[0] }
+}
+
+/// Returns a joint with this velocity (rad/s), this acceleration and this highest acceleration (rad/s²).
+fn moving(velocity: f64, acceleration: f64, most: f64) -> JointJog {
+    JointJog { wanted: 0.0, most, velocity, acceleration }
+}
+
+fn near(value: f64, expected: f64) -> bool {
+    (value - expected).abs() < 1e-12
+}
+
+#[test]
+fn j58_a_jogged_joint_has_a_fifth_of_its_acceleration_limit_after_a_tenth_of_a_second() {
+    assert_eq!(hardest(&limits()), 2.0);
+    assert_eq!(jerk(&limits()), 2.0 / 0.1);
+}
+
+/// In one tick of 0.5 s at 4 rad/s³, the acceleration changes by at most 2 rad/s².
+#[test]
+fn j58_a_joint_approaches_its_velocity_with_bounded_acceleration_and_jerk() {
+    let cases = [
+        // (velocity, acceleration, highest acceleration, target, expected velocity and acceleration)
+        // The acceleration increases by the jerk of one tick: 0 + 2 rad/s². The velocity increases by 2 · 0.5 rad/s.
+        (0.0, 0.0, 8.0, 8.0, (1.0, 2.0)),
+        // The acceleration stays at its limit: 3 · 0.5 = 1.5 rad/s.
+        (0.0, 3.0, 3.0, 8.0, (1.5, 3.0)),
+        // The steps 6, 4 and 2 rad/s² add (6 + 4 + 2) · 0.5 = 6 rad/s, so the next acceleration is 6 rad/s².
+        (1.0, 6.0, 8.0, 7.0, (4.0, 6.0)),
+        (1.0, 8.0, 8.0, 7.0, (4.0, 6.0)),
+        // The next acceleration would be 5 - 2 = 3 rad/s², which is one and a half steps of 2 rad/s². The velocity still missing is below
+        // 3 · 0.5 = 1.5 rad/s. The joint therefore arrives.
+        (0.0, 5.0, 8.0, 0.5, (0.5, 0.0)),
+        // With 5.25 - 2 = 3.25 rad/s², the joint does not arrive without a jump of the acceleration.
+        (0.0, 5.25, 8.0, 0.5, (1.625, 3.25)),
+        // 1.5 rad/s is the most that can be missing for an arrival. With 1.75 rad/s, the joint accelerates with 0 + 2 rad/s².
+        (0.0, 0.0, 8.0, 1.5, (1.5, 0.0)),
+        (0.0, 0.0, 8.0, 1.75, (1.0, 2.0)),
+    ];
+    for (velocity, acceleration, most, target, expected) in cases {
+        for sign in [1.0, -1.0] {
+            let next =
+                moving(sign * velocity, sign * acceleration, most).toward(sign * target, 4.0, 16.0, 0.5);
+            let found = (sign * next.velocity, sign * next.acceleration);
+            let about = std::format!("from {velocity} and {acceleration} to {target}: {found:?}");
+            assert!(near(found.0, expected.0) && near(found.1, expected.1), "{about}");
+            assert_eq!(next.most, most, "{about}");
+        }
+    }
+}
+
+/// A joint at 0.75 rad/s accelerates with 6 rad/s², which one tick reduces only to 4 rad/s². Without a limit, the joint would reach
+/// 0.75 + 4 · 0.5 = 2.75 rad/s. With a limit of 1 rad/s, its acceleration in this tick is (1 - 0.75) / 0.5 = 0.5 rad/s².
+#[test]
+fn j58_a_joint_that_still_accelerates_does_not_exceed_its_velocity_limit() {
+    for sign in [1.0, -1.0] {
+        let next = moving(sign * 0.75, sign * 6.0, 8.0).toward(0.0, 4.0, 1.0, 0.5);
+        assert_eq!((sign * next.velocity, sign * next.acceleration), (1.0, 0.5));
+        let free = moving(sign * 0.75, sign * 6.0, 8.0).toward(0.0, 4.0, 2.75, 0.5);
+        assert_eq!((sign * free.velocity, sign * free.acceleration), (2.75, 4.0));
+    }
+}
+
+/// The jerk of 2 rad/s³ gives 2 · 0.001 rad/s² in one tick. The controller does not compute this acceleration from rounded velocities.
+#[test]
+fn j58_the_acceleration_within_the_velocity_limit_has_no_rounding_error_of_the_velocity() {
+    for sign in [1.0, -1.0] {
+        let next = moving(sign, 0.0, 1.0).toward(sign * 1.5, 2.0, 2.0, 0.001);
+        assert_eq!(sign * next.acceleration, 0.002);
+    }
+}
+
+/// While the clock of the jog is at rest, the joint keeps its state, even if the joint is above its velocity limit.
+#[test]
+fn j58_a_tick_without_time_changes_no_joint() {
+    for (velocity, acceleration) in [(0.5, 1.0), (3.0, 0.0), (-3.0, -1.0)] {
+        let joint = moving(velocity, acceleration, 2.0);
+        assert_eq!(joint.toward(1.0, 20.0, 2.0, 0.0), joint);
+    }
+}
+
+/// The stopping distance consists of the distance until the acceleration is zero, and of the distance from there. From a speed v without
+/// acceleration, the joint stops in a symmetrical time T, so this distance is v · T / 2. If the joint reaches its highest acceleration A at
+/// the jerk J, T is v / A + A / J. Otherwise T is 2 · √(v / J). The jerk of all cases is 8 rad/s³. The controller adds 1 %, the distance of
+/// four ticks at the present speed, and 1 µrad.
+#[test]
+fn j58_the_stopping_distance_follows_from_the_jerk_and_the_highest_acceleration() {
+    let cases = [
+        // (velocity, acceleration, highest acceleration, stopping distance)
+        (0.0, 0.0, 2.0, 0.0),
+        // T = 0.75 / 2 + 2 / 8 = 0.625 s.
+        (0.75, 0.0, 2.0, 0.5 * 0.75 * 0.625),
+        // T = 1 / 2 + 2 / 8 = 0.75 s.
+        (1.0, 0.0, 2.0, 0.5 * 0.75),
+        // The highest acceleration is just reached: T = 0.5 / 2 + 2 / 8 = 0.5 s, and 2 · √(0.5 / 8) = 0.5 s.
+        (0.5, 0.0, 2.0, 0.5 * 0.5 * 0.5),
+        // The highest acceleration is not reached: T = 2 · √(0.125 / 8) = 0.25 s.
+        (0.125, 0.0, 2.0, 0.5 * 0.125 * 0.25),
+        // The acceleration of 0.5 rad/s² is zero after 1/16 s. The speed is then 0.75 + 0.5 · 0.5 / 16 = 0.765625 rad/s, and the joint has
+        // moved 0.75 / 16 + 0.5 · 0.5 / 16² - 8 / (6 · 16³) rad. T = 0.765625 / 2 + 0.25 = 0.6328125 s.
+        (0.75, 0.5, 2.0, 0.75 / 16.0 + 0.25 / 256.0 - 8.0 / (6.0 * 4_096.0) + 0.5 * 0.765625 * 0.6328125),
+        // This joint brakes since 1/16 s. It has moved 0.765625 / 16 - 8 / (6 · 16³) rad since its acceleration was zero.
+        (0.75, -0.5, 2.0, 0.5 * 0.765625 * 0.6328125 - (0.765625 / 16.0 - 8.0 / (6.0 * 4_096.0))),
+        // A joint without velocity accelerates with 1 rad/s², above its highest acceleration of 0.5 rad/s². After 1/8 s its speed is
+        // 0.5 / 8 = 0.0625 rad/s, and the joint has moved 0.5 / 8² - 8 / (6 · 8³) rad. T = 0.0625 / 0.5 + 0.5 / 8 = 0.1875 s.
+        (0.0, 1.0, 0.5, 0.5 / 64.0 - 8.0 / (6.0 * 512.0) + 0.5 * 0.0625 * 0.1875),
+    ];
+    for (velocity, acceleration, most, distance) in cases {
+        for sign in [1.0, -1.0] {
+            let found = sign * moving(sign * velocity, sign * acceleration, most).stopping_way(8.0);
+            let expected = 1.01 * distance + 4.0 * velocity * 0.001 + 1e-6;
+            assert!(near(found, expected), "{velocity} {acceleration} {most}: {found}, expected {expected}");
+        }
+    }
+}
+
+/// Executes one tick of 0.125 s. The highest acceleration is 2 rad/s², and the acceleration changes by at most 20 · 0.125 = 2.5 rad/s².
+fn step(mut joint: JointJog, mut position: f64, range: (f64, f64), goes: bool) -> (f64, f64, f64) {
+    joint.step(&mut position, range, &limits(), 0.125, goes);
+    (position, joint.velocity, joint.acceleration)
+}
+
+#[test]
+fn j58_a_joint_does_not_approach_its_commanded_velocity_after_the_jog_has_ended() {
+    let joint = JointJog { wanted: 1.0, ..moving(0.0, 0.0, 2.0) };
+    assert_eq!(step(joint, 0.0, (-2.0, 2.0), false), (0.0, 0.0, 0.0));
+    // The joint accelerates with 2 rad/s²: 2 · 0.125 = 0.25 rad/s, and 0.5 · 0.25 · 0.125 rad.
+    assert_eq!(step(joint, 0.0, (-2.0, 2.0), true), (0.015625, 0.25, 2.0));
+}
+
+/// A joint at 1 rad/s stops in 1 / 2 + 2 / 20 = 0.6 s, after 0.3 rad. With the distance of this tick and the margins, the joint needs
+/// 0.125 + 1.01 · 0.3 + 0.004 + 0.000001 = 0.432001 rad.
+#[test]
+fn j58_a_joint_slows_down_as_soon_as_it_could_not_stop_within_its_range() {
+    for sign in [1.0, -1.0] {
+        let joint = JointJog { wanted: sign, ..moving(sign, 0.0, 2.0) };
+        let range = |room: f64| if sign > 0.0 { (-2.0, 1.0 + room) } else { (-1.0 - room, 2.0) };
+        // With 0.45 rad, the joint keeps its velocity.
+        assert_eq!(step(joint, sign, range(0.45), true), (sign * 1.125, sign, 0.0));
+        // With 0.4 rad, the joint brakes with 2 rad/s²: 1 - 2 · 0.125 = 0.75 rad/s, and 0.5 · 1.75 · 0.125 = 0.109375 rad.
+        assert_eq!(step(joint, sign, range(0.4), true), (sign * 1.109375, sign * 0.75, sign * -2.0));
+        // With 0.0625 rad, the braking joint reaches the end of its range, and its motion ends there.
+        assert_eq!(step(joint, sign, range(0.0625), true), (sign * 1.0625, 0.0, 0.0));
+    }
+}
+
+#[test]
+fn j58_a_joint_whose_stopping_distance_ends_exactly_at_the_end_of_its_range_slows_down() {
+    for sign in [1.0, -1.0] {
+        let joint = JointJog { wanted: sign, ..moving(sign, 0.0, 2.0) };
+        // The next state at a constant velocity is the present state.
+        let needed = (0.125 + joint.stopping_way(20.0).abs()) * sign;
+        let range = |end: f64| if sign > 0.0 { (-2.0, end) } else { (end, 2.0) };
+        assert_eq!(step(joint, 0.0, range(needed), true).1, sign * 0.75);
+        assert_eq!(step(joint, 0.0, range(1.0001 * needed), true).1, sign);
+    }
+}
+
+/// A joint beyond its range moves back with 0.125 rad/s, and a velocity away from its range is commanded. With 2 rad/s² the joint would
+/// reverse to 0.125 rad/s in one tick. The joint stops instead.
+#[test]
+fn j58_a_joint_outside_its_range_does_not_reverse_away_from_its_range() {
+    for sign in [1.0, -1.0] {
+        let joint = JointJog { wanted: sign, ..moving(sign * -0.125, sign * 2.0, 2.0) };
+        let found = step(joint, sign * 2.0, (-1.0, 1.0), true);
+        assert_eq!(found, (sign * (2.0 - 0.5 * 0.125 * 0.125), 0.0, 0.0));
+    }
+}
+
+/// A joint reverses from a negative to a positive velocity in one tick. Its motion in this tick and its stopping distance cancel exactly.
+/// The joint may reverse inside its range. At the upper end of its range no margin remains, so the joint comes to rest.
+#[test]
+fn j58_a_joint_reverses_to_its_present_position_only_inside_its_range() {
+    let mut found = 0;
+    for wanted in (108..=136).map(|n| f64::from(n) / 1_024.0) {
+        // 0.5 · (velocity + wanted) · 0.125 = -stopping distance. Rounding prevents this equality for some velocities.
+        let stopping = moving(wanted, 0.0, 2.0).stopping_way(20.0);
+        let velocity = -(16.0 * stopping + wanted);
+        if 0.5 * (velocity + wanted) * 0.125 + stopping != 0.0 {
+            continue;
+        }
+        found += 1;
+        let joint = JointJog { wanted, ..moving(velocity, 0.0, 2.0) };
+        // At most 1.5 · 2.5 · 0.125 = 0.46875 rad/s are missing, so the joint reaches its target velocity in this tick.
+        assert!(wanted - velocity < 0.46875);
+        assert_eq!(step(joint, 0.0, (-1.0, 1.0), true).1, wanted);
+        assert_eq!(step(joint, 0.0, (-1.0, 0.0), true).1, 0.0);
+    }
+    assert!(found > 0);
+}

@@ -190,7 +190,7 @@ impl JointJog {
         let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * tick)) - 0.5);
         let next =
             flat.min(self.most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
-        let arrives = next.abs() <= 1.5 * round && left.abs() <= (1.5 * round * tick).max(next.abs() * tick);
+        let arrives = next.abs() <= 1.5 * round && left.abs() <= 1.5 * round * tick;
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {

@@ -232,6 +232,110 @@ mod tests {
         assert!(!seen(&[0.03, -0.05, 0.09]) && !seen(&[0.3, -0.31, 0.2, -0.25]) && !seen(&[0.1, 0.2, 0.3]));
     }
 
+    /// Returns a catch whose joint has settled and whose time is over.
+    fn over() -> Catch {
+        let mut catch = begun();
+        (0..1_000).for_each(|_| {
+            catch.step(0.0);
+        });
+        catch
+    }
+
+    /// Returns `true` if `watch` reports a growing swing at any of these velocities (rad/s), one velocity per tick.
+    fn grows(catch: &mut Catch, velocities: &[f64]) -> bool {
+        velocities.iter().any(|&velocity| catch.watch(velocity))
+    }
+
+    /// Each of the three half swings is faster than the half swing before it, and the third is faster than 0.1 rad/s. A half swing with
+    /// the same speed does not grow. Noise of 0.01 rad/s is not half a swing.
+    #[test]
+    fn j71_a_swing_with_two_halves_alike_does_not_grow() {
+        for sign in [1.0, -1.0] {
+            for (peaks, expected) in [
+                ([0.125, -0.25, 0.5], true),
+                ([0.25, -0.25, 0.5], false),
+                ([0.125, -0.25, 0.25], false),
+                ([0.03, -0.05, 0.1], false),
+                ([0.03, -0.05, 0.11], true),
+                ([0.01, -0.2, 0.3], false),
+            ] {
+                assert_eq!(grows(&mut over(), &peaks.map(|peak| sign * peak)), expected, "{peaks:?}");
+            }
+        }
+    }
+
+    /// When a trial of gains begins, the controller must not use a swing from the time before the trial.
+    #[test]
+    fn j71_a_swing_before_the_trial_does_not_count() {
+        let mut catch = over();
+        assert!(!grows(&mut catch, &[0.2, -0.3]));
+        catch.watch_anew();
+        assert!(!grows(&mut catch, &[0.4, -0.5]), "two halves since the trial began");
+        assert!(grows(&mut catch, &[0.6]));
+        // A growing swing that was already reported is also cleared.
+        let mut catch = over();
+        assert!(grows(&mut catch, &[0.2, -0.3, 0.4]));
+        catch.watch_anew();
+        assert!(!grows(&mut catch, &[0.4]));
+    }
+
+    /// After a catch is over, only `watch` records the swing of the joint.
+    #[test]
+    fn j71_a_catch_that_is_over_does_not_record_a_swing() {
+        let mut catch = over();
+        for velocity in [0.2, -0.3] {
+            assert!(!catch.step(velocity));
+        }
+        assert!(!grows(&mut catch, &[0.4, -0.5]));
+        let mut calmed = begun();
+        calmed.calm_down();
+        for velocity in [0.2, -0.3] {
+            assert!(!calmed.step(velocity));
+        }
+        assert!(calmed.settled() && !grows(&mut calmed, &[0.4]));
+    }
+
+    /// The controller watches the swing of a joint only after the joint has settled and after its catch is over.
+    #[test]
+    fn j71_a_swing_is_watched_only_after_the_catch_and_after_the_joint_has_settled() {
+        let peaks = [0.2, -0.3, 0.4, -0.5];
+        assert!(grows(&mut over(), &peaks));
+        let mut settled = begun();
+        (0..CALM_MS).for_each(|_| {
+            settled.step(0.0);
+        });
+        assert!(settled.settled() && !grows(&mut settled, &peaks), "the catch continues");
+        let mut moves = begun();
+        (0..1_000).for_each(|_| {
+            moves.step(0.1);
+        });
+        assert!(!moves.settled() && !grows(&mut moves, &peaks), "the joint has not settled");
+        assert!(!grows(&mut begun(), &peaks), "the joint has not settled, and the catch continues");
+    }
+
+    /// A joint that moves for the whole second of its catch settles as soon as it has been at rest for 100 ms.
+    #[test]
+    fn j66_a_joint_may_settle_after_its_catch() {
+        let mut catch = begun();
+        (0..1_000).for_each(|_| {
+            catch.step(0.5);
+        });
+        for ms in 1..=100 {
+            assert!(!catch.settled(), "{ms}");
+            assert!(!catch.step(0.0));
+        }
+        assert!(catch.settled());
+    }
+
+    /// A joint that has settled and is then pushed may swing with a growing amplitude. This swing does not end the catch.
+    #[test]
+    fn j43_a_growing_swing_ends_only_the_catch_of_a_joint_that_has_not_settled() {
+        let mut catch = begun();
+        assert!((0..100).all(|_| catch.step(0.0)));
+        assert!([0.2, -0.3, 0.4].iter().all(|&velocity| catch.step(velocity)));
+        assert!(!catch.swing_grows());
+    }
+
     #[test]
     fn j34_a_joint_that_keeps_moving_is_not_busy_for_longer_than_a_catch_takes() {
         let mut catch = begun();

@@ -183,4 +183,34 @@ mod tests {
             assert!((q - (p - 0.02)).abs() < 1e-12 && v == w);
         }
     }
+
+    /// A guided joint takes 0.2 s, with the velocity v · (1 − u)² and the acceleration −2 · v / T · (1 − u). A joint that falls at 1 rad/s
+    /// takes 1.5 · 1 rad/s / 3 rad/s² = 0.5 s, with the velocity v · (1 − 3 · u² + 2 · u³) and the acceleration −6 · v / T · u · (1 − u).
+    /// In these formulas, u is the elapsed share of the time T.
+    #[test]
+    fn j16_j25_the_acceleration_is_the_derivative_of_the_velocity() {
+        let (config, limits) = (Config::avena(), JointConfig { velocity_max: 2.0, ..limits() });
+        for v in [1.0, -1.0] {
+            let led = Deceleration::led(0.7, v, RAMP_MS, &limits);
+            let falling = Deceleration::falling(0.7, v, &config, &limits);
+            for (mut deceleration, ms, velocity, acceleration) in [
+                // u = 0.25: v · 0.75² = 0.5625 and −2 / 0.2 · 0.75 = −7.5.
+                (led, 50, 0.5625, -7.5),
+                // u = 0.5: v · 0.5² = 0.25 and −2 / 0.2 · 0.5 = −5.
+                (led, 100, 0.25, -5.0),
+                (led, 0, 1.0, -10.0),
+                (led, 200, 0.0, 0.0),
+                // u = 0.25: 1 − 0.1875 + 0.03125 = 0.84375 and −6 / 0.5 · 0.25 · 0.75 = −2.25.
+                (falling, 125, 0.84375, -2.25),
+                // u = 0.5: 1 − 0.75 + 0.25 = 0.5 and −6 / 0.5 · 0.25 = −3, the highest deceleration of a falling joint.
+                (falling, 250, 0.5, -3.0),
+                (falling, 0, 1.0, 0.0),
+                (falling, 500, 0.0, 0.0),
+            ] {
+                let (found, _) = (0..=ms).fold(([0.0; 3], false), |_, _| deceleration.step(&limits));
+                assert!((found[1] - v * velocity).abs() < 1e-9, "{ms} ms: {found:?}");
+                assert!((found[2] - v * acceleration).abs() < 1e-9, "{ms} ms: {found:?}");
+            }
+        }
+    }
 }

@@ -204,4 +204,126 @@ mod tests {
         hold_back.step(&[false; JOINTS], &PathClock::start(1.0));
         assert!(!hold_back.is_watched(), "it has its pace again");
     }
+
+    /// Returns the state of the joints if only this joint is at its torque limit.
+    fn only(joint: usize) -> [bool; JOINTS] {
+        core::array::from_fn(|j| j == joint)
+    }
+
+    /// Executes the ticks with the same inputs. Returns the first result that is not `Nothing`, with the number of its tick.
+    fn first(
+        hold_back: &mut HoldBack,
+        ticks: u16,
+        joints: &[bool; JOINTS],
+        clock: &PathClock,
+    ) -> Option<(u16, HoldBackStep)> {
+        (1..=ticks)
+            .map(|ms| (ms, hold_back.step(joints, clock)))
+            .find(|(_, next)| *next != HoldBackStep::Nothing)
+    }
+
+    /// The cause of a held stop names each joint that was at its limit.
+    #[test]
+    fn j75_each_joint_that_was_at_its_limit_is_known() {
+        for joint in 0..JOINTS {
+            let mut hold_back = HoldBack::default();
+            hold_back.begin();
+            hold_back.step(&only(joint), &going());
+            hold_back.step(&[false; JOINTS], &going());
+            for other in 0..JOINTS {
+                assert_eq!(hold_back.has_pressed(other), other == joint, "joint {other} of joint {joint}");
+            }
+            let next = (joint + 1) % JOINTS;
+            hold_back.step(&only(next), &going());
+            for other in 0..JOINTS {
+                assert_eq!(hold_back.has_pressed(other), other == joint || other == next, "joint {other}");
+            }
+        }
+    }
+
+    /// While the path is held back, a further overload does not clear the record of the joints and of the time at the limits.
+    #[test]
+    fn j75_a_further_overload_keeps_the_record_of_the_joints() {
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        hold_back.step(&only(4), &going());
+        for _ in 0..INERTIA_MS {
+            hold_back.step(&only(1), &going());
+        }
+        assert!(hold_back.begin() && hold_back.has_pressed(4) && hold_back.has_pressed(1));
+        let mut hold_back = HoldBack::default();
+        let after = (1..1_000).find(|_| {
+            hold_back.begin();
+            hold_back.step(&PRESSED, &going()) == HoldBackStep::Stop
+        });
+        assert_eq!(after, Some(PRESSED_MS + 1), "the limit is 250 ms without interruption");
+    }
+
+    /// When holding back begins again, the joints and the times of the earlier overload do not count.
+    #[test]
+    fn j75_holding_back_begins_without_the_joints_and_times_of_the_earlier_overload() {
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        assert_eq!(first(&mut hold_back, PRESSED_MS, &PRESSED, &going()), None);
+        hold_back.end();
+        hold_back.begin();
+        assert!((0..JOINTS).all(|joint| !hold_back.has_pressed(joint)));
+        assert_eq!(
+            first(&mut hold_back, 1_000, &PRESSED, &going()),
+            Some((PRESSED_MS + 1, HoldBackStep::Stop))
+        );
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        assert_eq!(first(&mut hold_back, QUIET_MS - 1, &[false; JOINTS], &going()), None);
+        hold_back.end();
+        hold_back.begin();
+        assert_eq!(
+            first(&mut hold_back, 1_000, &[false; JOINTS], &going()),
+            Some((QUIET_MS, HoldBackStep::Restore))
+        );
+    }
+
+    /// After the end, the path is not held back, and the controller does not call `step`. The time at rest starts again. The time for which
+    /// the path was held back remains for this run.
+    #[test]
+    fn j75_the_end_of_holding_back_keeps_only_the_time_of_the_run() {
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        for ms in 1..=3 {
+            hold_back.step(&PRESSED, &going());
+            assert_eq!(hold_back.run_ms(), ms);
+        }
+        hold_back.end();
+        assert!(!hold_back.is_active() && !hold_back.is_watched());
+        assert_eq!(hold_back.run_ms(), 3);
+        hold_back.begin();
+        hold_back.step(&PRESSED, &going());
+        assert_eq!(hold_back.run_ms(), 4);
+        // While the path returns to its normal rate, `step` is called, but the path is not held back.
+        let mut hold_back = HoldBack::default();
+        hold_back.begin();
+        first(&mut hold_back, QUIET_MS, &[false; JOINTS], &going());
+        assert!(!hold_back.is_active() && hold_back.is_watched());
+        hold_back.end();
+        assert!(!hold_back.is_watched());
+        // 1,000 ms below the rate of 0.02 are permitted. After the end, another 1,000 ms are permitted.
+        let mut hold_back = HoldBack::default();
+        for _ in 0..2 {
+            hold_back.begin();
+            for _ in 0..STANDS_MS {
+                assert_ne!(hold_back.step(&[false; JOINTS], &at(0.0)), HoldBackStep::Stop);
+            }
+            hold_back.end();
+        }
+    }
+
+    /// The path is at rest below a rate of 0.02, unless this rate is its normal rate.
+    #[test]
+    fn j75_a_path_at_a_rate_of_a_fiftieth_or_at_its_normal_rate_is_not_at_rest() {
+        for clock in [at(STANDS), PathClock::start(0.0)] {
+            let mut hold_back = HoldBack::default();
+            hold_back.begin();
+            assert!((0..2_000).all(|_| hold_back.step(&[false; JOINTS], &clock) != HoldBackStep::Stop));
+        }
+    }
 }

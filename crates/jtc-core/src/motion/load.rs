@@ -150,4 +150,56 @@ mod tests {
         observe(&mut load, 80.0, 3.0);
         assert_eq!(load.torque(0.0), 80.0);
     }
+
+    /// Returns the limits of a joint with a torque limit of 100 N·m.
+    fn round_limits() -> JointConfig {
+        JointConfig { torque_max: 100.0, ..limits() }
+    }
+
+    /// The bound is 30 % of the torque limit: 54 N·m of 180 N·m, and 30 N·m of 100 N·m.
+    #[test]
+    fn j70_a_load_without_observation_is_bounded_to_30_percent_of_the_limit() {
+        for sign in [1.0, -1.0] {
+            for (torque, of_180, of_100) in
+                [(0.0, 0.0, 0.0), (20.0, 20.0, 20.0), (40.0, 40.0, 30.0), (90.0, 54.0, 30.0)]
+            {
+                assert_eq!(Load::bounded(sign * torque, &limits()), sign * of_180);
+                assert_eq!(Load::bounded(sign * torque, &round_limits()), sign * of_100);
+            }
+        }
+    }
+
+    /// The limit is 100 N·m, so a difference of 10 N·m is not a contact. One observation in 6 ms changes the load by 10 N·m · 6 ms / 1 s =
+    /// 0.06 N·m.
+    #[test]
+    fn j66_a_difference_of_exactly_ten_percent_of_the_limit_is_not_a_contact() {
+        for sign in [1.0, -1.0] {
+            for (integral, expected) in [(10.0, 0.06), (10.5, 0.0)] {
+                let mut load = Load::default();
+                load.set(0.0);
+                load.observe(sign * integral, true, &round_limits());
+                let torque = load.known_torque();
+                assert!((torque - sign * expected).abs() < 1e-6, "{integral} N·m: {torque} N·m");
+            }
+        }
+    }
+
+    /// The integral alternates between 0 and 3 N·m, exactly 3 % of the limit of 100 N·m. The 1,667th observation is the first one after ten
+    /// seconds: 1,666 · 6 ms = 9.996 s, and 1,667 · 6 ms = 10.002 s. This observation sets the load to the integral.
+    #[test]
+    fn j66_an_integral_within_exactly_three_percent_of_the_limit_is_steady() {
+        let mut load = Load::default();
+        for k in 1..1_667 {
+            load.observe(if k % 2 == 0 { 3.0 } else { 0.0 }, true, &round_limits());
+            assert!(load.known_torque() < 2.0, "the mean is 1.5 N·m: {}", load.known_torque());
+        }
+        load.observe(3.0, true, &round_limits());
+        assert_eq!(load.known_torque(), 3.0);
+        // An integral that changes by more is not steady.
+        let mut load = Load::default();
+        for k in 1..=1_667 {
+            load.observe(if k % 2 == 0 { 0.0 } else { 3.5 }, true, &round_limits());
+        }
+        assert!(load.known_torque() < 2.5, "the mean is 1.75 N·m: {}", load.known_torque());
+    }
 }

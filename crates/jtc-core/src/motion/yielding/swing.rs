@@ -84,4 +84,66 @@ mod tests {
         assert_eq!(swing(20, [0.1, -0.1]).soft, 1.0, "too slow to matter");
         assert_eq!(swing(100, [0.3, -0.3]).soft, 1.0, "no swing of a loop");
     }
+
+    /// Executes half swings with these durations (ms) and velocities (rad/s), and one tick after the last reversal. Returns `soft`.
+    fn after(halves: &[(usize, f64)]) -> f32 {
+        let mut swing = Swing::NONE;
+        for &(ms, velocity) in halves {
+            (0..ms).for_each(|_| {
+                swing.step(velocity);
+            });
+        }
+        let (_, last) = halves[halves.len() - 1];
+        swing.step(-last);
+        swing.soft
+    }
+
+    /// The motion before the first reversal may have begun long before the yield, so this motion is not half a swing. The joint therefore
+    /// becomes softer at the third reversal, for each direction of the first motion.
+    #[test]
+    fn j68_a_joint_becomes_softer_at_the_third_reversal() {
+        for v in [0.3, -0.3] {
+            assert_eq!(after(&[(20, v)]), 1.0);
+            assert_eq!(after(&[(20, v), (20, -v)]), 1.0);
+            assert_eq!(after(&[(20, v), (20, -v), (20, v)]), 0.5);
+            assert_eq!(after(&[(20, v), (20, -v), (20, v), (20, -v)]), 0.25);
+        }
+    }
+
+    /// Each half of a swing is faster than 0.15 rad/s and takes at most 80 ms. The second half has at least half of the speed of the first
+    /// half.
+    #[test]
+    fn j68_both_halves_of_a_swing_are_fast_short_and_alike() {
+        for sign in [1.0, -1.0] {
+            for (first, second, soft) in [
+                ((20, 0.5), (20, 0.5), 0.5),
+                ((79, 0.5), (79, 0.5), 0.5),
+                ((81, 0.5), (20, 0.5), 1.0),
+                ((20, 0.5), (81, 0.5), 1.0),
+                ((20, 0.15), (20, 0.5), 1.0),
+                ((20, 0.2), (20, 0.15), 1.0),
+                ((20, 0.2), (20, 0.14), 1.0),
+                ((20, 0.16), (20, 0.16), 0.5),
+                ((20, 0.5), (20, 0.2), 1.0),
+                ((20, 0.5), (20, 0.24), 1.0),
+                ((20, 0.5), (20, 0.26), 0.5),
+                ((20, 0.2), (20, 0.5), 0.5),
+            ] {
+                let halves = [(20, sign * 0.3), (first.0, -sign * first.1), (second.0, sign * second.1)];
+                assert_eq!(after(&halves), soft, "{first:?}, {second:?}");
+            }
+        }
+    }
+
+    /// The speed of a half swing is its highest speed. Before and after this speed, the joint is slow.
+    #[test]
+    fn j68_the_highest_speed_of_a_half_swing_counts() {
+        let mut swing = Swing::NONE;
+        for half in [1.0, -1.0, 1.0, -1.0] {
+            for velocity in [0.02, 0.1, 0.3, 0.1, 0.02] {
+                swing.step(half * velocity);
+            }
+        }
+        assert_eq!(swing.soft, 0.5, "three reversals");
+    }
 }

@@ -4,6 +4,11 @@ use proptest::prelude::*;
 use super::*;
 use crate::Config;
 
+mod doubted_load;
+mod end;
+mod lowered_load;
+mod torques;
+
 const INERTIA: f64 = 5.0;
 const SHARE: f64 = 0.3;
 
@@ -24,6 +29,11 @@ fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
         let slow = Joint { young_velocity: 0.19 * limits.velocity_max, ..joint };
         assert_eq!(yields.step(&slow).d, 0.0);
     }
+}
+
+/// Returns limits with round numbers: a torque limit of 100 N·m and a velocity limit of 2 rad/s.
+fn round_limits() -> JointConfig {
+    JointConfig { torque_max: 100.0, velocity_max: 2.0, ..limits() }
 }
 
 /// Returns the inputs of a joint in the middle of a wide range.

@@ -268,9 +268,11 @@ impl Yield {
         let loaded = carried.abs() > LOADED * limit;
         let sinks = loaded && velocity * carried < 0.0 && velocity.abs() > AT_REST;
         self.sinks_ms = if sinks { self.sinks_ms.saturating_add(1) } else { 0 };
-        self.sunk = (self.sunk - velocity * carried.signum() * DT).max(0.0);
-        if !self.lowers && loaded && (self.sunk > SINKS.0 || self.sinks_ms > SINKS.1) {
-            self.lower(p);
+        if loaded {
+            self.sunk = (self.sunk - velocity * carried.signum() * DT).max(0.0);
+            if !self.lowers && (self.sunk > SINKS.0 || self.sinks_ms > SINKS.1) {
+                self.lower(p);
+            }
         }
         if !self.lowers {
             self.doubt(velocity, p + d);

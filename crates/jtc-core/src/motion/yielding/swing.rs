@@ -37,8 +37,8 @@ impl Swing {
         let velocity = velocity as f32;
         if velocity * self.peak < 0.0 {
             let speed = self.peak.abs();
-            let swings = self.half_ms < HALF_MS && speed > HALF_SPEED;
-            if swings && self.before > 0.0 && speed > LASTS * self.before {
+            let swings = self.half_ms <= HALF_MS && speed > HALF_SPEED;
+            if swings && self.before > 0.0 && speed >= LASTS * self.before {
                 (self.soft, self.soft_ms) = ((SOFTER * self.soft).max(SOFTEST), 0);
             }
             self.before = if swings { speed } else { 0.0 };
@@ -117,7 +117,7 @@ mod tests {
         for sign in [1.0, -1.0] {
             for (first, second, soft) in [
                 ((20, 0.5), (20, 0.5), 0.5),
-                ((79, 0.5), (79, 0.5), 0.5),
+                ((80, 0.5), (80, 0.5), 0.5),
                 ((81, 0.5), (20, 0.5), 1.0),
                 ((20, 0.5), (81, 0.5), 1.0),
                 ((20, 0.15), (20, 0.5), 1.0),
@@ -126,6 +126,7 @@ mod tests {
                 ((20, 0.16), (20, 0.16), 0.5),
                 ((20, 0.5), (20, 0.2), 1.0),
                 ((20, 0.5), (20, 0.24), 1.0),
+                ((20, 0.5), (20, 0.25), 0.5),
                 ((20, 0.5), (20, 0.26), 0.5),
                 ((20, 0.2), (20, 0.5), 0.5),
             ] {

@@ -99,3 +99,21 @@ fn j70_a_load_of_exactly_95_percent_of_the_limit_is_held_again() {
         }
     }
 }
+
+/// The limit is 100 N·m. A hand moves the joint by 0.6 rad in a pose in which gravity pulls with 4 N·m, less than 5 % of the limit. This
+/// motion is no sinking. In a pose with 20 N·m, the joint then sinks by 0.4 rad, which is not too far, and by another 0.2 rad, which is.
+#[test]
+fn j68_only_a_joint_that_gravity_pulls_sinks() {
+    let limits = round_limits();
+    for sign in [1.0, -1.0] {
+        let mut yields = Yield::begin(false, false, 0.0, INERTIA, 0.0);
+        for (ms, velocity, model, lowers) in
+            [(2_000, -0.3, 4.0, false), (1_000, -0.4, 20.0, false), (500, -0.4, 20.0, true)]
+        {
+            for _ in 0..ms {
+                tick(&mut yields, &at(&limits, 0.0, sign * velocity, sign * model));
+            }
+            assert_eq!(yields.lowers(), lowers, "{model} N·m");
+        }
+    }
+}

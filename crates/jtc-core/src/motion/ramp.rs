@@ -38,6 +38,12 @@ impl PathRamp {
         }
     }
 
+    /// Creates a ramp that begins with this mass matrix of the arm, kg·m².
+    #[cfg(test)]
+    pub(crate) fn with_inertia_for_test(inertia: [[f64; JOINTS]; JOINTS]) -> Self {
+        Self { inertia }
+    }
+
     /// Returns the inertia of each joint at the start of the ramp, for a motion of this joint alone, kg·m².
     pub(crate) fn inertia(&self) -> [f64; JOINTS] {
         core::array::from_fn(|j| self.inertia[j][j])

@@ -229,3 +229,6 @@ impl Motion {
 fn highest(torques: &[[f64; JOINTS]; 2], j: usize) -> f64 {
     torques.iter().fold(0.0, |most: f64, torque| most.max(torque[j].abs()))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,25 +1,11 @@
 //! Events from the parsers of all serial lines, copied in order for the controller. While the controller processes the events, the
 //! parsers can accept more bytes.
+use crate::event::{LinkEvent, ReceivedEvent};
 use crate::frame::{FRAME_MAX, FrameRef, FrameType};
 use crate::response::{DataStatus, FrameStatus, Response};
-use crate::stream::LinkEvent;
 
 /// Maximum number of events in a batch, and of events that a controller executes in one tick.
 pub const EVENTS_MAX: usize = 16;
-
-/// An event with its serial line and its position in the byte stream.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ReceivedEvent<'a> {
-    /// Number of the serial line of the event.
-    pub line: usize,
-    /// Position of the first byte of the event in the byte stream of its serial line.
-    pub position: u64,
-    /// `true` for a frame on a plain line. A line is plain if no extension request arrived on it in the 2 s before the first byte
-    /// of the frame (J-51).
-    pub plain: bool,
-    /// The received event.
-    pub event: LinkEvent<'a>,
-}
 
 /// Events in the order of execution. All fields are integers, so that zeroed memory is an empty batch.
 pub struct EventBatch {

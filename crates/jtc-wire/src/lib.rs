@@ -17,6 +17,7 @@ mod crc;
 mod describe;
 mod encode;
 mod encode_error;
+mod event;
 mod extension;
 pub mod fixed;
 mod floats;
@@ -31,7 +32,7 @@ mod stream;
 mod urgent;
 pub mod words;
 
-pub use batch::{EVENTS_MAX, EventBatch, ReceivedEvent};
+pub use batch::{EVENTS_MAX, EventBatch};
 pub use bits::{can_flag, error, joint_error, missing_parameter};
 pub use code::{Code, Known};
 pub use command::{ALL_NODES, Command, ExecCommand};
@@ -42,6 +43,7 @@ pub use encode::{
     trajectory,
 };
 pub use encode_error::{Channel, EncodeError, FloatName, OutOfScale};
+pub use event::{LinkEvent, ReceivedEvent};
 /// The states of the drives and the gripper in a status are the states that the joint bus defines.
 pub use jtc_bus::{Joint, NodeState};
 
@@ -63,7 +65,7 @@ pub use state::{ControllerState, TrajectoryState};
 pub use status::{
     GripperStatus, JointStatus, STATUS_LEN, STATUS_LEN_NO_GRIPPER, STATUS_LEN_SHORT_INDEX, Status,
 };
-pub use stream::{KNOWN_US, LinkEvent, Receiver};
+pub use stream::{KNOWN_US, Receiver};
 pub use urgent::{UrgentCommand, UrgentCommands, UrgentWatch};
 
 /// Byte ranges of the parts of each frame. Each range is defined once.

@@ -11,35 +11,14 @@
 //! Cost: the parser copies each byte once and adds it to the CRC once, when it arrives. The CRC register is stored at every 64th byte, so
 //! that the parser can check a candidate of any length with two registers and some arithmetic. In hostile input full of false headers, the
 //! work for each header is constant, and [`Receiver::poll`] scans a bounded number of headers per call.
-use crate::batch::ReceivedEvent;
 use crate::crc::advance;
+use crate::event::{LinkEvent, ReceivedEvent};
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
 use crate::response::{FrameStatus, Response};
 
 mod registers;
 
 use registers::Registers;
-
-/// Event that the parser found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LinkEvent<'a> {
-    /// A good frame.
-    Frame(FrameRef<'a>),
-    /// Invalid frame, including the bytes that follow it without a gap.
-    Bad(Response),
-    /// Run of bytes whose first byte is not the start of a frame.
-    Noise(Response),
-}
-
-impl LinkEvent<'_> {
-    /// Returns the frame status of the response record (J-05).
-    pub fn status(&self) -> FrameStatus {
-        match self {
-            Self::Frame(_) => FrameStatus::NoError,
-            Self::Bad(response) | Self::Noise(response) => response.status,
-        }
-    }
-}
 
 /// Time after an extension request in which the controller assumes that the client of the line knows the extensions, µs (J-51). After this
 /// time, the line is *plain*.

@@ -305,6 +305,50 @@ mod tests {
         }
     }
 
+    /// An arm that comes to rest after hand guiding still moves, so the cause of its held stop stays.
+    #[test]
+    fn j69_a_held_stop_is_not_cleared_while_the_arm_comes_to_rest_after_teaching() {
+        for (velocity, reacts) in [(0.0, false), (0.25, true)] {
+            let mut controller = holding();
+            let nodes = Nodes::enabled_at([0.0; JOINTS], [velocity; JOINTS]);
+            controller.motion.set.hold_for_test();
+            controller.motion.set.hold_measured(&nodes, 200.0, &controller.config);
+            assert!(!controller.is_reacting(), "no held stop");
+            controller.errors.hold_joints(&[joint_error::TORQUE; JOINTS], true);
+            assert_eq!(controller.is_reacting(), reacts, "{velocity} rad/s");
+        }
+    }
+
+    /// A set value outside a limit of the path does not come from the gains, even before the joint has settled.
+    #[test]
+    fn j71_a_violated_limit_of_the_path_does_not_end_a_trial_of_gains() {
+        for settled in [true, false] {
+            let mut controller = holding();
+            try_gains(&mut controller);
+            let on_trial = controller.parameters.pid;
+            controller
+                .react(ControlMode::Hold, &second(Found { errors: joint_error::VELOCITY, settled, ..HELD }));
+            assert_eq!(controller.last_stop.cause.kind, StopKind::Velocity, "settled: {settled}");
+            assert!(controller.parameters.trial.is_on(), "settled: {settled}");
+            assert_eq!(controller.parameters.pid, on_trial, "settled: {settled}");
+        }
+    }
+
+    /// A joint yields with the inertia of the arm at this moment. A stop without a yield does not need this inertia.
+    #[test]
+    fn j68_the_inertia_is_computed_for_a_joint_that_yields() {
+        for (found, computed) in [
+            (Found { pushed: true, ..HELD }, true),
+            (Found { overloaded: true, ..HELD }, true),
+            (Found { errors: joint_error::VELOCITY, ..HELD }, false),
+        ] {
+            let mut controller = holding();
+            controller.react(ControlMode::Hold, &second(found));
+            assert!(controller.errors.held_stop(), "{found:?}");
+            assert_eq!(controller.motion.ramp.inertia() != [0.0; JOINTS], computed, "{found:?}");
+        }
+    }
+
     #[test]
     fn j66_the_first_row_that_applies_wins() {
         use Reaction::*;

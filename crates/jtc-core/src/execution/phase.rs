@@ -103,3 +103,6 @@ impl Phase {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

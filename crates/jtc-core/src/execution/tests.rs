@@ -4,6 +4,9 @@ use jtc_wire::Segment;
 use super::*;
 use crate::{Config, ControllerState};
 
+mod hold_back;
+mod starting;
+
 fn braking(state: ControllerState, trajectory: TrajectoryState) -> Controller<[RawPoint; 4]> {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
     (controller.state, controller.trajectory, controller.braking_ms) = (state, trajectory, Some(5));
@@ -295,4 +298,48 @@ fn j75_only_a_motion_that_goes_on_is_held_back() {
     let Phase::Approaching { clock, .. } = &mut controller.phase else { panic!() };
     clock.time = 1.0;
     assert!(controller.hold_back());
+}
+
+/// Returns the current internal errors of the joints.
+fn joint_errors(controller: &Controller<[RawPoint; 4]>) -> [u16; JOINTS] {
+    core::array::from_fn(|j| controller.errors.joint(j).0)
+}
+
+/// A path or jog that still moves joint 3 at the end of the braking time ends, and joint 3 lowers its load. With `torque_release`, the same
+/// overload is an error that releases the arm.
+#[test]
+fn j33_j70_a_motion_that_cannot_be_stopped_ends_with_the_configured_reaction() {
+    let most = Config::avena().braking_ms_max;
+    for (jogs, releases) in [(false, false), (false, true), (true, false), (true, true)] {
+        for (ms, over) in [(most - 1, false), (most, true)] {
+            let mut controller = pausing(ms);
+            controller.config.torque_release = releases;
+            controller.phase = Phase::Running { leave: Some(TrajectoryState::Stop) };
+            if jogs {
+                (controller.state, controller.trajectory) =
+                    (ControllerState::HoldPos, TrajectoryState::Finish);
+                let config = Config::avena();
+                controller.motion.set.jog(&[0.0, 0.0, 0.1, 0.0, 0.0, 0.0], &[1.0; JOINTS], &config);
+                controller.motion.set.end_jog();
+                assert!(controller.motion.set.jog_ends(), "the jog comes to rest");
+            }
+            controller.motion.set.point.velocity[2] = -0.03;
+            let case = (jogs, releases, ms);
+            assert_eq!(controller.brake(), !over, "{case:?}");
+            let torque = if over { joint_error::TORQUE } else { 0 };
+            assert_eq!(joint_errors(&controller), [0, 0, torque, 0, 0, 0], "{case:?}");
+            let held = over && !releases;
+            assert_eq!(controller.errors.any(), over && releases, "{case:?}");
+            assert_eq!(controller.errors.held_stop(), held, "{case:?}");
+            let yields: [bool; JOINTS] = core::array::from_fn(|j| controller.motion.law.yields(j));
+            assert_eq!(yields, [false, false, held, false, false, false], "{case:?}");
+            assert_eq!(controller.motion.set.jogging(), jogs && !held, "{case:?}");
+            let trajectory = match (jogs, held) {
+                (true, _) => TrajectoryState::Finish,
+                (false, true) => TrajectoryState::Stop,
+                (false, false) => TrajectoryState::Execute,
+            };
+            assert_eq!(controller.trajectory, trajectory, "{case:?}");
+        }
+    }
 }

@@ -186,6 +186,8 @@ mod tests {
     use super::super::law::ControlParameters;
     use super::*;
     use crate::config::Config;
+    use crate::motion::catch::Catch;
+    use crate::motion::deceleration::Deceleration;
     use crate::nodes::Nodes;
     use crate::{Parameters, PidGains};
 
@@ -197,6 +199,7 @@ mod tests {
         law: ControlLaw,
         set: SetValues,
         limiter: Limiter,
+        on_trial: bool,
     }
 
     impl Bench {
@@ -207,7 +210,19 @@ mod tests {
             set.hold_for_test();
             set.catch.iter_mut().for_each(|catch| catch.calm_down());
             let config = Config { delay_ticks: 0, ..Config::avena() };
-            Self { config, law: ControlLaw::default(), set, limiter: Limiter::default() }
+            Self { config, law: ControlLaw::default(), set, limiter: Limiter::default(), on_trial: false }
+        }
+
+        /// Makes joint 2 yield.
+        fn yielding(mut self) -> Self {
+            self.law.begin_yield(1, (false, false), 0.0, 5.0, &self.config.joints[1]);
+            self
+        }
+
+        /// Begins the catch of every joint, so that no joint has settled.
+        fn catching(mut self) -> Self {
+            self.set.catch = [Catch::begin(&self.config); JOINTS];
+            self
         }
 
         /// Sets the feedback torque of joint 2 to `shares` times its permitted share.
@@ -244,7 +259,7 @@ mod tests {
                     pid: &[GAINS; JOINTS],
                     polynomial: &[[0.0; 6]; JOINTS],
                     table: None,
-                    on_trial: false,
+                    on_trial: self.on_trial,
                 };
                 let inputs = LawInputs { mode, braking, nodes: &nodes, config: &self.config, parameters };
                 limited = Limited::default();
@@ -378,6 +393,154 @@ mod tests {
             let ahead = 1.01 * limits.position_error_max;
             let found = bench.run(1, mode, (ahead, 0.0)).1;
             assert_eq!(found.errors & (position | acceleration), errors, "{mode:?}");
+        }
+    }
+
+    /// A yielding joint has no position controller, and its torque is bounded by construction.
+    #[test]
+    fn j68_a_yielding_joint_is_neither_overloaded_nor_pushed_and_does_not_sag() {
+        for yields in [false, true] {
+            let bench = || if yields { Bench::settled().yielding() } else { Bench::settled() };
+            let mut overloaded = bench();
+            overloaded.law.torque[1].model = 300.0;
+            assert_eq!(overloaded.run(60, HOLD, STILL).1.overloaded, !yields);
+            assert_eq!(bench().with_feedback(1.5).run(21, HOLD, STILL).1.pushed, !yields);
+            let most = Config::avena().joints[1].velocity_max;
+            assert_eq!(bench().run(1, HOLD, (1.1e-3, 0.21 * most)).1.pushed, !yields);
+            let ahead = 1.01 * Config::avena().joints[1].position_error_max;
+            let errors = if yields { 0 } else { joint_error::POSITION_ERROR };
+            assert_eq!(bench().run(1, HOLD, (ahead, 0.0)).1.errors, errors);
+            // The torque exceeds its limit of 180 N·m by 120 N·m. With a position gain of 100 N·m/rad, the set position sags to the measured
+            // position.
+            let mut sags = bench().catching();
+            sags.law.torque[1].model = 300.0;
+            sags.run(1, HOLD, (-0.05, 0.0));
+            assert_eq!(sags.set.point.position[1], if yields { 0.0 } else { -0.05 });
+        }
+    }
+
+    /// A swing of 0.2 rad/s in one direction and 0.25 rad/s in the other direction grows. On a path, and while the arm comes to rest, a
+    /// growing speed belongs to the motion.
+    #[test]
+    fn j43_j66_a_swing_that_grows_is_unstable_only_while_the_joint_is_held() {
+        for (mode, yields, unstable) in [
+            (HOLD, false, true),
+            (HOLD, true, false),
+            (REST, false, false),
+            (FOLLOW, false, false),
+            ((ControlMode::Approach, false, false), false, false),
+        ] {
+            let mut bench = if yields { Bench::settled().yielding() } else { Bench::settled() }.catching();
+            [0.2, -0.25].iter().for_each(|&velocity| {
+                bench.set.catch[1].step(velocity);
+            });
+            assert_eq!(bench.run(1, mode, STILL).1.unstable, unstable, "{mode:?} {yields}");
+        }
+    }
+
+    /// A settled joint makes three half swings, each faster than the half swing before it.
+    #[test]
+    fn j71_a_swing_of_a_settled_joint_counts_while_gains_are_on_trial() {
+        for (on_trial, mode, unstable) in [(true, HOLD, true), (false, HOLD, false), (true, FOLLOW, false)] {
+            let mut bench = Bench { on_trial, ..Bench::settled() };
+            let found = [0.05, -0.08, 0.11].map(|velocity| bench.run(1, mode, (0.0, velocity)).1.unstable);
+            assert_eq!(found, [false, false, unstable], "{on_trial} {mode:?}");
+        }
+    }
+
+    /// The torque reaches each limit twice. In Teaching, a hand causes the torque.
+    #[test]
+    fn j66_a_torque_that_jumps_between_its_limits_is_unstable_except_in_teaching() {
+        for (mode, unstable) in [(HOLD, true), (FOLLOW, true), ((ControlMode::Teach, false, false), false)] {
+            let mut bench = Bench::settled();
+            let found = [300.0, -300.0, 300.0, -300.0].map(|torque| {
+                bench.law.torque[1].model = torque;
+                bench.run(1, mode, STILL).1.unstable
+            });
+            assert_eq!(found, [false, false, false, unstable], "{mode:?}");
+        }
+    }
+
+    /// 10 ticks at the limit, 20 ticks with too much feedback torque, and three changes of the limit are permitted. After the counters were
+    /// cleared, the same number of ticks is permitted again.
+    #[test]
+    fn j66_a_joint_that_begins_to_yield_starts_with_cleared_counters() {
+        let mut pushed = Bench::settled().with_feedback(1.5);
+        assert!(!pushed.run(20, HOLD, STILL).1.pushed);
+        pushed.limiter.forget(1);
+        assert!(!pushed.run(20, HOLD, STILL).1.pushed && pushed.run(1, HOLD, STILL).1.pushed);
+        let mut overloaded = Bench::settled();
+        overloaded.law.torque[1].model = 300.0;
+        assert!(!overloaded.run(10, HOLD, STILL).1.overloaded);
+        overloaded.limiter.forget(1);
+        assert!(!overloaded.run(10, HOLD, STILL).1.overloaded && overloaded.run(1, HOLD, STILL).1.overloaded);
+        let mut jumps = Bench::settled();
+        for torque in [300.0, -300.0, 300.0, -300.0, 300.0, -300.0] {
+            jumps.law.torque[1].model = torque;
+            assert!(!jumps.run(1, HOLD, STILL).1.unstable);
+            jumps.limiter.forget(1);
+        }
+    }
+
+    /// Feedback torque at the permitted share, speed at the limit for braking, and a shove at both of its limits are still permitted.
+    #[test]
+    fn j66_the_limits_of_a_push_themselves_are_permitted() {
+        for shares in [1.0, -1.0] {
+            assert!(!Bench::settled().with_feedback(shares).run(60, HOLD, STILL).1.pushed, "{shares}");
+        }
+        // A fast joint may use twice its share.
+        for shares in [2.0, -2.0] {
+            let mut bench = Bench::settled().with_feedback(shares);
+            let velocity = bench.set_velocity(0.8);
+            assert!(!bench.run(60, FOLLOW, (0.0, velocity)).1.pushed, "{shares}");
+        }
+        // A joint that moves at `DRIVEN` does not count as moving, so the torque does not brake the joint.
+        let braking = (ControlMode::Hold, true, false);
+        assert!(Bench::settled().with_feedback(1.5).run(21, braking, (0.0, -DRIVEN)).1.pushed);
+        let most = Config::avena().joints[1].velocity_max;
+        for sign in [1.0, -1.0] {
+            let at_speed = (sign * 1.1e-3, sign * RUSH * most);
+            assert!(!Bench::settled().run(1, HOLD, at_speed).1.pushed, "{sign}");
+            let at_distance = (sign * RUSH_WAY, sign * 0.21 * most);
+            assert!(!Bench::settled().run(1, HOLD, at_distance).1.pushed, "{sign}");
+        }
+    }
+
+    /// A joint that decelerates needs its feedback torque to stop. A joint that has not settled is still caught.
+    #[test]
+    fn j43_j66_a_joint_that_decelerates_or_is_caught_is_not_pushed() {
+        for (decelerates, pushed) in [(false, true), (true, false)] {
+            let mut bench = Bench::settled().with_feedback(1.5);
+            if decelerates {
+                let limits = &bench.config.joints[1];
+                bench.set.deceleration[1] = Some(Deceleration::led(0.0, 0.3, 200.0, limits));
+            }
+            assert_eq!(bench.run(21, HOLD, STILL).1.pushed, pushed, "{decelerates}");
+        }
+        let most = Config::avena().joints[1].velocity_max;
+        assert!(!Bench::settled().catching().run(1, HOLD, (1.1e-3, 0.21 * most)).1.pushed);
+    }
+
+    /// The set velocity is 1 rad/s. A joint that moves at 0.5 rad/s is slower than its set velocity, even if it is ahead of its set
+    /// position. A joint that moves at 1.4 rad/s exceeds its set velocity by more than 0.3 rad/s.
+    #[test]
+    fn j66_only_a_joint_that_is_faster_than_its_set_velocity_is_shoved() {
+        for (velocity, pushed) in [(0.5, false), (1.2, false), (1.4, true)] {
+            let mut bench = Bench::settled();
+            bench.set.point.velocity[1] = 1.0;
+            assert_eq!(bench.run(1, FOLLOW, (1.1e-3, velocity)).1.pushed, pushed, "{velocity} rad/s");
+        }
+    }
+
+    /// A joint at exactly `LAGS` times its set velocity does not lag. A joint whose set velocity is zero has come to rest and cannot lag.
+    #[test]
+    fn j25_j66_a_joint_lags_below_its_share_of_a_set_velocity_only() {
+        for sign in [1.0, -1.0] {
+            let mut bench = Bench::settled().with_feedback(sign * 3.0).catching();
+            let set = bench.set_velocity(sign * 0.3);
+            assert!(!bench.run(21, REST, (0.0, LAGS * set)).1.pushed, "{sign}");
+            let mut rests = Bench::settled().with_feedback(sign * 3.0).catching();
+            assert!(!rests.run(21, REST, (0.0, sign * -0.06)).1.pushed, "{sign}");
         }
     }
 }

@@ -88,4 +88,38 @@ mod tests {
             assert_eq!(found(1, times, &config), too_fast, "{times}");
         }
     }
+
+    /// Four measurements above the threshold, one measurement below it, and four more above it are not five consecutive measurements. This
+    /// holds for a single fast joint, and for an arm whose joints are all fast.
+    #[test]
+    fn j35_a_measurement_within_the_threshold_restarts_the_time() {
+        let config = Config::avena();
+        for fast in [[false, true, false, false, false, false], [true; JOINTS]] {
+            let speeds = |times: f64| {
+                core::array::from_fn(|j| {
+                    let threshold = config.overspeed_factor * config.joints[j].velocity_max;
+                    if fast[j] { times * threshold } else { 0.0 }
+                })
+            };
+            let mut over_speed = OverSpeed::default();
+            for (tick, above) in
+                [true, true, true, true, false, true, true, true, true, true].into_iter().enumerate()
+            {
+                let nodes = Nodes::enabled_at([0.0; JOINTS], speeds(if above { 1.001 } else { 0.5 }));
+                let errors = over_speed.watch(&nodes, &config);
+                let expected = fast.map(|fast| if fast && tick == 9 { joint_error::VELOCITY } else { 0 });
+                assert_eq!(errors, expected, "tick {tick}");
+            }
+        }
+    }
+
+    /// With an allowed time of zero, a slow joint has no error while another joint is too fast.
+    #[test]
+    fn j35_only_the_joint_that_is_too_fast_has_an_error() {
+        let config = Config { overspeed_ms: 0, ..Config::avena() };
+        let mut speeds = [0.0; JOINTS];
+        speeds[4] = -1.001 * config.overspeed_factor * config.joints[4].velocity_max;
+        let errors = OverSpeed::default().watch(&Nodes::enabled_at([0.0; JOINTS], speeds), &config);
+        assert_eq!(errors, [0, 0, 0, 0, joint_error::VELOCITY, 0]);
+    }
 }

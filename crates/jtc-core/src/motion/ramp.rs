@@ -220,4 +220,133 @@ mod tests {
             }
         }
     }
+
+    /// Returns a ramp with this inertia of joints 1 and 2. The other joints have no inertia.
+    fn ramp([first, second]: [[f64; 2]; 2]) -> PathRamp {
+        let mut ramp = PathRamp::default();
+        (ramp.inertia[0][0], ramp.inertia[0][1]) = (first[0], first[1]);
+        (ramp.inertia[1][0], ramp.inertia[1][1]) = (second[0], second[1]);
+        ramp
+    }
+
+    /// Returns settings in which every joint has this torque limit, N·m, and a very high acceleration limit.
+    fn limited(torque_max: f64) -> Config {
+        let mut config = Config::avena();
+        for limits in &mut config.joints {
+            (limits.torque_max, limits.acceleration_max) = (torque_max, 1e6);
+        }
+        config
+    }
+
+    fn close(found: f64, expected: f64) -> bool {
+        found == expected || (found - expected).abs() <= 1e-9 * expected.abs()
+    }
+
+    #[test]
+    fn j34_the_inertia_of_a_joint_is_on_the_diagonal_and_its_coupling_beside_it() {
+        let ramp = ramp([[2.0, 0.5], [0.25, 4.0]]);
+        assert_eq!(ramp.inertia(), [2.0, 4.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!((ramp.coupling(0, 1), ramp.coupling(1, 0), ramp.coupling(1, 1)), (0.5, 0.25, 4.0));
+    }
+
+    /// The peak torque of the stop is twice the momentum divided by its time. Half of the torque that remains within the limit of 64 N·m is
+    /// available, and at least a tenth of the limit.
+    #[test]
+    fn j25_a_stop_after_teaching_takes_the_time_that_its_slowest_joint_needs() {
+        let config = limited(64.0);
+        let torque = |model: f64, load: f64| JointTorque { model, load, ..JointTorque::default() };
+        // Joint 1 has the momentum 2·0.25 + 1·0.5 = 1 kg·m²/s, and joint 2 has no momentum.
+        let coupled = [[2.0, 1.0], [0.0, 0.0]];
+        for (inertia, velocity, torques, ms) in [
+            // Half of 64 + 16 N·m: 2·1 / 40 s = 50 ms.
+            (coupled, [0.25, 0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 50.0),
+            // In the other direction, the holding torque reduces the available torque. Half of 64 − 16 N·m: 2·1 / 24 s.
+            (coupled, [-0.25, -0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 2_000.0 / 24.0),
+            (coupled, [0.25, 0.5], [torque(-12.0, -4.0), torque(0.0, 0.0)], 2_000.0 / 24.0),
+            // The holding torque needs all torque. A tenth of 64 N·m: 2·1 / 6.4 s = 312.5 ms.
+            (coupled, [-0.25, -0.5], [torque(60.0, 4.0), torque(0.0, 0.0)], 312.5),
+            (coupled, [-0.25, -0.5], [torque(100.0, 4.0), torque(0.0, 0.0)], 312.5),
+            // Half of 64 N·m: 2·4 / 32 s = 250 ms for joint 2, and 2·1 / 32 s = 62.5 ms for joint 1.
+            ([[2.0, 0.0], [0.0, 4.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
+            ([[8.0, 0.0], [0.0, 1.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
+            // Opposite momenta cancel each other.
+            (coupled, [0.25, -0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 0.0),
+            (coupled, [0.0, 0.0], [torque(12.0, 4.0), torque(0.0, 0.0)], 0.0),
+        ] {
+            let mut law = ControlLaw::default();
+            (law.torque[0], law.torque[1]) = (torques[0], torques[1]);
+            let velocity = [velocity[0], velocity[1], 0.0, 0.0, 0.0, 0.0];
+            let found = ramp(inertia).shortest_stop_ms(&law, &velocity, &config);
+            assert!(close(found, ms), "{velocity:?} {torques:?}: {found} ms, expected {ms} ms");
+        }
+    }
+
+    #[test]
+    fn j33_path_time_at_its_target_rate_has_no_slope() {
+        let (ramp, config) = (PathRamp::default(), Config::avena());
+        let mut clock = PathClock::start(0.5);
+        clock.slope = 5.0;
+        ramp.step(&SetPoint::default(), &ControlLaw::default(), &mut clock, &config);
+        assert_eq!((clock.rate, clock.slope), (0.5, 0.0));
+    }
+
+    /// The ramp takes a second, but a stop takes at most 250 ms. A change to another rate, which is not a stop, takes the whole ramp.
+    #[test]
+    fn j33_a_stop_is_faster_than_a_ramp_that_takes_longer_than_a_stop_may() {
+        let config = Config { ramp_ms: 1_000, stop_ms: 250, ..Config::avena() };
+        let after_250_ms = |mut clock: PathClock| {
+            for _ in 0..250 {
+                let law = ControlLaw::default();
+                PathRamp::default().step(&SetPoint::default(), &law, &mut clock, &config);
+            }
+            clock
+        };
+        let mut halts = PathClock::start(1.0);
+        halts.halt();
+        assert!(after_250_ms(halts).standing());
+        let mut slows = PathClock::start(1.0);
+        slows.set_pace(0.125);
+        assert!(after_250_ms(slows).rate > 0.5);
+    }
+
+    /// Joint 1 needs 60 N·m of 50 N·m. Its inertia of 2 kg·m² moves at 1 rad/s at full speed, so a slope of −5 1/s removes the excess. The
+    /// slope of path time covers a tenth of the difference in one tick.
+    #[test]
+    fn j75_path_time_that_is_held_back_follows_the_slope_at_the_torque_limit() {
+        let config = limited(50.0);
+        let mut law = ControlLaw::default();
+        law.torque[0].model = 60.0;
+        let at = SetPoint { velocity: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], ..SetPoint::default() };
+        let mut clock = PathClock::start(1.0);
+        ramp([[2.0, 0.0], [0.0, 2.0]]).hold_back(&at, &law, &mut clock, &config);
+        assert!(close(clock.slope, -0.5) && close(clock.rate, 1.0 - 0.0005), "{clock:?}");
+    }
+
+    /// Joint 2 yields, so it does not move along the path. Its coupling does not push joint 1, and its own limits do not bound the slope.
+    /// Joint 1 has a torque of 40 N·m and an inertia of 2 kg·m².
+    #[test]
+    fn j68_a_joint_that_yields_does_not_bound_the_slope_of_path_time() {
+        let config = limited(50.0);
+        let at = SetPoint { velocity: [1.0, 1.0, 0.0, 0.0, 0.0, 0.0], ..SetPoint::default() };
+        for (yields, full, easy) in [
+            // (−50 − 40) / 2 and (50 − 40) / 2; with 0.95·50 N·m, (−47.5 − 40) / 2 and (47.5 − 40) / 2.
+            (true, (-45.0, 5.0), (-43.75, 3.75)),
+            // The push on joint 1 is 2 + 4 = 6 N·m·s, and on joint 2 it is 4 + 8 = 12 N·m·s at a torque of 0: the bounds are
+            // max(−90 / 6, −50 / 12) and min(10 / 6, 50 / 12); with the easy limits max(−87.5 / 6, −47.5 / 12) and 7.5 / 6.
+            (false, (-50.0 / 12.0, 10.0 / 6.0), (-47.5 / 12.0, 7.5 / 6.0)),
+        ] {
+            let mut law = ControlLaw::default();
+            law.torque[0].model = 40.0;
+            if yields {
+                law.begin_yield(1, (false, false), 0.0, 8.0, &config.joints[1]);
+            }
+            let bounds = ramp([[2.0, 4.0], [4.0, 8.0]]).slope_bounds(&at, &law, 1.0, 0.0, &config);
+            for (found, expected) in [(bounds.full, full), (bounds.easy, easy)] {
+                assert!(
+                    close(found.0, expected.0) && close(found.1, expected.1),
+                    "{yields}: {found:?}, expected {expected:?}"
+                );
+            }
+        }
+    }
 }

@@ -5,6 +5,8 @@ use crate::interpolation::SetPoint;
 use crate::motion::catch::Catch;
 use crate::motion::deceleration::Deceleration;
 
+mod parts;
+
 /// Returns the motion of an arm in which these joints are held.
 fn holding(joints: [bool; JOINTS]) -> Motion {
     let mut motion = Motion::default();

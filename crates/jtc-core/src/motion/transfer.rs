@@ -189,4 +189,78 @@ mod tests {
         }
         assert!(last[2] == 0.0 && last[0] > 4.5, "{last:?}");
     }
+
+    /// Returns the blended torque of a tick in which the correction of every joint changes from `last` to `now`, N·m.
+    fn changed(transfer: &mut Transfer, last: f64, now: f64) -> [f64; JOINTS] {
+        let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);
+        let mut torque = [JointTorque { friction: now, ..JointTorque::default() }; JOINTS];
+        transfer.blend(before, &mut torque, &nodes, &Config::avena());
+        torque.map(|torque| torque.blend)
+    }
+
+    /// Executes 10 more ticks. Returns the blended torque of the last tick.
+    fn after_10_ms(transfer: &mut Transfer) -> [f64; JOINTS] {
+        (0..10).map(|_| blended(transfer, 0.0)).last().unwrap_or_default()
+    }
+
+    /// Another change of the torques comes `ms` after joint 3 has begun to yield. If the torque of joint 3 still falls, it falls to its new
+    /// value within 10 ms. After the fall, the torque of joint 3 is blended out like the torques of the other joints: 10 of 100 ms leave
+    /// 1 - 3 · 0.1² + 2 · 0.1³, which is 0.972.
+    #[test]
+    fn j44_j68_a_torque_that_falls_goes_on_falling_when_another_joint_yields() {
+        for (ms, falls) in [(1, true), (5, true), (9, true), (10, false), (15, false)] {
+            let mut transfer = Transfer::default();
+            transfer.begin_yield(2);
+            (0..ms).for_each(|k| {
+                blended(&mut transfer, if k == 0 { 5.0 } else { 0.0 });
+            });
+            transfer.begin_yield(4);
+            assert_eq!(blended(&mut transfer, 4.0), [4.0; JOINTS], "{ms} ms");
+            let left = after_10_ms(&mut transfer);
+            for j in 0..JOINTS {
+                let expected = if j == 4 || (j == 2 && falls) { 0.0 } else { 4.0 * 0.972 };
+                assert!((left[j] - expected).abs() < 1e-9, "{ms} ms, joint {}: {}", j + 1, left[j]);
+            }
+        }
+    }
+
+    /// Only an excess torque falls within 10 ms. If the torque of a yielding joint rises, or begins at zero, it is blended as usual.
+    #[test]
+    fn j44_j68_only_an_excess_torque_falls_fast() {
+        for (last, now, step, falls) in [
+            (5.0, 2.0, 3.0, true),
+            (-5.0, -2.0, -3.0, true),
+            (5.0, -2.0, 7.0, true),
+            (2.0, 5.0, -3.0, false),
+            (-2.0, -5.0, 3.0, false),
+            (0.0, -5.0, 5.0, false),
+            (0.0, 5.0, -5.0, false),
+        ] {
+            let mut transfer = Transfer::default();
+            transfer.begin_yield(2);
+            assert_eq!(changed(&mut transfer, last, now), [step; JOINTS], "{last} {now}");
+            let left = after_10_ms(&mut transfer)[2];
+            let expected = if falls { 0.0 } else { 0.972 * step };
+            assert!((left - expected).abs() < 1e-9, "{last} {now}: {left}");
+        }
+    }
+
+    /// The torque of a joint that was just enabled begins at the torque of the model, so the correction of 5 N·m is blended in. The torque
+    /// of the other joints does not change.
+    #[test]
+    fn j16_j44_only_the_joint_that_was_just_enabled_begins_at_the_torque_of_the_model() {
+        let mut transfer = Transfer::default();
+        transfer.set_just_enabled(core::array::from_fn(|j| j == 3));
+        for ms in 0..100 {
+            let blend = changed(&mut transfer, 5.0, 5.0);
+            let u = f64::from(ms) / 100.0;
+            let expected = -5.0 * (1.0 - u * u * (3.0 - 2.0 * u));
+            for j in 0..JOINTS {
+                let expected = if j == 3 { expected } else { 0.0 };
+                assert!((blend[j] - expected).abs() < 1e-9, "{ms} ms, joint {}: {}", j + 1, blend[j]);
+            }
+        }
+        assert_eq!(transfer.left_ms, 0, "after `blend_ms`, no step is left");
+    }
 }

@@ -142,11 +142,4 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn j69_only_the_joints_of_a_mask_get_the_error() {
-        assert_eq!(errors_of(0b10_0010, 7), [0, 7, 0, 0, 0, 7]);
-    }
-}
+mod tests;

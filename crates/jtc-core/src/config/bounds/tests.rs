@@ -160,3 +160,18 @@ fn j06_of_a_table_the_first_row_in_motion_is_named() {
     };
     assert_eq!(BOUNDS.check_table(&table, &joint()).map_err(|e| e.velocity), Err(Some(0.125)));
 }
+
+/// The bounds of the mass and inertia of a link also apply to a payload.
+#[test]
+fn j06_the_mass_and_inertia_of_a_payload_reach_the_bounds_of_a_link() {
+    let with = |change: fn(&mut Payload)| {
+        let mut payload = Payload { mass: 1.0, ..Payload::NONE };
+        change(&mut payload);
+        BOUNDS.check_payload(&payload).is_ok()
+    };
+    assert!(with(|payload| payload.mass = 50.0) && !with(|payload| payload.mass = 50.01));
+    assert!(with(|payload| payload.mass = 0.0) && !with(|payload| payload.mass = -0.01));
+    assert!(!with(|payload| payload.mass = f64::NAN));
+    assert!(with(|payload| payload.inertia[5] = 100.0) && !with(|payload| payload.inertia[5] = 100.1));
+    assert!(with(|payload| payload.inertia[5] = -100.0) && !with(|payload| payload.inertia[5] = -100.1));
+}

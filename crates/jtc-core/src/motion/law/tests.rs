@@ -8,6 +8,9 @@ use crate::motion::pid::PidTorque;
 use crate::motion::{Found, Motion};
 use crate::parameters::Friction;
 
+mod loads;
+mod yields;
+
 /// Pose of a bent arm, in which gravity loads joint 2 with several tens of N·m.
 const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];
 const MODES: [ControlMode; 4] =

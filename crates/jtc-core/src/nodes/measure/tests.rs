@@ -4,6 +4,7 @@ extern crate std;
 use super::*;
 
 mod late;
+mod readings;
 
 const VELOCITY_MAX: f64 = 2.0;
 /// Error of a prediction (rad) or of a rate (rad/s), because the history has single precision.

@@ -1,0 +1,163 @@
+//! Tests of late answers, of the more recent velocity, and of the two distances of a joint (J-35, J-63, J-68).
+use super::*;
+use crate::interpolation::SetPoint;
+
+/// Joint 2 was commanded to k² rad and 3·k rad/s in tick k, so each pair of ticks has another distance. The present tick is tick 9.
+#[test]
+fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
+    let mut commanded = Commanded::default();
+    for k in 0..10 {
+        commanded.next_tick();
+        let (mut position, mut velocity) = ([7.0; JOINTS], [8.0; JOINTS]);
+        (position[1], velocity[1]) = (f64::from(k * k), 3.0 * f64::from(k));
+        commanded.put(&SetPoint { position, velocity, ..SetPoint::default() });
+    }
+    for (delay_ticks, ticks, ms, velocity, way) in [
+        // The answer was due 2 ticks ago, in tick 7, and belongs to tick 4: 49 − 16.
+        (2, 3, 3, 12.0, 33.0),
+        (2, 0, 0, 21.0, 0.0),
+        (2, 5, 5, 6.0, 45.0),
+        // The commands of the last 7 ticks are stored, so the answer counts as 5 ticks late: 49 − 4.
+        (2, 7, 5, 6.0, 45.0),
+        // Without a configured delay, an answer belongs to the last tick, tick 8: 64 − 36.
+        (0, 2, 2, 18.0, 28.0),
+        (1, 2, 2, 18.0, 28.0),
+        (4, 1, 1, 12.0, 9.0),
+    ] {
+        let config = Config { delay_ticks, ..Config::avena() };
+        let late = Late::new(ticks, 1, &commanded, &config);
+        let found = (late.ms, late.commanded, late.commanded_way);
+        assert_eq!(found, (ms, velocity, way), "delay {delay_ticks}, {ticks} ticks late");
+    }
+}
+
+/// The rate of the positions minus the due velocity is limited to 2.5 times the reported velocity minus the due velocity. The remainder of a
+/// fading offset does not belong to the reported velocity.
+#[test]
+fn j68_the_young_velocity_is_not_far_from_the_reported_velocity() {
+    for (rate, used, offset, due, young) in [
+        // 1 − 0.25 = 0.75 of at most 2.5 · (0.75 − 0.25 − 0.25) = 0.625.
+        (1.0, 0.75, 0.25, 0.25, 0.875),
+        (-1.0, -0.75, -0.25, -0.25, -0.875),
+        // 0.5 − 0.25 = 0.25 of at most 2.5 · 0.5.
+        (0.5, 1.0, 0.25, 0.25, 0.5),
+        // 0.5 − 0.75 = −0.25 of at most 2.5 · |0.5 − 0.75| = 0.625.
+        (0.5, 0.5, 0.0, 0.75, 0.5),
+        (-1.0, 0.5, 0.0, 0.75, 0.125),
+        // The differences have opposite signs, so the encoder has jumped.
+        (0.75, 0.0, 0.0, 0.25, 0.25),
+        (0.0, 0.75, 0.0, 0.25, 0.25),
+        (0.75, 0.25, 0.25, 0.25, 0.25),
+        // The reported velocity is the due velocity, or the positions follow the due velocity.
+        (0.75, 0.25, 0.0, 0.25, 0.25),
+        (0.25, 0.75, 0.0, 0.25, 0.25),
+    ] {
+        let joint = Measurement {
+            rate,
+            used: Reading { position: 1.0, velocity: used },
+            velocity_offset: Fading { left: offset, slope: 0.0 },
+            ..Measurement::default()
+        };
+        assert_eq!(joint.young_velocity(due), young, "{rate} {used} {offset} {due}");
+    }
+}
+
+/// In a window of 10 ms, a joint at 0.5 rad/s moves 5 mrad. If the newest answer is missing, the distance ends at the last answer, which is
+/// 9 ms after the start of the window. The distance does not contain the prediction. Without a window, the distances are not known.
+#[test]
+fn j35_the_distance_of_the_positions_contains_only_answers() {
+    let velocity = 0.5;
+    for (window_ms, missing, measured) in
+        [(10, 0, Some(0.005)), (10, 1, Some(0.0045)), (10, 2, None), (4, 0, Some(0.002)), (0, 0, None)]
+    {
+        let config = Config { drive_speed_window_ms: window_ms, ..Config::avena() };
+        let mut joint = moving(velocity);
+        for _ in 0..missing {
+            step(&mut joint, &tick(None, velocity));
+        }
+        let ways = joint.ways(&config);
+        assert_eq!(ways.is_some(), measured.is_some(), "{window_ms} ms, {missing} missing");
+        if let (Some(ways), Some(measured)) = (ways, measured) {
+            assert!((ways.measured - measured).abs() < ROUNDED, "{window_ms} ms: {ways:?}");
+            let reported = velocity * f64::from(window_ms) * DT;
+            assert!((ways.reported - reported).abs() < 1e-12, "{window_ms} ms: {ways:?}");
+        }
+    }
+}
+
+/// An answer up to a tenth of the implausible distance from its prediction is used as it is. Such an answer does not show a jump or a turn
+/// of the drive's positions, even if a jump is subtracted. After 10 s without an answer, the implausible distance is 60 rad.
+#[test]
+fn j35_an_answer_near_its_prediction_is_used_as_it_is() {
+    let bound = UNEXPECTED * (IMPLAUSIBLE * DT * VELOCITY_MAX * 10_000.0);
+    assert!((bound - 6.0).abs() < 1e-9, "{bound}");
+    for position in [bound, -bound, 4.0, -4.0, 3.0] {
+        let mut joint = moving(0.0);
+        joint.jumps.take_off(0.25);
+        let long = Tick { elapsed_ms: 10_000, ..tick(Some(position), 0.0) };
+        assert!(step(&mut joint, &long));
+        assert_eq!(joint.used().position, position);
+    }
+}
+
+/// A late answer is at most as old as the time since the last answer. Here the last answer arrived one tick ago, so both answers of this
+/// tick belong to this tick, because the bus has repeated a frame.
+#[test]
+fn j63_an_answer_is_never_older_than_the_last_answer() {
+    let mut joint = moving(0.1);
+    let twice = Tick { asked: false, answers: 2, ..tick(Some(0.1 * DT), 0.1) };
+    assert!(step(&mut joint, &twice), "the answer is usable");
+    assert_eq!(joint.answered_ms, joint.clock_ms);
+    assert!((joint.used().position - 0.1 * DT).abs() < ROUNDED);
+}
+
+/// Before the first usable answer, no other answer limits the lateness. The answer was due one tick ago, and the joint has since moved by
+/// its commanded distance.
+#[test]
+fn j63_the_first_answer_may_be_late() {
+    let mut joint = Measurement::default();
+    let twice = Tick { asked: false, answers: 2, ..tick(Some(0.25), 0.5) };
+    assert!(step(&mut joint, &twice));
+    assert_eq!(joint.answered_ms, joint.clock_ms - 1);
+    assert!((joint.used().position - (0.25 + 0.5 * DT)).abs() < 1e-12);
+}
+
+/// Discarding the prediction does not change the knowledge that answers of this joint may be late.
+#[test]
+fn j63_the_evidence_of_late_answers_survives_a_discarded_prediction() {
+    let mut joint = moving(0.0);
+    step(&mut joint, &Tick { answers: 2, ..tick(Some(0.0), 0.0) });
+    assert!(!joint.lateness.stands(1));
+    joint.forget();
+    assert!(step(&mut joint, &tick(Some(0.5), 0.0)));
+    assert_eq!(joint.used().position, 0.5);
+    assert!(!joint.lateness.stands(1));
+}
+
+/// A joint at rest answers at 4 mrad, further than a tenth of the implausible distance of 6 mrad. On time, this answer may show a jump of
+/// the encoder, so the controller assumes that the joint has not moved. The answer of the tick before cannot show a jump, because the speed
+/// of a late answer belongs to another window. The encoder of a joint without torque is not checked either.
+#[test]
+fn j35_only_an_answer_on_time_of_an_enabled_joint_may_show_a_jump() {
+    for (enabled, late, watched) in
+        [(true, false, true), (true, true, false), (false, false, false), (false, true, false)]
+    {
+        let mut joint = moving(0.0);
+        let at = |answers: u8, position: f64| Tick {
+            answers,
+            enabled,
+            ..tick((answers > 0).then_some(position), 0.0)
+        };
+        // An answer arrives together with the answer of the next tick, which is the evidence of late answers.
+        step(&mut joint, &at(0, 0.0));
+        step(&mut joint, &at(2, 0.0));
+        if late {
+            step(&mut joint, &at(0, 0.0));
+        }
+        assert!(step(&mut joint, &at(1, 0.004)), "{enabled} {late}");
+        assert_eq!(joint.clock_ms - joint.answered_ms, u32::from(late));
+        assert_eq!(joint.jumps.watching(), watched, "{enabled} {late}");
+        let expected = if watched { 0.0 } else { 0.004 };
+        assert!((joint.answer.position - expected).abs() < ROUNDED, "{enabled} {late}: {joint:?}");
+    }
+}

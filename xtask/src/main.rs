@@ -41,12 +41,11 @@ Usage: cargo xtask COMMAND
                                performance and tracking figures beside their anchors, all measured in this run
   bench tracking               write docs/tracking.md: our control law beside that of the existing firmware, on one arm
   soak [--hours H] [--seed N]  virtual time with random commands and faults (default: 24 hours, seed 1)
-  prove mutants [--package NAME] [--survivors|--changed|--resume] [--report]
-                               mutation testing of the crates that run on a board (hours); fails when a survivor has no
-                               sentence in docs/evidence.md or more than 3 % of a crate survive
-                               --survivors: only those of the last run; --changed: only those on lines that have
-                               changed since; --resume: go on with the crate that was interrupted; --report: judge
-                               the results that are there
+  prove mutants [--package NAME] [--left] [--longest SECONDS] [--report]
+                               mutation testing of the crates that run on a board (an hour); fails when a survivor has
+                               no sentence in docs/evidence.md or more than 3 % of a crate survive
+                               --left: only mutants without an outcome, and survivors; --longest: duration of the
+                               longest test that runs (default 0.2 s); --report: judge the results that are there
   prove fuzz [TARGET] [--runs N] [--keep]
                                run one fuzz target, or each of them, up to 20000000 executions each, counted by commit
                                in docs/evidence.md

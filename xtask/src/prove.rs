@@ -1,6 +1,5 @@
 //! `cargo xtask prove`: checks that take hours and are therefore not part of `cargo xtask test`. The results of these
 //! checks are in docs/evidence.md.
-mod changes;
 mod evidence;
 mod fuzz;
 mod mutants;

@@ -203,4 +203,46 @@ mod tests {
         let at = |factor: f64| polynomial(&[2.0, 0.0, 0.0, 0.0, 1.0, 20.0], 0.5, 19.0 + factor, 0.02);
         assert_eq!([0.1, 0.2, 1.0, 1.5, 2.0, 2.1].map(at), [0.4, 0.4, 2.0, 3.0, 4.0, 4.0]);
     }
+
+    #[test]
+    fn j42_the_coulomb_friction_of_the_polynomial_is_c0_times_the_temperature_factor() {
+        // At 20.5 °C, the factor is 1 + 1 · (20.5 − 20) = 1.5.
+        for (c0, t, coulomb) in [(4.0, 20.5, 6.0), (4.0, 20.0, 4.0), (4.0, 0.0, 0.8), (-4.0, 20.5, 0.0)] {
+            let found = coulomb_of_polynomial(&[c0, 9.0, 9.0, 9.0, 1.0, 20.0], t);
+            assert!((found - coulomb).abs() < 1e-12, "{c0} {t}: {found}");
+        }
+    }
+
+    /// Returns a table with the torque `c0 + c1·|v|` against each direction of the motion. The velocities are `first + i · 0.1`, rad/s.
+    fn straight(first: f32, forward: [f32; 2], backward: [f32; 2]) -> TableOf<f32> {
+        let velocity: [f32; 20] = core::array::from_fn(|i| first + i as f32 * 0.1);
+        let torque = velocity.map(|v| {
+            let [c0, c1] = if v > 0.0 { forward } else { backward };
+            [(c0 + c1 * v.abs()) * v.signum(); 20]
+        });
+        TableOf { velocity, temperature: core::array::from_fn(|i| 20.0 + i as f32), torque }
+    }
+
+    /// The straight line through the torques at 0.1 and 0.2 rad/s is extended to standstill. The torque at standstill is at most the torque
+    /// at 0.1 rad/s, and the lower torque of both directions counts.
+    #[test]
+    fn j42_the_coulomb_friction_of_the_table_is_the_lower_torque_at_standstill() {
+        for (first, forward, backward, coulomb) in [
+            // The lines reach standstill at 4 and 6 N·m.
+            (-0.95, [4.0, 3.0], [6.0, 3.0], 4.0),
+            (-0.95, [6.0, 3.0], [4.0, 3.0], 4.0),
+            // The torque falls with the speed, so the torque at 0.1 rad/s counts: 5 − 2 · 0.1 = 4.8 N·m.
+            (-0.95, [5.0, -2.0], [6.0, 3.0], 4.8),
+            (-0.95, [6.0, 3.0], [5.0, -2.0], 4.8),
+            // A torque in the direction of the motion is not friction.
+            (-0.95, [-4.0, 0.0], [6.0, 3.0], 0.0),
+            (-0.95, [6.0, 3.0], [-4.0, 0.0], 0.0),
+            // The table does not contain 0.2 rad/s in one direction.
+            (-0.15, [4.0, 3.0], [6.0, 3.0], 0.0),
+            (-1.75, [4.0, 3.0], [6.0, 3.0], 0.0),
+        ] {
+            let found = coulomb_of_table(&straight(first, forward, backward), 25.0);
+            assert!((found - coulomb).abs() < 1e-5, "{first} {forward:?} {backward:?}: {found}");
+        }
+    }
 }

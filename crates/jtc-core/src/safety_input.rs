@@ -69,3 +69,6 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && self.motion.set.moving(&self.nodes) == [false; JOINTS]
     }
 }
+
+#[cfg(test)]
+mod tests;

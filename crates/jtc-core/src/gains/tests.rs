@@ -232,3 +232,79 @@ fn j66_a_joint_that_is_unstable_again_within_half_a_second_is_known() {
         trial.step(true);
     }
 }
+
+/// A joint with exactly the required inertia is accepted.
+#[test]
+fn j71_a_joint_with_the_required_inertia_is_accepted() {
+    let config = Config::avena();
+    let needed = given().map(|gains| inertia_needed(&gains, config.delay_ticks));
+    assert!(FeltInertia { joints: needed }.bears(&given(), &config));
+    for j in 0..JOINTS {
+        let mut joints = needed;
+        joints[j] = joints[j].next_down();
+        assert!(!FeltInertia { joints }.bears(&given(), &config), "joint {}", j + 1);
+    }
+}
+
+/// The position gain must produce 3 % of the torque limit at the position error limit. The torque that the new integral cannot keep may
+/// deflect the joint by less than a quarter of the position error limit.
+#[test]
+fn j71_a_held_joint_keeps_a_stiff_position_and_sags_little() {
+    // 3 % of 100 N·m is 3 N·m, which 6 N·m/rad produce at 0.5 rad. With 8 N·m/rad, the largest sag of 0.125 rad has 1 N·m.
+    let limits = JointConfig { torque_max: 100.0, position_error_max: 0.5, ..Config::avena().joints[1] };
+    let soft = |kp: f64| PidGains { kp, ki: 0.0, kd: 0.0, int_min: 0.0, int_max: 0.0 };
+    // The integral of these gains keeps torques from −50 to 50 N·m. The largest sag has 0.125 · 800 = 100 N·m.
+    let kept = PidGains { kp: 800.0, ki: 100.0, kd: 0.0, int_min: -0.5, int_max: 0.5 };
+    for (gains, p, i, holds) in [
+        (soft(6.0), 0.0, 0.0, true),
+        (soft(5.9375), 0.0, 0.0, false),
+        (soft(8.0), 0.0, 0.9375, true),
+        (soft(8.0), 0.0, -0.9375, true),
+        (soft(8.0), 0.0, 1.0, false),
+        (soft(8.0), 0.0, -1.0, false),
+        (soft(8.0), 0.75, 0.5, false),
+        (soft(8.0), 0.75, -0.5, true),
+        (kept, 0.0, 149.0, true),
+        (kept, 0.0, 150.0, false),
+        (kept, 0.0, -149.0, true),
+        (kept, 0.0, -150.0, false),
+        (kept, 100.0, 60.0, false),
+        (kept, 100.0, -60.0, true),
+    ] {
+        assert_eq!(hold_on(&gains, p, i, &limits), holds, "{gains:?}, {p} N·m, {i} N·m");
+    }
+}
+
+/// The gains before a trial return only if the controller may still restore them.
+#[test]
+fn j71_gains_that_may_not_return_are_discarded() {
+    for may in [false, true] {
+        let mut trial = Trial::default();
+        trial.begin(&scaled(0.5), &given());
+        trial.keep_if(|before| {
+            assert_eq!(before, &scaled(0.5));
+            may
+        });
+        assert_eq!(trial.end(), may.then(|| scaled(0.5)));
+    }
+}
+
+/// The trial runs while gains may return, while gains are blended, or while an instability of a joint is remembered.
+#[test]
+fn j71_a_trial_runs_until_its_last_time_has_passed() {
+    assert!(!Trial::default().runs());
+    assert!(Trial { before: Some(given()), ..Trial::default() }.runs());
+    assert!(Trial { again_ms: 1, ..Trial::default() }.runs());
+    assert!(Trial { blend_ms: 1, ..Trial::default() }.runs());
+}
+
+/// A failure without an unstable control loop does not change the record of an unstable joint.
+#[test]
+fn j66_a_joint_that_was_unstable_stays_known_after_a_tick_without_instability() {
+    let mut trial = Trial::default();
+    assert_eq!(trial.fails(0, 0, &given(), 2), None);
+    assert!(!trial.runs());
+    trial.fails(1 << 2, 1 << 2, &given(), 2);
+    assert_eq!(trial.fails(1, 0, &given(), 2), None);
+    assert!(trial.again(2) && !trial.again(0));
+}

@@ -242,4 +242,19 @@ mod tests {
             assert_eq!(node.enabled(), enabled, "{valid} {state}");
         }
     }
+
+    /// An absent joint counts as configured and ready. Its reported state is Start, unless its drive still reports a state.
+    #[test]
+    fn j53_an_absent_joint_is_ready_and_shown_in_start() {
+        let mut node = Node::default();
+        node.report.state = NodeState::ENABLED;
+        assert_eq!(node.state(), NodeState::ENABLED);
+        node.stand_in();
+        assert_eq!((node.state(), node.report.state), (NodeState::START, NodeState::READY));
+        assert!(node.absent() && node.configured && node.valid && !node.seen && !node.misbehaved);
+        assert!(!node.fallen_back() && !node.faulty() && !node.wants_configuration());
+        node.unasked = Some(NodeState::INIT);
+        node.stand_in();
+        assert_eq!((node.state(), node.misbehaved), (NodeState::INIT, true));
+    }
 }

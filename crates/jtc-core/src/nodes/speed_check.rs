@@ -107,3 +107,6 @@ impl Differs {
         false
     }
 }
+
+#[cfg(test)]
+mod tests;

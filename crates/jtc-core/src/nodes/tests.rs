@@ -4,8 +4,10 @@ use jtc_bus::{Frame, GripperReport, Request, Target};
 use super::*;
 use crate::io::BusState;
 
+mod absent;
 mod bring_up;
 mod frames;
+mod measured;
 mod missing;
 
 const SCALE: Scale = Scale { velocity: 2.0 };

@@ -180,4 +180,52 @@ mod tests {
             }
         }
     }
+
+    /// Returns a history with one answer in each millisecond from `first_ms` to `last_ms`. The position of an answer is its time, rad.
+    fn in_turn(first_ms: u32, last_ms: u32) -> History {
+        let answer = |at_ms: u32| Answered { position: f64::from(at_ms), at_ms };
+        let mut history = History::of(&answer(first_ms));
+        (first_ms..=last_ms).for_each(|at_ms| _ = history.take(&answer(at_ms), true));
+        history
+    }
+
+    /// The position at the start of a window is known if an answer arrived in each millisecond since then. Only the answer of the last
+    /// millisecond may be missing.
+    #[test]
+    fn j35_the_position_before_a_window_without_a_gap_is_known() {
+        let history = in_turn(100, 110);
+        for (now_ms, ms, from) in [
+            (110, 0, Some(110.0)),
+            (110, 1, Some(109.0)),
+            (110, 10, Some(100.0)),
+            // The history has no answer of 99 ms.
+            (110, 11, None),
+            (111, 0, None),
+            (111, 1, Some(110.0)),
+            (111, 11, Some(100.0)),
+            (111, 12, None),
+            // Two answers are missing.
+            (112, 2, None),
+            (112, 10, None),
+        ] {
+            assert_eq!(history.before(now_ms, ms), from, "{ms} ms before {now_ms} ms");
+        }
+        // The answer of 111 ms is missing, so only the answers from 112 ms on are in turn.
+        let mut gap = in_turn(100, 110);
+        (112..=115).for_each(|at_ms| _ = gap.take(&Answered { position: f64::from(at_ms), at_ms }, true));
+        assert_eq!((gap.before(115, 3), gap.before(115, 4)), (Some(112.0), None));
+    }
+
+    /// The history has 16 slots, so the oldest known position is 15 ms older than the newest answer.
+    #[test]
+    fn j35_positions_up_to_the_oldest_stored_answer_are_known() {
+        let history = in_turn(100, 140);
+        assert_eq!((history.before(140, 15), history.before(140, 16)), (Some(125.0), None));
+        assert_eq!((history.before(141, 16), history.before(141, 17)), (Some(125.0), None));
+        for (at_ms, position) in
+            [(140, Some(140.0)), (133, Some(133.0)), (125, Some(125.0)), (124, None), (141, None)]
+        {
+            assert_eq!(history.at(at_ms), position, "{at_ms} ms");
+        }
+    }
 }

@@ -190,3 +190,6 @@ impl Jumps {
         Seen::Jump(way)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -196,4 +196,78 @@ mod tests {
         lateness.count(true, 1, u32::from(LASTS_MS) + 7);
         assert!(lateness.stands(1));
     }
+
+    /// Before the first evidence, every Move counts as sent and as answered. If no Move was sent for the tick of the first evidence, the
+    /// newest answer belongs to the Move before it.
+    #[test]
+    fn j63_before_the_first_evidence_each_tick_counts_as_a_tick_with_a_move() {
+        assert_eq!(Lateness::default().count(true, 2, 1), 0);
+        assert_eq!(Lateness::default().count(false, 2, 1), 1);
+    }
+
+    /// At most as many Moves are outstanding as answers were late in one tick. This number is forgotten with the evidence.
+    #[test]
+    fn j63_no_more_moves_are_outstanding_than_answers_were_late_in_one_tick() {
+        let mut lateness = Lateness::default();
+        for answers in [2, 4, 3, 8, 9, 2] {
+            lateness.count(true, answers, 1);
+            (0..10).for_each(|_| _ = lateness.count(true, 0, 1));
+            // All answers except the last one were late. The count ends at a lateness of 7.
+            assert_eq!(lateness.count(true, 1, 1), (answers - 1).min(7), "{answers} answers");
+            lateness.count(true, 1, u32::from(LASTS_MS));
+            assert!(lateness.stands(1));
+        }
+    }
+
+    /// A lost answer is subtracted at the end of the next window in which the number of outstanding Moves does not return to zero. A window
+    /// has 64 ticks.
+    #[test]
+    fn j63_a_lost_answer_is_subtracted_after_a_window_of_64_ticks() {
+        let mut lateness = Lateness::default();
+        for tick in 1..=200 {
+            // The answer of the second tick is lost. No Move is outstanding in the first tick, so the first window subtracts nothing.
+            let answers = match tick {
+                1 => 2,
+                2 => 0,
+                _ => 1,
+            };
+            let late = lateness.count(true, answers, 1);
+            if tick > 2 {
+                assert_eq!(late, u8::from(tick < 128), "tick {tick}");
+            }
+        }
+    }
+
+    /// Of the outstanding Moves, only the Moves after the newest answered Move remain outstanding. `moves` marks the ticks with a Move.
+    #[test]
+    fn j63_the_moves_before_a_later_answer_are_lost() {
+        for (moves, late, outstanding) in [
+            (0b1111_1111u8, 0, 0),
+            (0b1111_1111, 1, 1),
+            (0b1111_1111, 2, 2),
+            (0b1111_1111, 3, 3),
+            // No more Moves are outstanding than before.
+            (0b1111_1111, 7, 3),
+            // In the last two ticks, one Move was sent.
+            (0b1111_1101, 2, 1),
+            (0b1111_1110, 2, 1),
+            (0b1111_1100, 2, 0),
+            (0b1010_1010, 5, 2),
+        ] {
+            let mut lateness = Lateness { left_ms: 9, outstanding: 3, most: 7, fewest: 3, window: 5, moves };
+            lateness.lost(late);
+            let found = (lateness.outstanding, lateness.fewest, lateness.moves, lateness.window);
+            assert_eq!(found, (outstanding, outstanding, moves, 5), "{moves:#b} {late}");
+        }
+    }
+
+    /// The highest counted lateness is 7 ticks, even if no Move was sent for a longer time.
+    #[test]
+    fn j63_a_lateness_of_more_than_seven_ticks_is_not_counted() {
+        let mut lateness = Lateness::default();
+        lateness.count(true, 2, 1);
+        for ticks in 1..=12 {
+            assert_eq!(lateness.count(false, 0, 1), ticks.min(7), "{ticks} ticks without a Move");
+        }
+    }
 }

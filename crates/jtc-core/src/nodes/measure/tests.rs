@@ -5,6 +5,7 @@ use super::*;
 
 mod late;
 mod readings;
+mod unexpected;
 
 const VELOCITY_MAX: f64 = 2.0;
 /// Error of a prediction (rad) or of a rate (rad/s), because the history has single precision.

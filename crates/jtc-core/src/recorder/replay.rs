@@ -329,3 +329,6 @@ impl BitSink for Digest {
         (self.hash, self.bits) = (mixed, self.bits + u64::from(bits));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -311,4 +311,47 @@ mod tests {
             }
         }
     }
+
+    /// A Trajectory body with two points, 20 ms apart. Byte 9 is the low byte of the first position, and byte 45 is that of the second.
+    fn body() -> [u8; 80] {
+        let mut body = [0; 80];
+        (body[5], body[7], body[9], body[45]) = (1, 20, 3, 4);
+        body
+    }
+
+    /// A log shows the state and the progress on the path from the snapshot.
+    #[test]
+    fn j56_a_snapshot_shows_the_state_and_the_time_on_the_path() {
+        let body = body();
+        let segment = jtc_wire::Segment::parse(&body).expect("a segment");
+        let mut controller = Box::new(Controller::new(Config::avena(), [RawPoint::default(); 4]));
+        controller.store.begin(&segment, false, false);
+        controller.clock.time = 12.5;
+        for state in ControllerState::ALL {
+            for trajectory in TrajectoryState::ALL {
+                (controller.state, controller.trajectory) = (state, trajectory);
+                let mut bits = Bits::default();
+                controller.origin().write(&mut bits);
+                controller.write_state(&mut bits);
+                let snapshot = Snapshot::read(&mut bits);
+                assert_eq!((snapshot.state(), snapshot.path_ms()), (state, (12.5, 20)));
+                // A replay needs the points only if the controller continues on the path.
+                let needed = trajectory == TrajectoryState::Execute || trajectory == TrajectoryState::Pause;
+                assert_eq!(snapshot.needs_points(), needed, "{trajectory:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn j56_the_points_in_memory_are_those_of_the_trajectory() {
+        let body = body();
+        let segment = jtc_wire::Segment::parse(&body).expect("a segment");
+        let mut controller = Box::new(Controller::new(Config::avena(), [RawPoint::default(); 4]));
+        controller.store.begin(&segment, false, false);
+        assert_eq!(controller.points(), []);
+        controller.store.copy(&segment, 0, 2);
+        controller.store.commit(&segment, Default::default());
+        let points: std::vec::Vec<i16> = controller.points().iter().map(|point| point.position[0]).collect();
+        assert_eq!(points, [3, 4]);
+    }
 }

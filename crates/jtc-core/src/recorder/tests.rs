@@ -1,4 +1,4 @@
-//! The reader returns any frames of the bus unchanged.
+//! Tests of the flight recorder. In this file: the reader returns any frames of the bus unchanged.
 extern crate std;
 use std::vec;
 use std::vec::Vec;
@@ -6,12 +6,21 @@ use std::vec::Vec;
 use jtc_bus::{Frame, id};
 use proptest::prelude::*;
 
+use super::block::Whole;
 use super::inputs::Reference;
 use super::memory::Writer;
 use super::reader::Reader;
 use super::{BLOCK_WORDS, Block, RecordedInputs};
 use crate::NODES;
+use crate::bit_codec::BitSource;
 use crate::io::Inputs;
+
+pub(super) mod bench;
+mod blocks;
+mod events;
+mod frames;
+mod recording;
+mod ring;
 
 /// Change of the answers from one tick to the next.
 #[derive(Clone, Debug)]
@@ -99,4 +108,32 @@ proptest! {
         }
         prop_assert!(reader.at_end());
     }
+}
+
+/// Writes the inputs of ticks and reads them back. The number of each tick is its check value. Each tick has the number of completed host
+/// events. Returns the inputs of each tick, and the number of words that the tick takes in the log.
+fn read_back(ticks: &[(Inputs<'_>, usize)]) -> Vec<(RecordedInputs, u32)> {
+    let mut writer = Writer::new([vec![[0; BLOCK_WORDS]; 8]]);
+    writer.begin();
+    let mut reference = Reference::default();
+    let (mut whole, mut words) = (Vec::new(), Vec::new());
+    let mut before = 0;
+    for (n, (inputs, done)) in ticks.iter().enumerate() {
+        whole.push(reference.write(inputs, *done, n as u16, &mut writer));
+        writer.commit();
+        let bits: u32 = writer.memory()[0].iter().filter_map(Whole::parse).map(|whole| whole.bits).sum();
+        words.push((bits - before) / 32);
+        before = bits;
+    }
+    let blocks = &writer.memory()[0];
+    let (mut reader, mut reference) = (Reader::new(blocks, 0), Reference::default());
+    let mut all = Vec::new();
+    for (n, words) in words.into_iter().enumerate() {
+        let (inputs, check) = RecordedInputs::read(&mut reference, &mut reader);
+        assert_eq!((usize::from(check), inputs.is_whole(), reader.is_damaged()), (n, whole[n], false));
+        assert!(inputs.bus().eq(ticks[n].0.bus.iter().copied()), "frames of tick {n}");
+        all.push((inputs, words));
+    }
+    assert!(reader.at_end());
+    all
 }

@@ -61,12 +61,14 @@ impl Commanded {
     /// `ticks` ago. With a delay of `ticks`, the due position of the joint is then `position`, and it changes at `velocity` in the next
     /// ticks.
     pub(crate) fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
+        let (way, mut after) = (velocity * DT, f64::from(ticks));
         for ago in 0..SLOTS as u8 {
             let slot = self.slot(ago);
             let (positions, velocities) = (&mut self.position[slot], &mut self.velocity[slot]);
             if let (Some(p), Some(v)) = (positions.get_mut(joint), velocities.get_mut(joint)) {
-                (*p, *v) = (position + velocity * DT * (f64::from(ticks) - f64::from(ago)), velocity);
+                (*p, *v) = (position + way * after, velocity);
             }
+            after -= 1.0;
         }
     }
 

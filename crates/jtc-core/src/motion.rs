@@ -138,7 +138,6 @@ impl Motion {
             length_ms = length_ms.max(needed).min(f64::from(config.stop_ms).max(length_ms));
         }
         self.set.hold_measured(nodes, length_ms, config);
-        self.law.begin();
         self.law.end_teaching(nodes, config, gains);
     }
 

@@ -160,14 +160,6 @@ impl ControlLaw {
         self.loads.iter_mut().for_each(Load::forget);
     }
 
-    /// Resets the position controllers for a start at rest, without a position error, and clears the loads.
-    pub(crate) fn begin(&mut self) {
-        for pid in &mut self.pid {
-            pid.reset(0.0);
-        }
-        self.forget_loads();
-    }
-
     /// Resets the control law of joints whose position hold has ended or has not begun.
     pub(crate) fn latch(&mut self, latched: &Latched) {
         for j in 0..JOINTS {

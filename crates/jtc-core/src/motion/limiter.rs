@@ -161,14 +161,16 @@ impl Limiter {
             // The distance is checked first, because the distance exceeds its limit only rarely.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
-            let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
-            let set_errors = limits::check_set(point, error, limits, mode == ControlMode::Follow);
             if catching && self.saturation[j].saturated {
                 let sag = set.sag(j, computed - within, parameters.pid[j].kp, error, limits);
                 limited.sag.get_or_insert([0.0; JOINTS])[j] = sag;
             }
             let looked_at = !taught && !yields && set.holding[j];
-            let errors = if looked_at { set_errors & !excused } else { 0 }
+            let set_errors = || {
+                let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);
+                limits::check_set(point, error, limits, mode == ControlMode::Follow)
+            };
+            let errors = if looked_at { set_errors() & !excused } else { 0 }
                 | if computed.is_nan() { joint_error::TORQUE } else { 0 };
             limited.torque[j] = within;
             let found = Found { errors, overloaded, pushed, strained, settled, unstable };

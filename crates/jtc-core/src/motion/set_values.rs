@@ -52,8 +52,13 @@ impl SetValues {
 
     /// Restarts the set values at rest at `position`, so that any motion can follow.
     pub(crate) fn begin_at(&mut self, position: &[f64; JOINTS]) {
-        self.point = SetPoint::still(*position);
         self.commanded.rest(position);
+        self.restart(position);
+    }
+
+    /// Restarts all set values at rest at `position`, except the set values of the last ticks.
+    fn restart(&mut self, position: &[f64; JOINTS]) {
+        self.point = SetPoint::still(*position);
         // J-63: the restart of the set values does not stop a joint, even if the joint did not follow its set values.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
@@ -130,15 +135,19 @@ impl SetValues {
     /// The controller catches a moving arm like a falling load.
     pub(crate) fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
-        self.begin_at(from);
-        let moving = velocity.iter().any(|&v| moves(v));
+        if !velocity.iter().any(|&v| moves(v)) {
+            self.begin_at(from);
+            return;
+        }
+        self.restart(from);
         for j in 0..JOINTS {
-            // A joint that is enabled later begins with its own latch.
-            self.deceleration[j] = None;
-            if moving && self.holding[j] {
+            if self.holding[j] {
                 let led = Deceleration::led(from[j], velocity[j], length_ms, &config.joints[j]);
                 self.decelerate(j, led, config);
                 self.led = true;
+            } else {
+                // A joint that is enabled later begins with its own latch.
+                self.commanded.begin(j, from[j], 0.0, 0);
             }
         }
         if self.led {

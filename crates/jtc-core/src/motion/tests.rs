@@ -39,7 +39,6 @@ fn j25_an_arm_that_stands_is_held_at_once() {
     let nodes = Nodes::new(&config);
     motion.set.hold_for_test();
     motion.set.hold_measured(&nodes, 200.0, &config);
-    motion.law.begin();
     assert!(motion.set.all_holding());
 }
 

@@ -82,19 +82,6 @@ fn j25_loads_are_known_up_to_and_with_a_little_feedback_torque() {
     assert!(law.knows_loads(&[true; JOINTS], &config, true));
 }
 
-/// After a restart at rest, the position controllers contain no torque, and the controller must learn the loads again.
-#[test]
-fn j41_j66_a_start_at_rest_begins_without_integrals_and_loads() {
-    let mut law = ControlLaw::default();
-    law.find_loads_for_test();
-    law.pid.iter_mut().for_each(|pid| pid.take_over(&WIDE, 12.0));
-    law.begin();
-    for j in 0..JOINTS {
-        assert!(!law.loads[j].is_known());
-        assert_eq!(law.pid[j].step(&WIDE, 0.0, true, None), PidTorque::default(), "joint {}", j + 1);
-    }
-}
-
 /// In Teaching, the position controller does not act, so its integral does not show a load. In HoldPos, the controller observes one joint per
 /// tick. The integral holds no torque, so a load of 2 N·m loses 0.006 of its torque in each observation, with a time constant of 1 s.
 #[test]

@@ -128,8 +128,16 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 (false, true) => joint_error::TORQUE,
                 (false, false) => 0,
             };
-            let kind = if lags.contains(&true) { StopKind::PositionError } else { StopKind::Overload };
-            self.hold_stop(&core::array::from_fn(cause), kind);
+            let errors = core::array::from_fn(cause);
+            // A joint at its torque limit may come before the joint that lags.
+            match lags.iter().position(|lags| *lags) {
+                Some(joint) => {
+                    let (error, limit) = self.motion.lag(joint, &self.nodes, &self.config);
+                    let cause = self.cause(StopKind::PositionError, joint, error, limit);
+                    self.hold_stop_for(&errors, cause);
+                }
+                None => self.hold_stop(&errors, StopKind::Overload),
+            }
         } else if next == HoldBackStep::Restore {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
         }

@@ -104,12 +104,21 @@ impl Motion {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Returns two flags for each joint: `true` if the joint is at its torque limit, and `true` if its position error is above half of the
-    /// maximum.
+    /// Returns two flags for each joint: `true` if the joint is at its torque limit, and `true` if it lags its set position too far.
     pub(crate) fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
-        let (due, q) = (self.set.due(config), nodes.positions());
-        let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
+        let lags = |j: usize| {
+            let (error, limit) = self.lag(j, nodes, config);
+            error.abs() > limit
+        };
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
+    }
+
+    /// Returns the position error of a joint, and its limit while the path is held back, rad. The limit is half of the maximum, so that the
+    /// arm still stops on its path (J-75).
+    pub(crate) fn lag(&self, j: usize, nodes: &Nodes, config: &Config) -> (f64, f64) {
+        let j = j.min(JOINTS - 1); // so that the compiler sees that the index is in range
+        let limit = 0.5 * config.joints[j].position_error_max;
+        (self.set.due(config)[j] - nodes.positions()[j], limit)
     }
 
     /// Returns `true` if the arm is held at rest and the loads of its joints are known. In a held stop, a `contact` may press on the arm,

@@ -13,7 +13,7 @@ fn errors_of(joints: u8, error: u16) -> [u16; JOINTS] {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Begins a held stop. `errors` are the joint errors that the status shows.
+    /// Begins a held stop. `errors` are the joint errors that the status shows. The first joint with an error is the cause.
     pub(crate) fn hold_stop(&mut self, errors: &[u16; JOINTS], kind: StopKind) {
         let joint = errors.iter().position(|bits| *bits != 0).unwrap_or(0);
         let (value, limit) = self.measure(kind, joint);

@@ -87,7 +87,9 @@ fn j75_a_joint_that_lags_while_the_path_is_held_back_stops_the_arm() {
         let stops = expected != [0; JOINTS];
         assert_eq!(controller.errors.held_stop(), stops, "{case:?}");
         if stops {
-            assert_eq!(controller.last_stop.cause.kind, StopKind::PositionError, "{case:?}");
+            let cause = controller.last_stop.cause;
+            assert_eq!((cause.kind, cause.joint), (StopKind::PositionError, 5), "{case:?}");
+            assert_eq!((cause.value, cause.limit), (-position as f32, 0.25), "{case:?}");
         }
     }
 }

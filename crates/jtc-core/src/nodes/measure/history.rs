@@ -108,13 +108,12 @@ impl History {
         self.as_predicted & younger == younger
     }
 
-    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer arrived in each millisecond since then. Only the answer of
-    /// the last millisecond may be missing.
+    /// Returns the position `ms` milliseconds before the newest answer, rad, if an answer arrived in each millisecond between them. The
+    /// newest answer is at most one millisecond older than `now_ms`, because an answer may be late or missing.
     pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
-        let n = u32::from(ms).checked_sub(since_newest)?;
-        (since_newest <= 1 && n <= u32::from(self.in_turn).min(SLOTS as u32 - 1))
-            .then(|| self.nth(n as usize).position)
+        (since_newest <= 1 && usize::from(ms) <= usize::from(self.in_turn).min(SLOTS - 1))
+            .then(|| self.nth(ms.into()).position)
     }
 
     /// Returns the last answer.
@@ -189,8 +188,8 @@ mod tests {
         history
     }
 
-    /// The position at the start of a window is known if an answer arrived in each millisecond since then. Only the answer of the last
-    /// millisecond may be missing.
+    /// The position at the start of a window is known if an answer arrived in each millisecond of the window. The window ends with the newest
+    /// answer, which may be 1 ms old.
     #[test]
     fn j35_the_position_before_a_window_without_a_gap_is_known() {
         let history = in_turn(100, 110);
@@ -200,15 +199,15 @@ mod tests {
             (110, 10, Some(100.0)),
             // The history has no answer of 99 ms.
             (110, 11, None),
-            (111, 0, None),
-            (111, 1, Some(110.0)),
-            (111, 11, Some(100.0)),
-            (111, 12, None),
+            (111, 0, Some(110.0)),
+            (111, 1, Some(109.0)),
+            (111, 10, Some(100.0)),
+            (111, 11, None),
             // Two answers are missing.
             (112, 2, None),
             (112, 10, None),
         ] {
-            assert_eq!(history.before(now_ms, ms), from, "{ms} ms before {now_ms} ms");
+            assert_eq!(history.before(now_ms, ms), from, "{ms} ms, at {now_ms} ms");
         }
         // The answer of 111 ms is missing, so only the answers from 112 ms on are in turn.
         let mut gap = in_turn(100, 110);
@@ -221,7 +220,7 @@ mod tests {
     fn j35_positions_up_to_the_oldest_stored_answer_are_known() {
         let history = in_turn(100, 140);
         assert_eq!((history.before(140, 15), history.before(140, 16)), (Some(125.0), None));
-        assert_eq!((history.before(141, 16), history.before(141, 17)), (Some(125.0), None));
+        assert_eq!((history.before(141, 15), history.before(141, 16)), (Some(125.0), None));
         for (at_ms, position) in
             [(140, Some(140.0)), (133, Some(133.0)), (125, Some(125.0)), (124, None), (141, None)]
         {

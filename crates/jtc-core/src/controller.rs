@@ -220,7 +220,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::POINTS_MAX;
+    use crate::motion::ControlMode;
+    use crate::{JOINTS, POINTS_MAX};
 
     /// Checks the size of the controller without the trajectory, because this part must fit into the fast memory of the board.
     #[test]
@@ -228,5 +229,55 @@ mod tests {
         let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>() - size_of::<[RawPoint; POINTS_MAX]>();
         assert_eq!(size_of::<[RawPoint; POINTS_MAX]>(), 432_000);
         assert!(bytes <= 40 * 1024, "{bytes} bytes");
+    }
+
+    fn holding() -> Controller<[RawPoint; 4]> {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.state = ControllerState::HoldPos;
+        controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        controller.motion.set.hold_for_test();
+        controller.motion.law.find_loads_for_test();
+        controller
+    }
+
+    /// Teaching begins when it was requested, the model contains the whole payload, and the arm is held with known loads.
+    #[test]
+    fn j25_j60_each_condition_alone_delays_teaching() {
+        for (teaching, blends, jogs, teachable) in [
+            (true, false, false, true),
+            (false, false, false, false),
+            (true, true, false, false),
+            (true, false, true, false),
+            (false, true, false, false),
+        ] {
+            let mut controller = holding();
+            controller.teaching = teaching;
+            if blends {
+                controller.parameters.change_payload(&Config::avena(), 1.0);
+            }
+            if jogs {
+                controller.motion.set.jog(&[0.1; JOINTS], &[1.0; JOINTS], &Config::avena());
+            }
+            let conditions = controller.conditions();
+            assert_eq!(conditions.teachable, teachable, "{teaching} {blends} {jogs}");
+        }
+    }
+
+    /// The last torque was 8 N·m of the model and 4 N·m of friction. After Teaching, the next torque continues both parts. After other
+    /// states, the torque of the model may step, so the next torque continues the friction only.
+    #[test]
+    fn j25_j44_after_teaching_no_part_of_the_torque_steps() {
+        for (last, whole) in [(ControllerState::Teaching, true), (ControllerState::Operate, false)] {
+            let mut controller = holding();
+            controller.state = last;
+            (controller.motion.law.torque[1].model, controller.motion.law.torque[1].friction) = (8.0, 4.0);
+            controller.enter(ControllerState::HoldPos);
+            controller.control(ControlMode::Hold);
+            let torque = controller.motion.law.torque[1];
+            let correction = torque.sum() - torque.model;
+            let (continued, expected) = if whole { (torque.sum(), 12.0) } else { (correction, 4.0) };
+            assert!((continued - expected).abs() < 1e-9, "{last:?}: {continued}");
+            assert!((torque.model - 8.0).abs() > 0.1, "the torque of the model would step: {torque:?}");
+        }
     }
 }

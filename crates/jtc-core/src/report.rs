@@ -123,9 +123,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
 #[cfg(test)]
 mod tests {
+    use jtc_bus::{Answer, JointReport, NodeState, Scale};
+
     use super::*;
     use crate::Config;
+    use crate::io::Inputs;
     use crate::motion::{JointTorque, PidTorque};
+    use crate::nodes::Nodes;
 
     #[test]
     fn j40_j41_j42_telemetry_tells_every_part_of_a_torque() {
@@ -142,5 +146,28 @@ mod tests {
         let joint = controller.telemetry().joints[2];
         assert_eq!((joint.torque_model, joint.torque_friction, joint.torque_other), (1.0, 16.0, 224.0));
         assert_eq!((joint.torque_p, joint.torque_i, joint.torque_d, joint.torque), (2.0, 4.0, 8.0, 250.0));
+    }
+
+    #[test]
+    fn j20_the_current_status_reports_the_state_and_the_missing_parameters() {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.tick(&Inputs::QUIET);
+        let status = controller.current_status();
+        assert_eq!((status.response, status.state), (Response::NONE, controller.state.into()));
+        assert_eq!((status.jtc_init, status.node_init), (7, 0x7F), "nothing was received");
+    }
+
+    /// The drive reports 12 N·m. With a torque gain of 1.5, the torque of the joint is 12/1.5 N·m. The bus rounds to 0.011 N·m.
+    #[test]
+    fn j61_the_status_contains_the_torque_of_the_joint() {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.config.joints[2].torque_gain = 1.5;
+        controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        let report = JointReport { torque: 12.0, state: NodeState::READY, ..JointReport::default() };
+        let scale = Scale { velocity: controller.config.velocity_full_scale };
+        let bus = [Answer::Joint { node: 2, report }.emit(scale)];
+        controller.tick(&Inputs { bus: &bus, ..Inputs::QUIET });
+        let torque = controller.current_status().joints[2].torque;
+        assert!((torque - 8.0).abs() < 0.02, "{torque}");
     }
 }

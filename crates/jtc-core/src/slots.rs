@@ -250,3 +250,6 @@ impl Storing {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

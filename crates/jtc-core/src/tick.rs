@@ -233,8 +233,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
 #[cfg(test)]
 mod tests {
+    use jtc_wire::Segment;
+
     use super::*;
     use crate::Config;
+    use crate::nodes::Nodes;
+    use crate::parameters::PidGains;
 
     /// An accepted teach request waits at most as long as enabling may take. After the timeout, the operator no longer expects the arm to
     /// become compliant.
@@ -247,6 +251,96 @@ mod tests {
             controller.teaching_waits_ms = waited_ms;
             controller.hold();
             assert_eq!(controller.teaching, waits, "{waited_ms} ms");
+        }
+    }
+
+    fn holding() -> Controller<[RawPoint; 4]> {
+        let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+        controller.state = ControllerState::HoldPos;
+        controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
+        controller.motion.set.hold_for_test();
+        controller
+    }
+
+    /// Ten late ticks within a second are a failure of the device.
+    #[test]
+    fn j12_ten_missed_ticks_are_an_internal_error() {
+        for (missed_ticks, failed) in [(0, false), (9, false), (10, true), (11, true)] {
+            let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
+            controller.tick(&Inputs::QUIET);
+            controller.tick(&Inputs { missed_ticks, ..Inputs::QUIET });
+            assert_eq!(controller.errors.internal(), failed, "{missed_ticks}");
+            assert_eq!(controller.state == ControllerState::Error, failed, "{missed_ticks}");
+        }
+    }
+
+    /// When the arm has come to rest, the control mode changes. A torque of friction (8 N·m) of the jog is then blended out.
+    #[test]
+    fn j44_a_jog_ends_without_a_torque_step() {
+        for (jogs, blended) in [(false, 0.0), (true, 8.0)] {
+            let mut controller = holding();
+            if jogs {
+                controller.motion.set.jog(&[0.1; JOINTS], &[1.0; JOINTS], &Config::avena());
+                controller.motion.set.end_jog();
+            }
+            controller.motion.law.torque[0].friction = 8.0;
+            controller.hold();
+            assert!(!controller.motion.set.jogging());
+            assert_eq!(controller.motion.law.torque[0].blend, blended, "{jogs}");
+        }
+    }
+
+    /// In Teaching, the gains have no effect, so their blend waits.
+    #[test]
+    fn j71_new_gains_are_blended_in_while_the_gains_have_an_effect() {
+        for (mode, goes_on) in
+            [(ControlMode::Hold, true), (ControlMode::Follow, true), (ControlMode::Teach, false)]
+        {
+            let mut controller = holding();
+            let before = controller.parameters.pid;
+            let after = before.map(|gains| PidGains { kp: 0.5 * gains.kp, ..gains });
+            controller.parameters.trial.begin(&before, &after);
+            controller.parameters.put_pid(&after);
+            let begun = controller.parameters.trial.blended(&after).expect("a blend");
+            for _ in 0..10 {
+                controller.control(mode);
+            }
+            let gains = controller.parameters.trial.blended(&after).expect("a blend");
+            assert_eq!(gains[0].kp < begun[0].kp, goes_on, "{mode:?}");
+        }
+    }
+
+    /// The check has accepted a path inside its range, with an allowance of 1e-9 rad for the rounding of the interpolation.
+    #[test]
+    fn j43_only_positions_that_the_check_has_accepted_are_tolerated() {
+        let (low, high) = PathRange::of(&Config::avena(), 1, 10).of_path(0.0);
+        let (least, most) = (low - 1e-9, high + 1e-9);
+        assert!(least < low && low < high && high < most);
+        let other = joint_error::VELOCITY;
+        for (position, errors) in [
+            (least.next_down(), joint_error::POSITION | other),
+            (least, other),
+            (low, other),
+            (0.0, other),
+            (high, other),
+            (most, other),
+            (most.next_up(), joint_error::POSITION | other),
+            (f64::NAN, joint_error::POSITION | other),
+        ] {
+            let mut controller = holding();
+            let mut body = [0, 1, 0, 0, 0, 1, 0, 10].to_vec();
+            body.resize(body.len() + 36 * 2, 0);
+            let segment = Segment::parse(&body).expect("a segment");
+            controller.store.begin(&segment, false, false);
+            controller.store.copy(&segment, 0, 2);
+            let passed = controller.check.passed();
+            controller.store.commit(&segment, passed);
+            controller.motion.set.point.position[1] = position;
+            let mut found = [Found::default(); JOINTS];
+            found[1].errors = joint_error::POSITION | other;
+            found[2].errors = other;
+            controller.tolerate_positions(&mut found);
+            assert_eq!((found[1].errors, found[2].errors), (errors, other), "{position}");
         }
     }
 }

@@ -14,6 +14,9 @@ use super::*;
 use crate::nodes::Nodes;
 use crate::{HostEvent, Inputs, JOINTS, Outputs};
 
+mod changes;
+mod identity;
+mod jogs;
 mod motion;
 mod setting_frames;
 mod stored;

@@ -9,6 +9,9 @@ use crate::nodes::Nodes;
 use crate::trajectory::check::TrajectoryCheck;
 use crate::{Config, HOST_LINES};
 
+mod commands;
+mod uploads;
+
 type Bench = Controller<[RawPoint; 64]>;
 
 /// Line and event from which a command comes that the test executes at once.

@@ -127,4 +127,38 @@ mod tests {
         assert!((come - 1.25).abs() < 1e-12, "{come}");
         assert_eq!((blend.left_ms(), blend.next_mass()), (0, 0.0));
     }
+
+    #[test]
+    fn j60_a_rebuilt_model_ends_the_blend() {
+        let dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);
+        let mut blend = PayloadBlend::none(&dynamics);
+        blend.begin(&dynamics, &dynamics, 1.5);
+        assert_eq!((blend.left_ms(), blend.next_mass()), (500, 1.5 / 500.0));
+        assert!(blend.state().from.is_some());
+        blend.forget();
+        assert_eq!((blend.left_ms(), blend.next_mass()), (0, 0.0));
+        assert!(blend.state().from.is_none(), "the state of an ended blend needs no inertias");
+    }
+
+    /// The last step uses the next arm itself. An interpolation from a heavy payload to a light one would differ from it by rounding.
+    #[test]
+    fn j60_at_the_end_of_the_blend_the_model_is_exactly_the_next_arm() {
+        let (model, gravity) = (Parameters::avena().model, Config::avena().gravity);
+        let with = |mass: f64| {
+            let payload = jtc_dynamics::Payload { mass, com: [0.3, -0.7, 0.11], inertia: [0.0; 6] };
+            Dynamics::with_payload(&model, gravity, &payload)
+        };
+        for (from, mass) in [(0.1, 1.3), (50.0, 0.1), (47.0, 0.003), (33.0, 0.0)] {
+            let (mut dynamics, next) = (with(from), with(mass));
+            let mut blend = PayloadBlend::none(&dynamics);
+            let now = dynamics.clone();
+            blend.begin(&now, &next, mass - from);
+            for _ in 0..BLEND_MS {
+                assert_ne!(dynamics.inertias().numbers(), next.inertias().numbers(), "{mass}");
+                blend.step(&mut dynamics);
+            }
+            assert_eq!(dynamics.inertias().numbers(), next.inertias().numbers(), "{mass}");
+            assert_eq!(blend.left_ms(), 0);
+        }
+    }
 }

@@ -6,6 +6,9 @@ use jtc_wire::Floats;
 
 use super::*;
 
+mod checks;
+mod read_back;
+
 #[test]
 fn j06_a_model_may_need_the_whole_torque_limit() {
     for (times, held) in [(1.0, true), (0.999, false), (1.001, true)] {

@@ -89,6 +89,31 @@ fn j53_what_is_out_of_range_is_refused_and_named() {
     assert!(matches!(set(3, 4, 5.0), Err(SettingError::Config(ConfigError::SpeedScale { joint: 4, .. }))));
 }
 
+#[test]
+fn j53_the_message_of_an_error_names_the_joint_of_the_setting() {
+    let refused = |joint, name| SettingError::Value { name, joint, value: 120.0, low: 5.0, high: 100.0 };
+    assert_eq!(
+        std::format!("{}", refused(0, "gravity")),
+        "gravity: 120 is not a valid value, expected 5 to 100"
+    );
+    assert_eq!(
+        std::format!("{}", refused(2, "torque")),
+        "joint 2, torque: 120 is not a valid value, expected 5 to 100"
+    );
+}
+
+/// The largest principal moment of this payload (1 kg·m²) is above the sum of the others (0.2 kg·m²). The check of these moments takes too
+/// long for a change of another setting during a motion.
+#[test]
+fn j07_j60_a_payload_is_checked_only_when_it_changes() {
+    let payload = Payload { mass: 1.0, com: [0.0; 3], inertia: [1.0, 0.0, 0.0, 0.1, 0.0, 0.1] };
+    let speed = SettingValue { setting: SPEED, joint: 0, value: 0.5 };
+    let config = Config { payload, ..Config::avena() };
+    assert!(with_values(&config, [speed].into_iter()).is_ok());
+    let refused = with_values(&Config::avena(), payload_values(&payload));
+    assert!(matches!(refused, Err(SettingError::Payload(_))), "{refused:?}");
+}
+
 proptest! {
     /// If settings are accepted, the configuration passes its check, and the settings read back unchanged.
     #[test]

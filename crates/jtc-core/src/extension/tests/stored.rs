@@ -3,7 +3,7 @@ use super::*;
 use crate::extension::arm::IMAGE_PER_TICK;
 
 /// Returns the image of an arm other than the built-in arm, and the hash of this arm.
-fn other_arm() -> (Vec<u8>, u64) {
+pub(super) fn other_arm() -> (Vec<u8>, u64) {
     let mut bench = Bench::new();
     assert_eq!(bench.set(33, 0, 3.0), DataStatus::NoError);
     assert_eq!(bench.set(8, 4, 1.3), DataStatus::NoError);

@@ -123,23 +123,28 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         };
         let next = self.motion.hold_back.step(&pressed, clock);
         if next == HoldBackStep::Stop || lags.contains(&true) {
-            let cause = |j: usize| match (lags[j], self.motion.hold_back.has_pressed(j)) {
-                (true, _) => joint_error::POSITION_ERROR,
-                (false, true) => joint_error::TORQUE,
-                (false, false) => 0,
-            };
-            let errors = core::array::from_fn(cause);
-            // A joint at its torque limit may come before the joint that lags.
-            match lags.iter().position(|lags| *lags) {
-                Some(joint) => {
-                    let (error, limit) = self.motion.lag(joint, &self.nodes, &self.config);
-                    let cause = self.cause(StopKind::PositionError, joint, error, limit);
-                    self.hold_stop_for(&errors, cause);
-                }
-                None => self.hold_stop(&errors, StopKind::Overload),
-            }
+            self.stop_held_back(&lags);
         } else if next == HoldBackStep::Restore {
             self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
+        }
+    }
+
+    /// Begins a held stop, because holding back does not help. `lags` is `true` for the joints that lag too far.
+    #[cold]
+    fn stop_held_back(&mut self, lags: &[bool; JOINTS]) {
+        let errors = core::array::from_fn(|j| match (lags[j], self.motion.hold_back.has_pressed(j)) {
+            (true, _) => joint_error::POSITION_ERROR,
+            (false, true) => joint_error::TORQUE,
+            (false, false) => 0,
+        });
+        // A joint at its torque limit may come before the joint that lags.
+        match lags.iter().position(|lags| *lags) {
+            Some(joint) => {
+                let (error, limit) = self.motion.lag(joint, &self.nodes, &self.config);
+                let cause = self.cause(StopKind::PositionError, joint, error, limit);
+                self.hold_stop_for(&errors, cause);
+            }
+            None => self.hold_stop(&errors, StopKind::Overload),
         }
     }
 

@@ -110,7 +110,8 @@ impl Motion {
             let (error, limit) = self.lag(j, nodes, config);
             error.abs() > limit
         };
-        (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
+        let saturated = core::array::from_fn(|j| self.limiter.is_saturated(j));
+        (saturated, core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
     /// Returns the position error of a joint, and its limit while the path is held back, rad. The limit is half of the maximum, so that the
@@ -191,7 +192,7 @@ impl Motion {
             }
         }
         self.set.commanded.put(&self.set.point);
-        let missing = self.law.step(inputs, &self.set, &self.limiter.saturated());
+        let missing = self.law.step(inputs, &self.set, |j| self.limiter.is_saturated(j));
         let held_back = self.hold_back.is_active();
         let mut limited = Limited::default();
         self.limiter.step(inputs, &self.law, &mut self.set, held_back, &mut limited);

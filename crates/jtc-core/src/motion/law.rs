@@ -344,14 +344,14 @@ impl ControlLaw {
         }
     }
 
-    /// Executes one tick of the control law, which computes the torques before any limit. Returns the joint errors that the friction table
-    /// causes.
+    /// Executes one tick of the control law, which computes the torques before any limit. `is_saturated` returns `true` for a joint whose
+    /// last torque was above its limit. Returns the joint errors that the friction table causes.
     #[inline(always)]
     pub(crate) fn step(
         &mut self,
         inputs: &LawInputs<'_>,
         set: &SetValues,
-        saturated: &[bool; JOINTS],
+        is_saturated: impl Fn(usize) -> bool,
     ) -> [u16; JOINTS] {
         let LawInputs { mode, nodes, config, ref parameters, .. } = *inputs;
         self.unwinds_ms = self.unwinds_ms.saturating_sub(1);
@@ -404,7 +404,7 @@ impl ControlLaw {
                 let error = due[j] - q[j];
                 let at_rest = set.point.velocity[j] == 0.0 && set.point.acceleration[j] == 0.0;
                 let encoder_step = at_rest.then_some(config.encoder_step);
-                self.pid[j].step(&parameters.pid[j], error, saturated[j], encoder_step)
+                self.pid[j].step(&parameters.pid[j], error, is_saturated(j), encoder_step)
             } else {
                 PidTorque::default()
             };

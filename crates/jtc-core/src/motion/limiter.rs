@@ -71,9 +71,10 @@ pub(crate) struct Limited {
 }
 
 impl Limiter {
-    /// Returns `true` for each joint whose last computed torque was above its limit. The integral of such a joint does not change (J-41).
-    pub(super) fn saturated(&self) -> [bool; JOINTS] {
-        core::array::from_fn(|j| self.saturation[j].saturated)
+    /// Returns `true` if the last computed torque of the joint was above its limit. The integral of such a joint does not change (J-41).
+    #[inline(always)]
+    pub(super) fn is_saturated(&self, j: usize) -> bool {
+        self.saturation[j].saturated
     }
 
     /// Clears the counters of a joint in the limiter.

@@ -112,8 +112,7 @@ impl History {
     /// newest answer is at most one millisecond older than `now_ms`, because an answer may be late or missing.
     pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
-        (since_newest <= 1 && usize::from(ms) <= usize::from(self.in_turn).min(SLOTS - 1))
-            .then(|| self.nth(ms.into()).position)
+        (since_newest <= 1 && ms <= self.in_turn.min(SLOTS as u8 - 1)).then(|| self.nth(ms.into()).position)
     }
 
     /// Returns the last answer.

@@ -17,7 +17,7 @@ use openjtc_emulator::clock::to_ns;
 use openjtc_emulator::observe::Observers;
 use openjtc_emulator::{BoardConfig, Elf, FIRST_LINE};
 use rig::Rig;
-use session::{Session, Steps};
+use session::Session;
 
 /// Interrupt handlers of the program, with their names and exception numbers.
 const HANDLERS: [(&str, usize); 8] = [
@@ -30,6 +30,9 @@ const HANDLERS: [(&str, usize); 8] = [
     ("DMA1 stream 2", FIRST_LINE + 13),
     ("DMA1 stream 3", FIRST_LINE + 14),
 ];
+
+/// Largest number of instructions of a control step without a host event.
+const STEP_MAX: u64 = 12_000;
 
 /// Longest time from the tick's timer event to the first instruction of the tick, ns.
 const LATENCY_MAX: u64 = 1_000;
@@ -53,8 +56,8 @@ fn run() -> Result<(), Box<dyn Error>> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
     let with_cycles = arguments.iter().any(|a| a == "--cycles");
     arguments.retain(|a| a != "--cycles");
-    let [path] = &arguments[..] else { return Err("one ELF file is needed".into()) };
-    let elf = Elf::parse(&std::fs::read(path).map_err(|e| format!("{path}: {e}"))?)?;
+    let [file] = &arguments[..] else { return Err("one ELF file is needed".into()) };
+    let elf = Elf::parse(&std::fs::read(file).map_err(|e| format!("{file}: {e}"))?)?;
     let version = rig::version(&elf).ok_or("the file has no version record")?;
     let stack = stack(&elf)?;
     let rig = Rig::of(elf, &BoardConfig { baud: version.baud, ..Default::default() });
@@ -65,9 +68,14 @@ fn run() -> Result<(), Box<dyn Error>> {
     for (state, status, steps) in session.steps() {
         let and = if status { " and a status" } else { "" };
         println!("    {state}{and}: {} to {} in {} steps", steps.min, steps.max, steps.count);
+        if steps.max > STEP_MAX {
+            return Err(
+                format!("a control step has {} instructions, {STEP_MAX} are allowed", steps.max).into()
+            );
+        }
     }
-    let Steps { min, max, count, .. } = session.on_path();
-    println!("    Operate, on the path at full speed: {min} to {max} in {count} steps");
+    let path = session.on_path();
+    println!("    Operate, on the path at full speed: {} to {} in {} steps", path.min, path.max, path.count);
     println!("  control step that works at what a host sent, instructions:");
     for (name, state, steps) in session.serving() {
         println!("    {name} in {state}: {} to {} in {} steps", steps.min, steps.max, steps.count);
@@ -93,7 +101,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     stacks(observers, stack)?;
     if with_cycles {
-        cycles::print(path, &version)?;
+        cycles::print(file, &version)?;
     }
     Ok(())
 }

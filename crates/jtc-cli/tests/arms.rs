@@ -2,7 +2,8 @@
 
 use crate::common;
 
-use common::{Sim, jtc, motion};
+use cli_kit::testing::CommandOutput;
+use common::{Dir, Sim, jtc, motion};
 
 /// Writes an arm file whose first two joints have lower speed limits than the controller.
 fn slower(dir: &std::path::Path) -> String {
@@ -50,6 +51,36 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
         );
         sim.jtc(&[&words[..], &["--accept-device-limits"]].concat()).ends(0);
     }
+}
+
+/// J-55: without an arm file, the arm of the controller decides whether a trajectory is possible, not the built-in arm.
+#[test]
+fn j55_a_run_without_an_arm_file_is_checked_with_the_arm_of_the_controller() {
+    let dir = Dir::new();
+    let text = include_str!("../../../arms/avena.toml");
+    let wide = dir.file("wide.toml", &text.replacen("position_max_rad = 2.97", "position_max_rad = 2.99", 1));
+    // Joint 1 moves to 2.98 rad and back. The limit of the built-in arm is 2.97 rad.
+    let mut motion = String::from("t,q1,q2,q3,q4,q5,q6\n");
+    for i in 0..=500 {
+        let s = f64::from(i) / 500.0;
+        motion += &format!("{:.3},{},0,0,0,0,0\n", 10.0 * s, 2.98 * (std::f64::consts::PI * s).sin().powi(4));
+    }
+    let file = dir.file("motion.csv", &motion);
+    let refused = |output: CommandOutput| {
+        let value = output.ends(4).json();
+        let problems = value["verdict"]["problems"].as_array().unwrap().clone();
+        assert!(problems.iter().all(|problem| problem["kind"] == "position"), "{value}");
+    };
+
+    // If no controller can be reached, or the controller has the built-in arm, the motion is refused.
+    refused(jtc(&["--json", "traj", "run", &file, "--port", "/nowhere/tty"]));
+    refused(Sim::start(&["--no-throttle"]).held().jtc(&["--json", "traj", "run", &file]));
+    let sim = Sim::start(&["--no-throttle", "--arm", &wide]).held();
+    let output = sim.jtc(&["traj", "run", &file]).ends(0);
+    assert!(output.err.contains("checked with the arm of the controller"), "{}", output.err);
+    // An arm file that the user has specified still decides before the command connects.
+    let narrow = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
+    refused(jtc(&["--json", "traj", "run", &file, "--arm", narrow, "--port", "/nowhere/tty"]));
 }
 
 /// Parameters that a URDF cannot contain are unknown, not zero. The command does not list unknown parameters as differences from the

@@ -8,6 +8,7 @@ mod terminal;
 use std::path::PathBuf;
 
 use cli_kit::{Failure, Output};
+use jtc_host::check::Verdict;
 use jtc_host::plan::MoveSpeed;
 use jtc_host::recording::Format;
 use jtc_host::run::{OpenPath, Order, run as run_all};
@@ -143,11 +144,12 @@ fn match_device(
 }
 
 /// Checks a motion that the command knows before it connects to the controller. A repeated motion must end at its start
-/// point.
-fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failure> {
+/// point. Without an arm file, only the controller knows the arm that moves. If the built-in arm cannot execute the motion,
+/// the function then returns the verdict.
+fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<Option<Verdict>, Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {
-        return Err(job.refuse(&verdict, out));
+        return if course.arm_named { Err(job.refuse(&verdict, out)) } else { Ok(Some(verdict)) };
     }
     for warning in verdict.warnings() {
         out.note(format!("warning: {warning}"));
@@ -155,7 +157,7 @@ fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failur
     let open = OpenPath::between(&job.trajectory, &job.trajectory, job.config.start_tolerance_rad);
     match open.filter(|_| course.repeat > 1 && !course.approach) {
         Some(open) => Err(open_path(&open, course)),
-        None => Ok(()),
+        None => Ok(None),
     }
 }
 
@@ -171,12 +173,12 @@ fn drive(
     progress: &Progress,
     out: &Output,
 ) -> Result<(), Failure> {
-    if make.is_none() {
-        checked_before(course, job, out)?;
-    }
+    let refused = if make.is_none() { checked_before(course, job, out)? } else { None };
     let outputs = Outputs::open(course).map_err(Failure::nothing_sent)?;
     let mut operator = Operator::listen(out, progress)?;
-    let mut session = Session::new(course.execute.link.open_with(course.execute.policy())?);
+    let port = course.execute.link.open_with(course.execute.policy());
+    let port = port.map_err(|failure| refused.map_or(failure, |verdict| job.refuse(&verdict, out)))?;
+    let mut session = Session::new(port);
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
     match_device(&mut session, job, course, out)?;

@@ -1,4 +1,4 @@
-//! What the parser of a serial line finds, and in which form a controller receives it.
+//! Events that the parser of a serial line finds, and the form in which a controller receives them.
 use crate::frame::FrameRef;
 use crate::response::{FrameStatus, Response};
 

@@ -14,7 +14,7 @@ use anyhow::{Result, ensure};
 
 use super::evidence::{self, Named};
 use crate::shell::{self, command, target};
-use outcomes::{Outcome, Outcomes};
+use outcomes::{Judged, Outcome, Outcomes};
 
 /// Crates that run on a board, each with the packages whose tests run on its mutants.
 const PACKAGES: [(&str, &[&str]); 5] = [
@@ -106,7 +106,7 @@ fn results(package: &str) -> PathBuf {
 }
 
 /// Counts the outcomes of the mutants of a crate.
-fn tally<'a>(outcomes: impl IntoIterator<Item = &'a (Named, u64, Outcome)>, page: &str) -> Tally {
+fn tally(outcomes: &[Judged], page: &str) -> Tally {
     let explained = evidence::explained(page);
     let mut tally = Tally::default();
     for (named, at, outcome) in outcomes {

@@ -21,7 +21,7 @@ const GUARD: &str = "pub fn a(id: u32) -> bool {\n";
 const END: &str = "\n}\n";
 /// Code of the function in programs that measure tests. The function of cargo-gamma needs more time.
 const COMPARE: &str = "    ACTIVE.load(Ordering::Relaxed) == id";
-/// Code of the function in programs that record the mutants that a test reaches. It writes the number of each mutant to
+/// Code of the function in programs that record the mutants that a test reaches. The function writes the number of each mutant to
 /// standard error when the program reaches the mutant for the first time.
 const RECORD: &str = "    static REACHED: [AtomicBool; 65536] = [const { AtomicBool::new(false) }; 65536];
     unsafe extern \"C\" {
@@ -36,7 +36,7 @@ const RECORD: &str = "    static REACHED: [AtomicBool; 65536] = [const { AtomicB
     }
     false";
 
-/// One mutant of a crate.
+/// Mutant of a crate.
 pub(super) struct Mutant {
     /// Identification of the mutant. cargo-gamma keeps it while the code of the mutant does not change.
     pub id: String,
@@ -57,7 +57,7 @@ pub(super) struct Program {
 /// Test programs of a crate, and the mutants in them.
 pub(super) struct Build {
     pub programs: Vec<Program>,
-    /// The same programs in the same order. They record the mutants that a test reaches.
+    /// Variants of `programs`, in their order, that record the mutants that a test reaches.
     pub recording: Vec<Program>,
     pub mutants: Vec<Mutant>,
 }

@@ -42,6 +42,9 @@ impl Outcome {
     }
 }
 
+/// A mutant, its line in the source file, and its outcome.
+pub(super) type Judged = (Named, u64, Outcome);
+
 /// Outcomes of the mutants of a crate, with the file that contains them.
 pub(super) struct Outcomes {
     folder: PathBuf,
@@ -101,7 +104,7 @@ fn known(folder: &Path) -> BTreeMap<String, Outcome> {
 /// # Errors
 ///
 /// Returns an error if mutants have no outcome.
-pub(super) fn read(folder: &Path) -> Result<Option<(Vec<(Named, u64, Outcome)>, String)>> {
+pub(super) fn read(folder: &Path) -> Result<Option<(Vec<Judged>, String)>> {
     let Ok(text) = read_to_string(folder.join(MUTANTS)) else { return Ok(None) };
     let list: Vec<Value> = serde_json::from_str(&text)?;
     let known = known(folder);

@@ -176,7 +176,7 @@ fn j75_a_path_at_full_speed_slows_down_while_it_is_held_back() {
         }
         let inertia = controller.motion.ramp.inertia()[0];
         controller.walk();
-        // 1000 steps of the wire format, of which 32767 are 2π rad/s.
+        // 1000 steps of the wire format. The wire format has 32767 steps for 2π rad/s.
         let velocity = 1000.0 * (VELOCITY_SCALE / RAW_FULL_SCALE);
         let slope = if held { -0.1 * 0.1 * limit / (inertia * velocity) } else { 0.0 };
         assert!((controller.clock.slope - slope).abs() < 1e-9, "{held}: {:?} {slope}", controller.clock);

@@ -23,7 +23,7 @@ fn too_stiff() -> [PidGains; JOINTS] {
     defaults::PID.map(|gains| PidGains { kd: 1e6, ..gains })
 }
 
-/// One slice checks the masses, 17 slices compute the inertia in one pose each, and the last slice uses the model.
+/// The first slice checks the masses, 17 slices compute the inertia in one pose each, and the last slice uses the model.
 #[test]
 fn j71_a_model_takes_19_slices() {
     let config = Config::avena();

@@ -238,7 +238,7 @@ mod tests {
         }
     }
 
-    /// Of the outstanding Moves, only the Moves after the newest answered Move remain outstanding. `moves` marks the ticks with a Move.
+    /// Only the Moves after the newest answered Move remain outstanding. `moves` marks the ticks with a Move.
     #[test]
     fn j63_the_moves_before_a_later_answer_are_lost() {
         for (moves, late, outstanding) in [

@@ -29,7 +29,7 @@ fn j53_a_joint_is_absent_at_once_and_the_others_stay() {
     }
 }
 
-/// A joint that is no longer absent starts like every joint: it is not configured, and it may be silent while it starts.
+/// A joint that was absent before starts like every joint: the joint is not configured, and may be silent while it starts.
 #[test]
 fn j53_a_joint_that_is_no_longer_absent_is_brought_up() {
     let (config, before) = (Config::avena(), without_joint_3());

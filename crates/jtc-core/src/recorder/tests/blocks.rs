@@ -8,13 +8,13 @@ use jtc_wire::LogState;
 /// Number of words in a block after its head.
 const WORDS: usize = BLOCK_WORDS - HEAD;
 
-/// Returns a block that is not closed, with these words after the head, of which the first `bits` bits are committed.
+/// Returns a block that is not closed, with these words after the head. The first `bits` bits of the words are committed.
 fn block(words: &[u32; WORDS], bits: u32, snapshot: u16, flags: u16) -> Block {
     let mut block = [0; BLOCK_WORDS];
     block[HEAD..].copy_from_slice(words);
     let full = bits as usize / 32;
     let hash = words[..full.min(WORDS)].iter().fold(mix(MAGIC, 3), |hash, word| mix(hash, *word));
-    let rest = if bits % 32 == 0 { 0 } else { words[full] & (u32::MAX >> (32 - bits % 32)) };
+    let rest = if bits.is_multiple_of(32) { 0 } else { words[full] & (u32::MAX >> (32 - bits % 32)) };
     block[head::MAGIC] = MAGIC;
     block[head::SEQUENCE] = 3;
     block[head::COMMIT] = commit(hash, rest, bits);

@@ -50,7 +50,7 @@ fn j56_a_tick_of_moving_joints_takes_eight_words() {
     assert_eq!(words(&ticks), [8, 8, 8, 8, 13, 8]);
 }
 
-/// One flag for each of seven nodes, six flags for the words of the node, and the changed word are 45 bits, which take two words. Changed
+/// A flag for each of seven nodes, six flags for the words of the node, and the changed word are 45 bits, which take two words. Changed
 /// velocities are already in the first eight words.
 #[test]
 fn j56_a_changed_temperature_takes_two_words_more() {

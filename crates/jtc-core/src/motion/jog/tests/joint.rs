@@ -1,7 +1,7 @@
 //! Tests of one jogged joint: its approach to a velocity, its stopping distance and its behaviour at the ends of its range (J-58).
 use super::*;
 
-/// Returns limits with which a jogged joint has at most 2 rad/s² and 20 rad/s³.
+/// Returns limits that allow a jogged joint at most 2 rad/s² and 20 rad/s³.
 fn limits() -> JointConfig {
     JointConfig { velocity_max: 2.0, acceleration_max: 10.0, ..Config::avena().joints[0] }
 }
@@ -104,7 +104,7 @@ fn j58_the_stopping_distance_follows_from_the_jerk_and_the_highest_acceleration(
         // The acceleration of 0.5 rad/s² is zero after 1/16 s. The speed is then 0.75 + 0.5 · 0.5 / 16 = 0.765625 rad/s, and the joint has
         // moved 0.75 / 16 + 0.5 · 0.5 / 16² - 8 / (6 · 16³) rad. T = 0.765625 / 2 + 0.25 = 0.6328125 s.
         (0.75, 0.5, 2.0, 0.75 / 16.0 + 0.25 / 256.0 - 8.0 / (6.0 * 4_096.0) + 0.5 * 0.765625 * 0.6328125),
-        // This joint brakes since 1/16 s. It has moved 0.765625 / 16 - 8 / (6 · 16³) rad since its acceleration was zero.
+        // The joint has braked for 1/16 s. It has moved 0.765625 / 16 - 8 / (6 · 16³) rad since its acceleration was zero.
         (0.75, -0.5, 2.0, 0.5 * 0.765625 * 0.6328125 - (0.765625 / 16.0 - 8.0 / (6.0 * 4_096.0))),
         // A joint without velocity accelerates with 1 rad/s², above its highest acceleration of 0.5 rad/s². After 1/8 s its speed is
         // 0.5 / 8 = 0.0625 rad/s, and the joint has moved 0.5 / 8² - 8 / (6 · 8³) rad. T = 0.0625 / 0.5 + 0.5 / 8 = 0.1875 s.

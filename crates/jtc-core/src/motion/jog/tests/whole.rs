@@ -1,7 +1,7 @@
 //! Tests of the jog of all joints: the acceleration limits of a command, the end of a jog, and the set values (J-33, J-58).
 use super::*;
 
-/// Returns limits with which a jogged joint has at most 2 rad/s² and 20 rad/s³. The first joint has this position range, rad.
+/// Returns limits that allow a jogged joint at most 2 rad/s² and 20 rad/s³. The first joint has this position range, rad.
 fn ranged((low, high): (f64, f64)) -> Config {
     let mut config = config();
     for joint in &mut config.joints {

@@ -199,8 +199,7 @@ fn j53_j71_the_gains_of_an_absent_joint_need_not_hold() {
 #[test]
 fn j16_a_joint_that_is_enabled_again_begins_without_its_old_torques() {
     let begun = || {
-        let mut law = ControlLaw::default();
-        law.unwinds_ms = 100;
+        let mut law = ControlLaw { unwinds_ms: 100, ..ControlLaw::default() };
         for j in 0..JOINTS {
             law.pid[j].take_over(&WIDE, 12.0);
             law.loads[j].set(5.0);

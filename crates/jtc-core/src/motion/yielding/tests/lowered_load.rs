@@ -100,8 +100,8 @@ fn j70_a_load_of_exactly_95_percent_of_the_limit_is_held_again() {
     }
 }
 
-/// The limit is 100 N·m. A hand moves the joint by 0.6 rad in a pose in which gravity pulls with 4 N·m, less than 5 % of the limit. This
-/// motion is no sinking. In a pose with 20 N·m, the joint then sinks by 0.4 rad, which is not too far, and by another 0.2 rad, which is.
+/// The limit is 100 N·m. A hand moves the joint by 0.6 rad in a pose in which gravity pulls with 4 N·m, less than 5 % of the limit. The
+/// joint does not sink. In a pose with 20 N·m, the joint then sinks by 0.4 rad, which is not too far, and by another 0.2 rad, which is.
 #[test]
 fn j68_only_a_joint_that_gravity_pulls_sinks() {
     let limits = round_limits();

@@ -218,8 +218,8 @@ fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     let off = motion.off(&came);
     for (ms, off) in (0..3_000).zip(&off).skip(1_000) {
         let ms = f64::from(ms);
-        let behind = motion.position(ms - 2.0) - motion.position(ms);
-        assert!((off.position - behind).abs() <= ENCODER, "{ms} ms: {off:?}, {behind} rad behind");
+        let lag = motion.position(ms - 2.0) - motion.position(ms);
+        assert!((off.position - lag).abs() <= ENCODER, "{ms} ms: {off:?}, a lag of {lag} rad");
     }
 }
 

@@ -158,7 +158,7 @@ fn j63_a_returned_answer_on_time_makes_no_step() {
     assert!(joint.used().position.abs() < 1e-9, "{:?}", joint.used());
 }
 
-/// Returns a joint at rest at position 0 with evidence of late answers. One answer is outstanding, so the next answer is one tick late.
+/// Returns a joint at rest at position 0 with evidence of late answers. An answer is outstanding, so the next answer is one tick late.
 fn one_outstanding() -> Measurement {
     let mut joint = at_rest();
     assert!(step(&mut joint, &Tick { answers: 2, ..tick(Some(0.0), 0.0) }));
@@ -212,7 +212,7 @@ fn j63_a_late_velocity_makes_no_step() {
         commanded: 0.25,
         ..tick(None, 0.0)
     };
-    // The prediction is at 0.25 mrad. The answer is at 0.7 mrad, less the 0.125 mrad by which the joint is slower than its command.
+    // The prediction is at 0.25 mrad. The answer is at 0.7 mrad, less 0.125 mrad, because the joint is slower than its command.
     assert_eq!(joint.step(&late, past(0.125, 0.0), &Config::avena()), Outcome::Used);
     assert!((joint.used().velocity - 0.25).abs() < 1e-12, "{:?}", joint.used());
     assert!((joint.used().position - 0.25 * DT).abs() < 1e-9, "{:?}", joint.used());

@@ -73,9 +73,10 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
         build::install()?;
         for (name, judges) in PACKAGES.into_iter().filter(|(name, _)| wanted(name)) {
             println!("== {name}");
+            let tested = commit()?;
             let build = build::build(name, judges, &results(name))?;
             let cases = cases::measure(&build, longest)?;
-            judge::judge(&build, &cases, Outcomes::open(&results(name), left, &commit()?)?)?;
+            judge::judge(&build, &cases, Outcomes::open(&results(name), left, &tested)?)?;
         }
     }
     let page = evidence::read()?;

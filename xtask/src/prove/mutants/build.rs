@@ -38,7 +38,7 @@ const RECORD: &str = "    static REACHED: [AtomicBool; 65536] = [const { AtomicB
 
 /// Mutant of a crate.
 pub(super) struct Mutant {
-    /// Identification of the mutant. cargo-gamma keeps it while the code of the mutant does not change.
+    /// Identification of the mutant. cargo-gamma derives it from the function and the code of the mutant.
     pub id: String,
     /// Number that enables the mutant in the test programs.
     pub ordinal: u32,

@@ -5,7 +5,7 @@ use std::process::Stdio;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::build::{Build, Mutant};
 use super::cases::{Case, End, in_parallel, run, wait};
@@ -16,9 +16,11 @@ const FIRST: usize = 8;
 /// Largest duration and number of the tests that run in one program.
 const GROUP_SECONDS: f64 = 1.2;
 const GROUP_COUNT: usize = 60;
-/// Time limit of a program: this duration, and this multiple of the duration without a mutant.
+/// Time limit of a program: this duration, and this multiple of the duration without a mutant. A program that does not end
+/// runs again with [`PATIENCE`] times the limit, because other programs may have slowed it down.
 const LIMIT_SECONDS: f64 = 6.0;
 const LIMIT_FACTOR: f64 = 8.0;
+const PATIENCE: f64 = 4.0;
 
 /// Tests that have found mutants.
 #[derive(Default)]
@@ -30,8 +32,21 @@ struct Finders {
 }
 
 /// Runs the tests on each mutant that is left in `outcomes`.
+///
+/// # Errors
+///
+/// Returns an error if the tests fail without a mutant.
 pub(super) fn judge(build: &Build, cases: &[Case], outcomes: Outcomes) -> Result<()> {
     outcomes.list(&build.mutants)?;
+    // The tests that passed alone must also pass together.
+    let all: Vec<usize> = (0..cases.len()).collect();
+    for group in split(cases, &all) {
+        ensure!(
+            run_group(build, cases, &group, None)?.is_none(),
+            "tests fail together: {}",
+            names(cases, &group)
+        );
+    }
     let left: Vec<&Mutant> = build.mutants.iter().filter(|mutant| outcomes.is_left(&mutant.id)).collect();
     println!("testing {} of {} mutants", left.len(), build.mutants.len());
     let shared = Mutex::new((Finders::default(), outcomes, 0_usize));
@@ -108,26 +123,54 @@ fn outcome(
     groups: &[Vec<usize>],
 ) -> Result<(Outcome, Vec<usize>)> {
     for group in groups {
-        let Some(&first) = group.first() else { continue };
-        let mut arguments = vec!["-Z", "unstable-options", "--fail-fast", "--test-threads", "1", "--exact"];
-        arguments.extend(group.iter().map(|&n| &*cases[n].name));
-        let seconds: f64 = group.iter().map(|&n| cases[n].seconds).sum();
-        let mut command = run(&build.programs[cases[first].program], &arguments, Some(mutant.ordinal));
-        command.stdout(Stdio::piped()).stderr(Stdio::null());
-        let limit = Duration::from_secs_f64(LIMIT_SECONDS + LIMIT_FACTOR * seconds);
-        let (end, output) = wait(&mut command, limit)?;
-        let outcome = match end {
-            End::Passed => continue,
-            End::Failed => Outcome::Killed,
-            End::Late => Outcome::Endless,
-        };
-        let failed = |n: &usize| {
-            let line = format!("test {} ", cases[*n].name);
-            output.lines().any(|text| text.starts_with(&line) && text.ends_with("FAILED"))
-        };
-        return Ok((outcome, group.iter().copied().filter(failed).collect()));
+        if let Some(outcome) = run_group(build, cases, group, Some(mutant.ordinal))? {
+            return Ok(outcome);
+        }
     }
     Ok((Outcome::Survived, Vec::new()))
+}
+
+/// Runs the tests of a group in one program, with the mutant `ordinal` enabled. Returns `None` if all tests pass.
+fn run_group(
+    build: &Build,
+    cases: &[Case],
+    group: &[usize],
+    ordinal: Option<u32>,
+) -> Result<Option<(Outcome, Vec<usize>)>> {
+    let Some(&first) = group.first() else { return Ok(None) };
+    let mut arguments = vec!["-Z", "unstable-options", "--fail-fast", "--test-threads", "1", "--exact"];
+    arguments.extend(group.iter().map(|&n| &*cases[n].name));
+    let seconds: f64 = group.iter().map(|&n| cases[n].seconds).sum();
+    let limit = LIMIT_SECONDS + LIMIT_FACTOR * seconds;
+    for limit in [limit, PATIENCE * limit] {
+        let mut command = run(&build.programs[cases[first].program], &arguments, ordinal);
+        command.stdout(Stdio::piped()).stderr(Stdio::null());
+        let (end, output) = wait(&mut command, Duration::from_secs_f64(limit))?;
+        match end {
+            End::Passed => return Ok(None),
+            End::Late => {}
+            End::Failed => {
+                let failed: Vec<usize> =
+                    group.iter().copied().filter(|&n| has_failed(&output, &cases[n].name)).collect();
+                // A program that crashes prints the name of its test, but no result.
+                let began = group.iter().any(|&n| output.contains(&format!("test {} ", cases[n].name)));
+                ensure!(began, "no test of {} ran:\n{output}", names(cases, group));
+                return Ok(Some((Outcome::Killed, failed)));
+            }
+        }
+    }
+    Ok(Some((Outcome::Endless, Vec::new())))
+}
+
+/// Returns `true` if the output of a test program contains the failure of this test.
+fn has_failed(output: &str, name: &str) -> bool {
+    let line = format!("test {name} ");
+    output.lines().any(|text| text.starts_with(&line) && text.ends_with("FAILED"))
+}
+
+/// Returns the names of the tests of a group.
+fn names(cases: &[Case], group: &[usize]) -> String {
+    group.iter().map(|&n| &*cases[n].name).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

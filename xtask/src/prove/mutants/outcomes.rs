@@ -53,7 +53,8 @@ pub(super) struct Outcomes {
 }
 
 impl Outcomes {
-    /// Opens the file of outcomes in `folder`. If `left` is `false`, the function removes earlier outcomes.
+    /// Opens the file of outcomes in `folder`. If `left` is `false`, the function removes earlier outcomes. Otherwise, the outcomes of
+    /// mutants that tests have found remain, although the code around them and the tests may have changed.
     pub(super) fn open(folder: &Path, left: bool, commit: &str) -> Result<Self> {
         let path = folder.join(OUTCOMES);
         if !left && path.exists() {

@@ -151,13 +151,18 @@ fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<Option<Ver
     if !verdict.is_ok() {
         return if course.arm_named { Err(job.refuse(&verdict, out)) } else { Ok(Some(verdict)) };
     }
-    for warning in verdict.warnings() {
-        out.note(format!("warning: {warning}"));
-    }
+    warn(&verdict, out);
     let open = OpenPath::between(&job.trajectory, &job.trajectory, job.config.start_tolerance_rad);
     match open.filter(|_| course.repeat > 1 && !course.approach) {
         Some(open) => Err(open_path(&open, course)),
         None => Ok(None),
+    }
+}
+
+/// Prints the warnings of a check.
+fn warn(verdict: &Verdict, out: &Output) {
+    for warning in verdict.warnings() {
+        out.note(format!("warning: {warning}"));
     }
 }
 
@@ -176,12 +181,24 @@ fn drive(
     let refused = if make.is_none() { checked_before(course, job, out)? } else { None };
     let outputs = Outputs::open(course).map_err(Failure::nothing_sent)?;
     let mut operator = Operator::listen(out, progress)?;
-    let port = course.execute.link.open_with(course.execute.policy());
-    let port = port.map_err(|failure| refused.map_or(failure, |verdict| job.refuse(&verdict, out)))?;
+    let port = match (course.execute.link.open_with(course.execute.policy()), &refused) {
+        (Ok(port), _) => port,
+        (Err(failure), None) => return Err(failure),
+        (Err(failure), Some(verdict)) => {
+            out.note(format!(
+                "note: checked with the built-in arm, because of the link: {}",
+                failure.message
+            ));
+            return Err(job.refuse(verdict, out));
+        }
+    };
     let mut session = Session::new(port);
     progress.watch(&mut session);
     let status = ready(&mut session, &operator)?;
     match_device(&mut session, job, course, out)?;
+    if refused.is_some() {
+        warn(&job.verdict(&job.trajectory, None, course.upload()), out);
+    }
     let move_speed = session.move_speed(course.speed)?;
     if let Some(make) = make {
         make(job, &status, move_speed)?;

@@ -233,6 +233,17 @@ fn j66_a_joint_that_is_unstable_again_within_half_a_second_is_known() {
     }
 }
 
+/// For Kp = 1,000 N·m/rad and Kd = 100 N·m·s/rad, a delay of 2 ms requires 0.005 s · (0.75 · 100 + 2 · 1,000 · 0.0025) N·m·s/rad = 0.4 kg·m².
+/// Without a delay, 0.003 s · (75 + 2 · 1,000 · 0.001) N·m·s/rad = 0.231 kg·m² are required.
+#[test]
+fn j71_the_required_inertia_follows_from_the_gains_and_the_delay() {
+    let gains = PidGains { kp: 1_000.0, ki: 0.0, kd: 100.0, int_min: 0.0, int_max: 0.0 };
+    for (delay_ticks, inertia) in [(2, 0.4), (0, 0.231)] {
+        let needed = inertia_needed(&gains, delay_ticks);
+        assert!((needed - inertia).abs() < 1e-9, "{delay_ticks} ticks: {needed} kg·m²");
+    }
+}
+
 /// A joint with exactly the required inertia is accepted.
 #[test]
 fn j71_a_joint_with_the_required_inertia_is_accepted() {

@@ -174,7 +174,7 @@ mod tests {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
         let after = (1..1_000).find(|_| hold_back.step(&PRESSED, &going()) == HoldBackStep::Stop);
-        assert_eq!(after, Some(PRESSED_MS + 1));
+        assert_eq!(after, Some(251));
         let mut hold_back = HoldBack::default();
         let mut ms = 0;
         let next = loop {
@@ -185,7 +185,7 @@ mod tests {
                 next => break next,
             }
         };
-        assert_eq!((next, ms), (HoldBackStep::Stop, RUN_MS + 1));
+        assert_eq!((next, ms), (HoldBackStep::Stop, 5_001));
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
             let mut hold_back = HoldBack::default();
             hold_back.begin();
             let next = (0..5_000).find(|_| hold_back.step(&[false; JOINTS], &at(rate)) == HoldBackStep::Stop);
-            assert_eq!(next, stops.then_some(u32::from(STANDS_MS)), "{rate}");
+            assert_eq!(next, stops.then_some(1_000), "{rate}");
         }
         let mut hold_back = HoldBack::default();
         hold_back.begin();
@@ -256,7 +256,7 @@ mod tests {
             hold_back.begin();
             hold_back.step(&PRESSED, &going()) == HoldBackStep::Stop
         });
-        assert_eq!(after, Some(PRESSED_MS + 1), "the limit is 250 ms without interruption");
+        assert_eq!(after, Some(251), "the limit is 250 ms without interruption");
     }
 
     /// When holding back begins again, the joints and the times of the earlier overload do not count.
@@ -264,22 +264,19 @@ mod tests {
     fn j75_holding_back_begins_without_the_joints_and_times_of_the_earlier_overload() {
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        assert_eq!(first(&mut hold_back, PRESSED_MS, &PRESSED, &going()), None);
+        assert_eq!(first(&mut hold_back, 250, &PRESSED, &going()), None);
         hold_back.end();
         hold_back.begin();
         assert!((0..JOINTS).all(|joint| !hold_back.has_pressed(joint)));
-        assert_eq!(
-            first(&mut hold_back, 1_000, &PRESSED, &going()),
-            Some((PRESSED_MS + 1, HoldBackStep::Stop))
-        );
+        assert_eq!(first(&mut hold_back, 1_000, &PRESSED, &going()), Some((251, HoldBackStep::Stop)));
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        assert_eq!(first(&mut hold_back, QUIET_MS - 1, &[false; JOINTS], &going()), None);
+        assert_eq!(first(&mut hold_back, 199, &[false; JOINTS], &going()), None);
         hold_back.end();
         hold_back.begin();
         assert_eq!(
             first(&mut hold_back, 1_000, &[false; JOINTS], &going()),
-            Some((QUIET_MS, HoldBackStep::Restore))
+            Some((200, HoldBackStep::Restore))
         );
     }
 
@@ -302,7 +299,7 @@ mod tests {
         // While the path returns to its normal rate, `step` is called, but the path is not held back.
         let mut hold_back = HoldBack::default();
         hold_back.begin();
-        first(&mut hold_back, QUIET_MS, &[false; JOINTS], &going());
+        first(&mut hold_back, 200, &[false; JOINTS], &going());
         assert!(!hold_back.is_active() && hold_back.is_watched());
         hold_back.end();
         assert!(!hold_back.is_watched());
@@ -310,7 +307,7 @@ mod tests {
         let mut hold_back = HoldBack::default();
         for _ in 0..2 {
             hold_back.begin();
-            for _ in 0..STANDS_MS {
+            for _ in 0..1_000 {
                 assert_ne!(hold_back.step(&[false; JOINTS], &at(0.0)), HoldBackStep::Stop);
             }
             hold_back.end();
@@ -320,7 +317,7 @@ mod tests {
     /// The path is at rest below a rate of 0.02, unless this rate is its normal rate.
     #[test]
     fn j75_a_path_at_a_rate_of_a_fiftieth_or_at_its_normal_rate_is_not_at_rest() {
-        for clock in [at(STANDS), PathClock::start(0.0)] {
+        for clock in [at(0.02), PathClock::start(0.0)] {
             let mut hold_back = HoldBack::default();
             hold_back.begin();
             assert!((0..2_000).all(|_| hold_back.step(&[false; JOINTS], &clock) != HoldBackStep::Stop));

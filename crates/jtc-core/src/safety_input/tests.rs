@@ -41,10 +41,10 @@ fn watched(arm: &mut Arm, safety_input: bool, missed_ticks: u16) -> Option<u16> 
     arm.safety_stop_ms
 }
 
-/// A stop begins only if the arm comes to rest, is taught or executes a motion, and only if no joint yields. Otherwise the torque goes at
-/// once.
+/// A stop begins only if the arm comes to rest, is taught or executes a motion, and only if no joint yields. Otherwise the controller
+/// switches the torque off at once. An arm in Teaching that stands is at rest in the next tick.
 #[test]
-fn j22_only_an_arm_that_moves_by_command_or_by_hand_stops_first() {
+fn j22_an_arm_in_teaching_or_in_execution_or_that_comes_to_rest_stops_first() {
     let operate = |phase: Phase| Arm { phase, ..arm(ControllerState::Operate, 0.0) };
     let cases: [(&dyn Fn() -> Arm, bool); 12] = [
         (&|| arm(ControllerState::HoldPos, 0.0), false),

@@ -29,7 +29,7 @@ fn j56_every_phase_reads_back_as_it_was_written() {
 }
 
 #[test]
-fn j16_only_the_first_phase_waits_for_the_joints() {
+fn j34_only_the_wait_before_the_approach_waits_for_the_joints() {
     assert!(Phase::BEGIN.waits() && Phase::Waiting { elapsed_ms: 9 }.waits());
     assert!(!Phase::AtStart.waits() && !Phase::Running { leave: None }.waits());
     assert!(!approaching(0.0, 1.0, None).waits());

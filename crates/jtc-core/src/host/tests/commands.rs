@@ -42,7 +42,7 @@ fn carry_out(controller: &mut Bench, command: Command<'_>) -> Result<(), DataSta
 }
 
 #[test]
-fn j06_parameters_are_refused_while_a_joint_yields() {
+fn j69_parameters_are_refused_while_a_joint_yields() {
     for (yields, expected) in [(false, Ok(())), (true, Err(DataStatus::NotAllowed))] {
         let mut controller = holding();
         if yields {
@@ -115,9 +115,10 @@ fn j52_commands_that_are_refused_do_not_clear_the_hash() {
     }
 }
 
-/// After a change of the model under torque, the load of each joint must be learned again: the integral of 4 N·m then counts as the load.
+/// Before the change, the learned load is 0 N·m, although the integral holds 4 N·m. While no load is learned, the integral counts as the load.
+/// A load of 4 N·m therefore shows that the learned load was cleared.
 #[test]
-fn j44_only_an_accepted_model_under_torque_clears_the_loads() {
+fn j60_j66_only_an_accepted_model_under_torque_clears_the_learned_loads() {
     let unfinished = || SliceOutcome::Unfinished(SliceProgress::Begin);
     let refused = || SliceOutcome::Refused(DataStatus::IncorrectValue);
     for (state, taken, load) in [

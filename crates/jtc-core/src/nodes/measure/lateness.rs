@@ -222,7 +222,7 @@ mod tests {
     /// A lost answer is subtracted at the end of the next window in which the number of outstanding Moves does not return to zero. A window
     /// has 64 ticks.
     #[test]
-    fn j63_a_lost_answer_is_subtracted_after_a_window_of_64_ticks() {
+    fn j63_a_lost_answer_is_subtracted_at_the_end_of_the_first_whole_window_of_64_ticks() {
         let mut lateness = Lateness::default();
         for tick in 1..=200 {
             // The answer of the second tick is lost. No Move is outstanding in the first tick, so the first window subtracts nothing.

@@ -127,7 +127,7 @@ fn j58_half_of_the_remaining_torque_accelerates_the_joints_that_move() {
 }
 
 /// Friction of 91.9 N·m leaves 0.1 N·m. Half of this torque is 1/40 of the torque for the highest acceleration of an inertia of 1 kg·m²,
-/// and 1/80 for 2 kg·m².
+/// and 1/80 for 2 kg·m². There, the lower bound of 2 % of 2 rad/s², which needs 0.08 N·m, has priority.
 #[test]
 fn j58_a_jog_has_at_least_two_per_cent_of_its_highest_acceleration() {
     for (inertia, acceleration) in [(1.0, 2.0 / 40.0), (2.0, 0.04)] {

@@ -232,8 +232,9 @@ fn j25_a_joint_without_answers_loses_its_springs_and_then_its_damping() {
     check(&joint, 1, format_args!("a missing answer in a late tick"));
 }
 
-/// The setting is 90 N·m·s/rad. A load of 60 N·m needs 120 N·m·s/rad to be balanced at 0.5 rad/s. The inertia of 3 kg·m² tolerates 90 1/s
-/// times 3 kg·m², which is 270 N·m·s/rad. The highest damping is 180 N·m·s/rad, because the torque limit is 180 N·m.
+/// The setting is 90 N·m·s/rad. Loads of 60, 100 and 150 N·m need 120, 200 and 300 N·m·s/rad to be balanced at 0.5 rad/s. The increased
+/// damping is the torque limit per rad/s, which is 180 N·m·s/rad, or the damping that balances the load if this is higher. The inertia bounds
+/// both: 90 1/s times 3 kg·m² are 270 N·m·s/rad.
 #[test]
 fn j25_the_damping_balances_the_load_within_the_bound_of_the_inertia() {
     for (inertia, load, expected) in [

@@ -31,10 +31,11 @@ fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
     }
 }
 
-/// The rate of the positions minus the due velocity is limited to 2.5 times the reported velocity minus the due velocity. The remainder of a
-/// fading offset does not belong to the reported velocity.
+/// The young velocity is the rate of the positions of the last 5 ms. Its distance from the commanded velocity (`due`) is limited to 2.5
+/// times the distance of the reported velocity, in the same direction. The remainder of a fading offset does not belong to the reported
+/// velocity.
 #[test]
-fn j68_the_young_velocity_is_not_far_from_the_reported_velocity() {
+fn j66_the_velocity_from_positions_is_bounded_around_the_commanded_velocity() {
     for (rate, used, offset, due, young) in [
         // 1 − 0.25 = 0.75 of at most 2.5 · (0.75 − 0.25 − 0.25) = 0.625.
         (1.0, 0.75, 0.25, 0.25, 0.875),

@@ -1,4 +1,4 @@
-//! Runs programs in parallel. Most of these programs wait and use little processor time.
+//! Runs work in parallel, mostly programs. Most of the checks of a test run wait and use little processor time.
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
@@ -107,28 +107,16 @@ pub(crate) fn run_all<T: Send, R: Ran + Send>(
     ended: impl FnMut(T, R) + Send,
 ) -> Result<u64> {
     let scratch = Scratch::new("parallel")?;
-    let at_once = std::thread::available_parallelism().map_or(1, NonZero::get) + 1;
-    let (waiting, ended) = (Mutex::new(VecDeque::from(items)), Mutex::new(ended));
+    let ended = Mutex::new(ended);
     let failed = Mutex::new(Vec::new());
-    let worker = |number: usize| {
-        let log = scratch.path().join(number.to_string());
-        loop {
-            let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-            let Some(item) = next else { return };
-            let came = run(&item, &log);
-            if let Some(output) = came.failure() {
-                println!("\n{}\n-- it failed and will run again, alone", output.trim());
-                failed.lock().unwrap_or_else(PoisonError::into_inner).push(item);
-            } else {
-                ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
-            }
+    process(items, processors() + 1, |thread, item| {
+        let came = run(&item, &scratch.path().join(thread.to_string()));
+        if let Some(output) = came.failure() {
+            println!("\n{}\n-- it failed and will run again, alone", output.trim());
+            failed.lock().unwrap_or_else(PoisonError::into_inner).push(item);
+        } else {
+            ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
         }
-    };
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..at_once).map(|number| scope.spawn(move || worker(number))).collect();
-        workers.into_iter().for_each(|worker| {
-            worker.join().unwrap_or_else(|e| std::panic::resume_unwind(e));
-        });
     });
     let log = scratch.path().join("alone");
     let mut passed_alone = 0;
@@ -139,6 +127,31 @@ pub(crate) fn run_all<T: Send, R: Ran + Send>(
         ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
     }
     Ok(passed_alone)
+}
+
+/// Returns the number of processors.
+pub(crate) fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZero::get)
+}
+
+/// Calls `work` for each item, in this number of threads. The first argument of `work` is the index of the thread. The results
+/// have any order.
+pub(crate) fn process<T: Send, R: Send>(
+    items: Vec<T>,
+    threads: usize,
+    work: impl Fn(usize, T) -> R + Sync,
+) -> Vec<R> {
+    let waiting = Mutex::new(VecDeque::from(items));
+    let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+    let worker = |thread| std::iter::from_fn(next).map(|item| work(thread, item)).collect::<Vec<R>>();
+    std::thread::scope(|scope| {
+        let worker = &worker;
+        let workers: Vec<_> = (0..threads).map(|thread| scope.spawn(move || worker(thread))).collect();
+        let results = |worker: std::thread::ScopedJoinHandle<'_, Vec<R>>| {
+            worker.join().unwrap_or_else(|e| std::panic::resume_unwind(e))
+        };
+        workers.into_iter().flat_map(results).collect()
+    })
 }
 
 /// Runs a command and writes its output to `log`.
@@ -154,4 +167,37 @@ pub(crate) fn run(command: &mut Command, log: &Path) -> Result<Ended> {
         output.push_str(&format!("\n{status}"));
     }
     Ok(Ended { output, passed: status.success(), seconds: start.elapsed().as_secs_f64() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_item_is_processed_once() {
+        let mut results = process((0..100).collect(), 3, |thread, n: u32| {
+            assert!(thread < 3);
+            n * 2
+        });
+        results.sort_unstable();
+        assert_eq!(results, (0..100).map(|n| n * 2).collect::<Vec<u32>>());
+    }
+
+    #[test]
+    fn what_failed_runs_again_alone_and_its_second_result_counts() {
+        let tries = Mutex::new(Vec::new());
+        let mut results = Vec::new();
+        let run = |item: &u32, _: &Path| -> Result<Ended> {
+            let mut tries = tries.lock().unwrap();
+            let again = tries.contains(item);
+            tries.push(*item);
+            let passed = *item != 9 && (*item != 7 || again);
+            Ok(Ended { output: item.to_string(), passed, seconds: 0.0 })
+        };
+        let passed_alone = run_all((0..20).collect(), run, |item, came| results.push((item, came.passed())));
+        results.sort_unstable();
+        assert_eq!(results, (0..20).map(|n| (n, n != 9)).collect::<Vec<_>>());
+        assert_eq!(passed_alone.unwrap(), 1);
+        assert_eq!(tries.into_inner().unwrap().len(), 22);
+    }
 }

@@ -6,7 +6,6 @@
 //! tests of one file.
 use std::collections::BTreeMap;
 use std::io::Write as _;
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -162,8 +161,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
     // If xtask runs under `nohup` or in the background of a script, it ignores signals that tests send to their programs. The
     // test programs inherit this signal setting.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
-    let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
-    let threads = (BOARD_TESTS_FOR_A_PROCESSOR * processors).to_string();
+    let threads = (BOARD_TESTS_FOR_A_PROCESSOR * parallel::processors()).to_string();
     // Each test program runs in the folder of its package, as with cargo.
     let run = |program: &Program, log: &Path| {
         let mut command = if heeds_signals {

@@ -1,16 +1,15 @@
 //! Measures each test: its duration, and the mutants that it reaches. A test that does not reach a mutant cannot find
 //! it.
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 use std::io::Read as _;
-use std::num::NonZero;
 use std::process::{Command, Stdio};
-use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
 use super::build::{Build, Program};
+use crate::parallel::{process, processors};
 use crate::shell;
 
 /// Time limit of a test program without a mutant, in addition to the longest duration of a test.
@@ -52,7 +51,7 @@ pub(super) fn measure(build: &Build, longest: f64) -> Result<Vec<Case>> {
         tests.extend(names.map(|name| (index, name.to_owned())));
     }
     println!("measuring {} tests", tests.len());
-    let measured = in_parallel(tests, |(index, name)| {
+    let measured = process(tests, processors(), |_, (index, name)| {
         let start = Instant::now();
         let limit = Duration::from_secs_f64(longest) + START;
         if alone(&build.programs[index], &name, limit)?.is_none() {
@@ -134,19 +133,6 @@ pub(super) fn wait(command: &mut Command, limit: Duration) -> Result<(End, Strin
     })
 }
 
-/// Processes the items with one thread for each processor. The results have any order.
-pub(super) fn in_parallel<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
-    let waiting = Mutex::new(VecDeque::from(items));
-    let next = || waiting.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-    let threads = thread::available_parallelism().map_or(1, NonZero::get);
-    thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
-            .map(|_| scope.spawn(|| std::iter::from_fn(next).map(&work).collect::<Vec<R>>()))
-            .collect();
-        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,12 +151,5 @@ mod tests {
             wait(Command::new("echo").arg("words").stdout(Stdio::piped()), Duration::from_secs(60)).unwrap();
         assert!(matches!(end, End::Passed));
         assert_eq!(output, "words\n");
-    }
-
-    #[test]
-    fn every_item_is_processed_once() {
-        let mut results = in_parallel((0..100).collect(), |n: u32| n * 2);
-        results.sort_unstable();
-        assert_eq!(results, (0..100).map(|n| n * 2).collect::<Vec<u32>>());
     }
 }

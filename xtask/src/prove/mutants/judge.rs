@@ -8,8 +8,9 @@ use std::time::Duration;
 use anyhow::{Result, ensure};
 
 use super::build::{Build, Mutant};
-use super::cases::{Case, End, in_parallel, run, wait};
+use super::cases::{Case, End, run, wait};
 use super::outcomes::{Outcome, Outcomes};
+use crate::parallel::{process, processors};
 
 /// Number of tests that found mutants of the same file and run first.
 const FIRST: usize = 8;
@@ -50,7 +51,7 @@ pub(super) fn judge(build: &Build, cases: &[Case], outcomes: Outcomes) -> Result
     let left: Vec<&Mutant> = build.mutants.iter().filter(|mutant| outcomes.is_left(&mutant.id)).collect();
     println!("testing {} of {} mutants", left.len(), build.mutants.len());
     let shared = Mutex::new((Finders::default(), outcomes, 0_usize));
-    let results = in_parallel(left, |mutant| {
+    let results = process(left, processors(), |_, mutant| {
         let fit: Vec<usize> =
             (0..cases.len()).filter(|&n| cases[n].reached.contains(&mutant.ordinal)).collect();
         let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);

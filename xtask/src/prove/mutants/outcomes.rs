@@ -157,7 +157,7 @@ mod tests {
         let outcomes: Vec<Outcome> = outcomes.into_iter().map(|(_, _, outcome)| outcome).collect();
         assert_eq!(outcomes, [Outcome::Killed, Outcome::Killed, Outcome::Endless]);
 
-        let anew = Outcomes::open(folder.path(), false, "ghi").unwrap();
-        assert!(["a", "b", "c"].into_iter().all(|id| anew.is_left(id)));
+        let all = Outcomes::open(folder.path(), false, "ghi").unwrap();
+        assert!(["a", "b", "c"].into_iter().all(|id| all.is_left(id)));
     }
 }

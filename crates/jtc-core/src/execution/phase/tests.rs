@@ -35,7 +35,7 @@ fn j34_only_the_wait_before_the_approach_waits_for_the_joints() {
     assert!(!approaching(0.0, 1.0, None).waits());
 }
 
-/// The approach goes on from its first tick to an accepted Pause or Stop, and the path to an accepted Pause or Stop.
+/// The approach and the path continue until the controller accepts a Pause or a Stop. The approach continues from its first tick on.
 #[test]
 fn j75_a_motion_goes_on_until_a_pause_or_stop() {
     for leave in LEAVES {

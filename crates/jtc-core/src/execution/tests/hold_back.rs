@@ -94,7 +94,7 @@ fn j75_a_joint_that_lags_while_the_path_is_held_back_stops_the_arm() {
     }
 }
 
-/// The arm stands on the path if the clock of its present motion is slower than 0.02. On the approach, path time is not this clock.
+/// The arm stands on the path if the clock of its present motion is slower than 0.02. The clock of the approach differs from path time.
 #[test]
 fn j75_the_clock_of_the_present_motion_shows_whether_the_arm_stands() {
     let approach = |clock| Phase::Approaching { from: [0.0; JOINTS], length_ms: 500.0, clock, leave: None };

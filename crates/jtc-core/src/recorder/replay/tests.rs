@@ -124,7 +124,7 @@ fn j56_a_snapshot_that_differs_from_the_replayed_state_is_reported() {
     assert_eq!(replayed.snapshots, [Same, Differs]);
 }
 
-/// After a gap or a restart of the device, the next snapshot is a step of its own.
+/// After a gap or a restart of the device, the replay reports the next snapshot as a separate step.
 #[test]
 fn j56_a_snapshot_of_another_tick_or_start_of_the_device_is_a_step() {
     for (boots, ticks) in [(1, 0), (0, 1), (1, 1)] {

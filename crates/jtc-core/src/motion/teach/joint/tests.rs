@@ -378,7 +378,7 @@ fn j25_the_dry_friction_is_softer_for_a_joint_with_low_inertia() {
 }
 
 /// If a joint is too fast for dry friction, the anchor of the spring moves with the joint. The anchor also moves with a joint that has no
-/// dry friction, because this joint has enough friction of its own. If the dry friction appears later, it has no step.
+/// dry friction, because this joint has enough friction of its own. If the dry friction begins to act later, the torque does not step.
 #[test]
 fn j25_the_anchor_of_the_dry_friction_moves_with_a_fast_joint_and_without_dry_friction() {
     // The joint is 0.02 rad away from its anchor. At 0.3 rad/s, only the damping of 90 N·m·s/rad acts.

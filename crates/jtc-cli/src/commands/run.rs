@@ -185,10 +185,8 @@ fn drive(
         (Ok(port), _) => port,
         (Err(failure), None) => return Err(failure),
         (Err(failure), Some(verdict)) => {
-            out.note(format!(
-                "note: checked with the built-in arm, because of the link: {}",
-                failure.message
-            ));
+            let why = failure.message;
+            out.note(format!("note: checked with the built-in arm, because the link failed: {why}"));
             return Err(job.refuse(verdict, out));
         }
     };

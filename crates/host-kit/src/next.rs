@@ -149,6 +149,8 @@ actions! {
     BoardRun: "ucom run {number}", "Run (POST /api/run)", "ucom run {number}";
     /// End the application of a board.
     BoardStop: "ucom stop {number}", "Stop application (POST /api/boards/{number}/stop)", "ucom stop {number}";
+    /// Reboot a board.
+    BoardReset: "ucom reset {number}", "Reset (POST /api/boards/{number}/reset)", "ucom reset {number}";
     /// Write an image to a board.
     BoardUpdate: "ucom update {number} IMAGE", "Update (POST /api/updates)", "ucom update {number} IMAGE";
 }

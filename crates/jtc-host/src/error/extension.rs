@@ -147,7 +147,8 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "not-stored",
                 next!(
-                    "the arm is in use until the device is switched off; `jtc info` shows the state of the memory, {} tries again",
+                    "the arm is in use until the device is switched off; {} shows the state of the memory, {} tries again",
+                    Info,
                     ArmStore
                 ),
             ),

@@ -77,15 +77,20 @@ impl Diagnose for LinkError {
             Self::Port(e) => e.diagnosis(),
             Self::NoLink { bytes: 0, .. } => no_link(
                 "no-link",
-                "check cable and power of the controller, then run `jtc doctor`; `jtc ports` lists all ports"
-                    .into(),
+                next!(
+                    "check cable and power of the controller, then run {}; `jtc ports` lists all ports",
+                    Doctor
+                ),
             ),
             Self::NoLink { baud, .. } => {
                 let baud = baud.map_or("none".into(), |b| b.to_string());
                 no_link(
                     "no-link",
-                    Next::from(format!("the rate is probably wrong ({baud} Bd here): try "))
-                        .then(next!("{}; `jtc doctor` tries all rates", Baud)),
+                    Next::from(format!("the rate is probably wrong ({baud} Bd here): try ")).then(next!(
+                        "{}; {} tries all rates",
+                        Baud,
+                        Doctor
+                    )),
                 )
             }
             Self::NotConfirmed { .. } => {
@@ -94,7 +99,10 @@ impl Diagnose for LinkError {
             Self::NoExtension { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "no-extension",
-                "the firmware of this device supports only the protocol of existing devices; `jtc info` shows the details that are known",
+                next!(
+                    "the firmware of this device supports only the protocol of existing devices; {} shows the details that are known",
+                    Info
+                ),
             ),
             Self::Denied { .. } => Diagnosis::new(
                 ErrorKind::Refused,

@@ -232,7 +232,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
                 "give one of them another flash number".into()
             }
             ScanFinding::Disagrees { .. } => "`ucom probe`".into(),
-            ScanFinding::Status { .. } => next!("`ucom probe`; then `ucom reset` and {}", ChainInit),
+            ScanFinding::Status { .. } => next!("`ucom probe`; then {} and {}", BoardReset, ChainInit),
             ScanFinding::Contradicts { .. } => next!("{} numbers the boards again", ChainInit),
             _ => next!("{} again", ChainScan),
         };

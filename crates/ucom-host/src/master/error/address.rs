@@ -1,5 +1,5 @@
 //! Errors of an address assignment that the PC refused.
-use crate::master::error::identity::OTHER_PROTOCOL;
+use crate::master::error::identity::other_protocol;
 use host_kit::{Action, Diagnose, Diagnosis, ErrorKind, Next, next};
 
 /// Reasons why boards did not get numbers.
@@ -42,7 +42,7 @@ pub enum AddressError {
 impl Diagnose for AddressError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
-            Self::AckMismatch { .. } => Diagnosis::new(ErrorKind::Refused, "ack-mismatch", OTHER_PROTOCOL),
+            Self::AckMismatch { .. } => Diagnosis::new(ErrorKind::Refused, "ack-mismatch", other_protocol()),
             Self::MayTakeNumber { other, .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "may-take-number",

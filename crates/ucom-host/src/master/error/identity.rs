@@ -54,7 +54,7 @@ impl Diagnose for IdentityError {
     fn diagnosis(&self) -> Diagnosis {
         match self {
             Self::WrongSequence { .. } => {
-                Diagnosis::new(ErrorKind::Refused, "wrong-sequence", OTHER_PROTOCOL)
+                Diagnosis::new(ErrorKind::Refused, "wrong-sequence", other_protocol())
             }
             Self::WrongBoard { wanted, found, .. } if *wanted == found.swap_bytes() => Diagnosis::new(
                 ErrorKind::Refused,
@@ -113,6 +113,10 @@ pub(crate) fn shared_remedy() -> Next {
     )
 }
 
-/// Remedy if the identifier and the data of a frame contain different board numbers.
-pub(crate) const OTHER_PROTOCOL: &str = "two boards may share a number, or the board interprets the \
-                                         protocol differently: `ucom reset`, then `ucom probe`";
+/// Returns the remedy if the identifier and the data of a frame contain different board numbers.
+pub(crate) fn other_protocol() -> Next {
+    next!(
+        "two boards may share a number, or the board interprets the protocol differently: {}, then `ucom probe`",
+        BoardReset
+    )
+}

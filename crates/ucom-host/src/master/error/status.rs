@@ -61,7 +61,7 @@ impl Diagnose for StatusError {
             Self::NotReached { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "not-reached",
-                next!("{}, then `ucom reset` and {}", BoardInfo, ChainInit).of_board(*board),
+                next!("{}, then {} and {}", BoardInfo, BoardReset, ChainInit).of_board(*board),
             ),
             Self::AdminRefused { board, .. } => Diagnosis::new(
                 ErrorKind::Device,

@@ -106,8 +106,8 @@ impl Answer {
         }
     }
 
-    /// Decodes the frame of an answer. The controller uses this function. The function is inlined, because a report that is stored by
-    /// bytes and copied by words stalls the processor of a PC.
+    /// Decodes the frame of an answer. The controller uses this function. The function is inlined, because a PC
+    /// stalls if a report is written byte by byte and then copied in larger words.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);

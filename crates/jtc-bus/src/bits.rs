@@ -1,7 +1,7 @@
 //! Bit words of the bus. A table for each word contains the number, name, text and meaning of each bit.
 
-/// Declares bit words. Each row of a word contains the meaning of a bit (as documentation), the name of its mask, its number and its
-/// text.
+/// Declares bit words. Each row describes one bit: its meaning (as documentation), the name of its mask, its number
+/// and its text.
 ///
 /// Each word becomes a module with a mask for each bit, and with the texts in `NAMES`.
 #[doc(hidden)]

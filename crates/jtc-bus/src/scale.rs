@@ -40,8 +40,8 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
-/// Returns the physical value of a 16-bit integer. The quotient of the scale is computed first, because it is the same for every answer of
-/// a tick. On the board a division takes as long as seven multiplications.
+/// Returns the physical value of a 16-bit integer. The factor in parentheses is computed separately, because it is
+/// the same for every answer of a tick. On the board, a division takes as long as seven multiplications.
 #[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))

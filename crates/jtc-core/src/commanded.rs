@@ -35,7 +35,8 @@ impl Commanded {
         self.now = self.now.wrapping_add(1);
     }
 
-    /// Stores the set values of the present tick. The tick must call this function each time that it changes the set values.
+    /// Stores the set values of the present tick. Call this function again each time that the set values change
+    /// within the tick.
     pub(crate) fn put(&mut self, point: &SetPoint) {
         let now = self.slot(0);
         (self.position[now], self.velocity[now]) = (point.position, point.velocity);
@@ -57,9 +58,9 @@ impl Commanded {
         self.velocity(config.delay_ticks.max(1))
     }
 
-    /// Replaces all stored set values of a joint by a motion at the constant `velocity` (rad/s), with `position` (rad) as the set position
-    /// `ticks` ago. With a delay of `ticks`, the due position of the joint is then `position`, and it changes at `velocity` in the next
-    /// ticks.
+    /// Fills the stored set values of a joint as if it had moved at the constant `velocity` (rad/s) and had been at
+    /// `position` (rad) `ticks` ago. With a delay of `ticks`, `position` is then the due position of the joint, and
+    /// it changes at `velocity` in the next ticks.
     pub(crate) fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         let (way, mut after) = (velocity * DT, f64::from(ticks));
         for ago in 0..SLOTS as u8 {
@@ -122,9 +123,9 @@ mod tests {
             }
         }
 
-        /// After the stored set values of a joint were replaced, its measured position is equal to the due position. If the joint keeps its
-        /// velocity, its measured position is also equal to the due position in the next ticks. The stored set values of other joints do
-        /// not change.
+        /// After the stored set values of a joint were replaced, its measured position is equal to the due position.
+        /// It remains equal in the next ticks if the joint keeps its velocity. The stored set values of other joints
+        /// do not change.
         #[test]
         fn j44_j62_a_joint_that_begins_anew_has_no_error(
             start in any::<u8>(),
@@ -152,7 +153,8 @@ mod tests {
         }
     }
 
-    /// A sag shifts all stored set positions of the joint, and also the position errors that the PID controller stores.
+    /// When the set position of a joint sags, all its stored set positions and the stored position errors of its PID
+    /// controller shift by the same distance.
     #[test]
     fn j43_j62_a_sag_is_no_motion() {
         let mut commanded = Commanded::default();

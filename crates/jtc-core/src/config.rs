@@ -65,9 +65,9 @@ pub struct Config {
     pub enable_speed_max: f64,
     /// Time for which every joint must have been slower than `enable_speed_max`, ms.
     pub enable_still_ms: u16,
-    /// Time after the torque was switched off in which the controller does not enable the joints, ms. The motor control of the drives
-    /// pauses for this time after a stop. If the controller requested enabling earlier, the drives would enable only after this pause, when
-    /// the arm may have begun to fall.
+    /// Time after the torque was switched off in which the controller does not enable the joints, ms. The motor
+    /// control of the drives pauses for this time after a stop. If the controller requested enabling earlier, the
+    /// drives would enable only after this pause, and the arm might already be falling.
     pub enable_rest_ms: u16,
     /// Largest distance of each joint from the first point at which Execute is accepted, rad (J-34).
     pub start_tolerance_rad: f64,
@@ -81,8 +81,8 @@ pub struct Config {
     pub overspeed_ms: u16,
     /// Longest duration of a pause or stop if the torque limits allow it, ms (J-33).
     pub stop_ms: u16,
-    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after this time, the moving joints
-    /// are overloaded and lower their loads (J-33, J-70).
+    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after this
+    /// time, the controller treats the moving joints as overloaded, and each of them lowers its load (J-33, J-70).
     pub braking_ms_max: u16,
     /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share counts as
     /// a push (J-66).

@@ -35,7 +35,7 @@ pub struct Controller<M> {
     // Parameters and commands that the controller has received from the host.
     pub(crate) parameters: HostParameters,
     pub(crate) teaching: bool,
-    /// Time for which the controller has waited for the arm to be held before Teaching begins, ms.
+    /// Time for which a request for Teaching has waited until the controller holds the arm, ms.
     pub(crate) teaching_waits_ms: u32,
     pub(crate) pump: bool,
     // Store of the trajectory. The next fields belong to its execution.
@@ -47,7 +47,8 @@ pub struct Controller<M> {
     pub(crate) phase: Phase,
     /// Ticks since a pause or stop was commanded on the path, until the arm is at rest (J-33).
     pub(crate) braking_ms: Option<u16>,
-    /// Ticks since the safety input stopped a motion. The torque is switched off at the end of this stop (J-22).
+    /// Ticks since the safety input began to stop a motion. When the motion has stopped, the controller switches the
+    /// torque off (J-22).
     pub(crate) safety_stop_ms: Option<u16>,
     pub(crate) motion: Motion,
     /// Cause of the last held stop (J-69).
@@ -109,8 +110,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         &self.status_frame
     }
 
-    /// Returns the reason why the check of J-36 refused the last segment or Execute. Returns `None` if the check did not refuse this
-    /// segment or Execute.
+    /// Returns the reason why the check of J-36 refused the last segment or the last Execute. Returns `None` if the
+    /// check did not refuse it.
     pub fn violation(&self) -> Option<&Violation> {
         self.violation.as_ref()
     }
@@ -163,7 +164,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            // J-60: after a change of the payload, HoldPos can determine an unmodelled load only when the model includes the whole payload.
+            // J-60: after a change of the payload, the controller can learn an unmodelled load only when the whole
+            // payload has been blended into the model.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
                 && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
@@ -202,7 +204,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
         if last == ControllerState::Teaching {
-            // After Teaching, no torque may step, because the model torque then contains the torque that decelerates the arm.
+            // After Teaching, the model torque also contains the torque that decelerates the arm. The whole torque
+            // must therefore continue without a step, including the model torque.
             self.motion.law.change_whole_torque();
         } else {
             self.motion.law.change_mode();
@@ -263,8 +266,9 @@ mod tests {
         }
     }
 
-    /// The last torque was 8 N·m of the model and 4 N·m of friction. After Teaching, the next torque continues both parts. After other
-    /// states, the torque of the model may step, so the next torque continues the friction only.
+    /// The last torque consists of 8 N·m from the model and 4 N·m for friction. After Teaching, the next torque
+    /// begins at the sum of 12 N·m. After other states, only the friction part of 4 N·m continues, because the torque
+    /// of the model may step.
     #[test]
     fn j25_j44_after_teaching_no_part_of_the_torque_steps() {
         for (last, whole) in [(ControllerState::Teaching, true), (ControllerState::Operate, false)] {

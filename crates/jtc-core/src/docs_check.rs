@@ -1,5 +1,5 @@
-//! Parts of the documentation that tests generate from the code. If `UPDATE_DOCS=1` is set, the tests write these parts of the
-//! documentation.
+//! Parts of the documentation that are generated from the code. Tests compare these parts with the code. With
+//! `UPDATE_DOCS=1`, the tests write them.
 extern crate std;
 use std::format;
 use std::path::Path;

@@ -175,8 +175,8 @@ mod tests {
 
     const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
 
-    /// When an error is raised, the words of current and occurred errors show it in the same tick. The word of occurred errors contains an
-    /// error until the host also clears this word.
+    /// When an error is raised, the words of current and occurred errors show it in the same tick. The word of
+    /// occurred errors keeps the error until the host clears this word as well.
     #[test]
     fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
         for (raise, word) in [

@@ -64,7 +64,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if from == *point && self.clock.time == 0.0 {
             return Some(Phase::AtStart);
         }
-        // If the arm is outside its limits, the path may begin at its position (J-36).
+        // An arm that is already outside its limits may begin a path at its present position (J-36).
         let within = |j: usize| {
             let (low, high) = PathRange::of(&self.config, j, self.store.step_ms()).of_path(from[j]);
             point[j] >= low && point[j] <= high
@@ -129,7 +129,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Begins a held stop, because holding back does not help. `lags` is `true` for the joints that lag too far.
+    /// Begins a held stop, because the arm is still overloaded although the path was slowed down. `lags` is `true`
+    /// for each joint whose position error is too large.
     #[cold]
     fn stop_held_back(&mut self, lags: &[bool; JOINTS]) {
         let errors = core::array::from_fn(|j| match (lags[j], self.motion.hold_back.has_pressed(j)) {
@@ -137,7 +138,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             (false, true) => joint_error::TORQUE,
             (false, false) => 0,
         });
-        // A joint at its torque limit may come before the joint that lags.
+        // If a joint has a position error that is too large, this joint is the cause of the stop. A joint at its
+        // torque limit is the cause only if no joint lags.
         match lags.iter().position(|lags| *lags) {
             Some(joint) => {
                 let (error, limit) = self.motion.lag(joint, &self.nodes, &self.config);
@@ -280,14 +282,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Executes one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. During a pause or stop, the
-    /// controller may use all available torque for braking. After `stop_ms`, the stop ends as soon as every joint is slow enough to count
-    /// as at rest. If path time or a jog has not stopped at the end of the braking time, the torque is not sufficient. The moving joints
-    /// are then overloaded. If the arm is already held at the end of the braking time but an external force moves it, the normal limits
-    /// apply.
+    /// Executes one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues.
+    /// During a pause or stop, the controller may use all available torque for braking. After `stop_ms`, the stop
+    /// ends as soon as every joint is slow enough to count as at rest. If path time or a jog has not stopped at the
+    /// end of the braking time, the available torque was too low, and the moving joints count as overloaded. If the
+    /// controller already holds the arm at the end of the braking time but an external force moves it, the normal
+    /// limits apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
-            // A jog has begun since the stop, or a jog continues.
+            // A jog is active and does not come to rest, so the earlier pause or stop is over.
             self.braking_ms = None;
         }
         let Some(ms) = self.braking_ms else { return false };

@@ -99,7 +99,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
-            // An operator may still press a jog key when a held stop is cleared. The controller then refuses the Jogs of this key.
+            // When the host clears a held stop, an operator may still press a jog key. The controller therefore
+            // refuses the Jogs of a key that was pressed during the held stop.
             if self.stops_held() && velocities.iter().any(|velocity| velocity != 0.0) {
                 self.extensions.refuse_jogs();
             }

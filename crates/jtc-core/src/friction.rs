@@ -77,14 +77,14 @@ pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let columns = row.array_windows().zip(next.array_windows());
     let (y, ([a, b], [c, d])) = locate(&table.temperature, columns, t)?;
     let [a, b, c, d] = [a, b, c, d].map(|&torque| f64::from(torque));
-    // The first step interpolates between the velocities of the cell, at both temperatures. The second step interpolates between the
-    // temperatures.
+    // First interpolates along the velocity, at both temperatures of the cell. Then interpolates between the two
+    // results along the temperature.
     let (low, high) = (a + x * (c - a), b + x * (d - b));
     inside.then_some(low + y * (high - low))
 }
 
-/// Returns the position of `value` within its cell of an axis (0..1), and the element of `cells` for that cell. Returns `None` if `value`
-/// is outside the axis.
+/// Finds the cell of an axis that contains `value`. Returns the position of `value` within this cell (0..1), and the
+/// element of `cells` for this cell. Returns `None` if `value` is outside the axis.
 fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Option<(f64, T)> {
     let mut found = None;
     // The loop has no early exit, so that it takes the same number of instructions for every value.
@@ -185,8 +185,8 @@ mod tests {
         assert_eq!([200, 246, 255].map(celsius), [-56.0, -10.0, -1.0]);
     }
 
-    /// If a velocity is outside the table by at most the rounding tolerance, the torque at the end of the table is used. A velocity outside
-    /// the table by twice the rounding tolerance is refused.
+    /// At a velocity outside the table by at most the rounding tolerance, the torque at the end of the table is used.
+    /// At twice the rounding tolerance, the table has no torque.
     #[test]
     fn j36_j42_what_rounding_adds_to_a_velocity_has_the_torque_at_the_end() {
         let t = sample();
@@ -223,21 +223,23 @@ mod tests {
         TableOf { velocity, temperature: core::array::from_fn(|i| 20.0 + i as f32), torque }
     }
 
-    /// The straight line through the torques at 0.1 and 0.2 rad/s is extended to standstill. The torque at standstill is at most the torque
-    /// at 0.1 rad/s, and the lower torque of both directions counts.
+    /// A straight line through the torques at 0.1 and 0.2 rad/s gives the torque at standstill, but at most the
+    /// torque at 0.1 rad/s. The Coulomb friction is the lower torque of both directions.
     #[test]
     fn j42_the_coulomb_friction_of_the_table_is_the_lower_torque_at_standstill() {
         for (first, forward, backward, coulomb) in [
-            // The lines reach standstill at 4 and 6 N·m.
+            // The line of the forward direction gives 4 N·m at standstill, and the line of the backward direction
+            // gives 6 N·m.
             (-0.95, [4.0, 3.0], [6.0, 3.0], 4.0),
             (-0.95, [6.0, 3.0], [4.0, 3.0], 4.0),
-            // The torque falls with the speed, so the torque at 0.1 rad/s counts: 5 − 2 · 0.1 = 4.8 N·m.
+            // In the forward direction the torque falls with the speed, so the torque at 0.1 rad/s is used: 5 − 2 ·
+            // 0.1 = 4.8 N·m.
             (-0.95, [5.0, -2.0], [6.0, 3.0], 4.8),
             (-0.95, [6.0, 3.0], [5.0, -2.0], 4.8),
-            // A torque in the direction of the motion is not friction.
+            // A torque in the direction of the motion is not friction, so the Coulomb friction is 0.
             (-0.95, [-4.0, 0.0], [6.0, 3.0], 0.0),
             (-0.95, [6.0, 3.0], [-4.0, 0.0], 0.0),
-            // The table does not contain 0.2 rad/s in one direction.
+            // In one direction the table does not reach 0.2 rad/s, so the Coulomb friction is 0.
             (-0.15, [4.0, 3.0], [6.0, 3.0], 0.0),
             (-1.75, [4.0, 3.0], [6.0, 3.0], 0.0),
         ] {

@@ -1,8 +1,8 @@
 //! Check that the gains match the inertia of the joints (J-71), and trial of new gains.
 //!
-//! The torques of the derivative and of the position error take effect with a delay, so a joint with too little inertia for its gains
-//! oscillates. The controller computes the smallest effective inertia of each joint in a fixed set of poses, one pose per tick. The
-//! controller compares the gains with this inertia.
+//! The torques of the derivative and of the position error take effect with a delay, so a joint with too little
+//! inertia for its gains oscillates. The controller computes the smallest effective inertia of each joint in a fixed
+//! set of poses, one pose per tick, and compares it with the inertia that the gains require.
 use core::f64::consts::TAU;
 
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -17,17 +17,18 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Delay of the torque of the derivative in addition to [`Config::delay_ticks`], ticks. The additional delay of the derivative is half of
-/// the ticks over which it is computed, plus half of the tick for which a torque is constant.
+/// Additional delay of the derivative torque, ticks, on top of [`Config::delay_ticks`]. It consists of half of the
+/// window over which the derivative is computed, and half of the tick for which a torque is constant.
 const DERIVATIVE_AGE: f64 = 3.0;
-/// Delay of the torque of the position error in addition to [`Config::delay_ticks`], ticks.
+/// Additional delay of the torque of the position error, ticks, on top of [`Config::delay_ticks`].
 const POSITION_AGE: f64 = 0.5;
-/// Factors in the formula for the required inertia: the first for Kd times the delay of its torque, the second for Kp times both delays.
-/// The required inertia is 1.1 to 1.7 times the inertia at which the control loop of one joint becomes stable. The range of 1.1 to 1.7
-/// applies if Kp is at most half of the Kp that Kd can damp.
+/// Factors in the formula for the required inertia. `PER_KD` multiplies Kd times the delay of its torque, and
+/// `PER_KP` multiplies Kp times both delays. If Kp is at most half of the Kp that Kd can damp, the required inertia
+/// is 1.1 to 1.7 times the smallest inertia with which a joint is stable.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
-/// Largest sag of a joint, as a share of the position error limit, that is permitted when new gains reduce the torque of its integral.
+/// Largest sag of a joint, as a share of the position error limit, when new gains allow less integral torque than
+/// before.
 const SAG: f64 = 0.25;
 /// Least torque that the position gain must produce at the position error limit, as a share of the torque limit.
 const STIFF: f64 = 0.03;
@@ -36,12 +37,12 @@ const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
 /// Time after a change of gains during which the controller attributes an unstable control loop to the new gains, ms.
 const BLAMED_MS: u16 = 10_000;
-/// Factor that reduces the gains of a joint with an unstable control loop, and time after this reduction within which a second instability
-/// is an error, ms.
+/// Factor by which the gains of a joint with an unstable control loop are reduced. If the loop is unstable again
+/// within `AGAIN_MS` (ms) after this reduction, the controller raises an error.
 const SOFTER: f64 = 0.3;
 const AGAIN_MS: u16 = 500;
 
-/// Position of each joint, as a share of its range, in the poses after the first pose. The shares of all poses fill the ranges evenly
+/// Position of each joint, as a share of its range, in all poses except pose 0. The poses fill the ranges evenly
 /// (Halton 1960).
 const SHARES: [[f32; JOINTS]; POSES - 1] = shares();
 
@@ -87,7 +88,7 @@ pub(crate) struct FeltInertia {
 bit_codec!(FeltInertia { joints });
 
 impl FeltInertia {
-    /// Value before the inertia is computed in the first pose.
+    /// Initial value, before the inertia was computed in any pose.
     pub(crate) const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
     /// Computes the effective inertias in the pose `number`, for an arm without a payload.
@@ -112,9 +113,9 @@ impl FeltInertia {
     }
 }
 
-/// Returns the smallest effective inertia (kg·m²) of each joint of an arm without a payload, while the other joints are free. Like a
-/// controller with these settings (J-71), the function computes the inertia in the zero pose and in sixteen poses within the position
-/// limits. For a drive without a configured rotor inertia, 0.7 kg·m² is used.
+/// Returns the smallest effective inertia (kg·m²) of each joint of an arm without a payload, while the other joints
+/// are free. The function uses the same poses as a controller with these settings (J-71): the zero pose and sixteen
+/// poses within the position limits. For a drive without a configured rotor inertia, 0.7 kg·m² is used.
 pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
     let mut felt = FeltInertia::NONE;
     (0..POSES).for_each(|number| felt.look(number, model, config));
@@ -133,9 +134,10 @@ fn position_delay(delay_ticks: u8) -> f64 {
     DT * (f64::from(delay_ticks) + POSITION_AGE).max(1.0)
 }
 
-/// Returns `true` if a held joint does not fall when these gains are applied (J-71). `p` is the torque of the position error of the joint,
-/// and `i` is the torque of its integral, N·m. At the position error limit, the position gain must produce a minimum torque. If the new
-/// gains reduce the torque of the integral, the resulting position error must be small.
+/// Returns `true` if a held joint does not fall when these gains are applied (J-71). `p` is the present torque of the
+/// position error, and `i` is the present torque of the integral, N·m. At the position error limit, the position gain
+/// must produce a minimum torque. If the new gains allow less integral torque, the resulting position error must be
+/// small.
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -143,18 +145,19 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
     stiff && gains.kp > 0.0 && (held - kept).abs() < SAG * limits.position_error_max * gains.kp
 }
 
-/// Gains that were received under torque, and the state of their trial.
+/// Trial of gains that a host has sent while the torque was on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
-    /// Gains before the trial, for as long as the controller may restore them.
+    /// Gains before the trial. `None` if the controller may not restore any gains.
     before: Option<[PidGains; JOINTS]>,
-    /// Time for which all joints have been held stable during the trial, ms.
+    /// Time of the trial in which all joints were settled and no joint yielded, ms.
     held_ms: u16,
-    /// Kp and Kd at the time when the gains changed. The next field is the remaining time of the blend to the new gains, ms.
+    /// Kp and Kd at the time when the gains changed. `blend_ms` is the remaining time of the blend to the new gains,
+    /// ms.
     from: [[f32; 2]; JOINTS],
     blend_ms: u16,
-    /// Joints (one bit each) whose gains were reduced or restored because their control loop was unstable. The next field is the remaining
-    /// time in which a second instability is an error, ms.
+    /// Joints (one bit each) whose gains were reduced or restored because their control loop was unstable. `again_ms`
+    /// is the remaining time in which a further instability of these joints is an error, ms.
     unstable: u8,
     again_ms: u16,
 }
@@ -163,27 +166,29 @@ bit_codec!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// Begins a trial of the gains `given`, which a host has sent while the torque was on. The gains `given` replace the gains `before`.
+    /// Begins a trial of the gains `given`, which a host has sent while the torque was on. They replace the gains
+    /// `before`.
     pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
         // If the gains in `before` are still on trial, the controller does not know yet whether they hold the arm stable.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
-        // Gains that have already held the arm stable need no trial.
+        // If the host sends the stored earlier gains again, no trial is necessary, because these gains have already
+        // held the arm.
         self.before = self.before.filter(|before| before != given);
         self.held_ms = 0;
     }
 
-    /// Ends the trial of gains, because the controller no longer holds the arm. If gains are on trial, returns the gains before the trial,
-    /// because the new gains have not yet held the arm stable.
+    /// Ends the trial, because the controller no longer holds the arm. Returns the earlier gains if the new gains
+    /// have not yet held the arm for long enough. Returns `None` otherwise.
     pub(crate) fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
         before
     }
 
-    /// Discards the gains before the trial, unless `may` allows the controller to restore these gains.
+    /// Discards the stored earlier gains if `may` returns `false` for them. The controller can then not restore them.
     pub(crate) fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
         self.before = self.before.filter(may);
     }
@@ -209,8 +214,8 @@ impl Trial {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// Returns the gains of this tick during the blend to the new gains `given`. Kp and Kd change gradually, but the gain of the integral
-    /// changes at once. Returns `None` if the blend is over.
+    /// Returns the gains of this tick during the blend to the new gains `given`. Kp and Kd change gradually, and the
+    /// integral gain changes at once. Returns `None` if the blend is over.
     pub(crate) fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
@@ -236,9 +241,9 @@ impl Trial {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
-    /// Handles joints (one bit each) that fail with their `gains`. `unstable` marks the joints with unstable control loops. If the gains
-    /// must change, returns the cause and the new gains. The new gains are the gains before the trial or, if none are stored, softer gains
-    /// for the unstable joints.
+    /// Handles the failure of joints (one bit each) with their `gains`. `unstable` marks the joints with unstable
+    /// control loops. If the gains must change, returns the cause and the new gains. The new gains are the gains
+    /// before the trial. If no earlier gains are stored, the unstable joints get softer gains.
     pub(crate) fn fails(
         &mut self,
         failed: u8,
@@ -273,7 +278,7 @@ fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains;
         own if joints >> j & 1 == 0 => own,
         own => {
             let kp = SOFTER * own.kp;
-            // The delay of the Kp torque cancels at most half of the damping by Kd.
+            // Kd is high enough that the delay of the Kp torque cancels at most half of the damping.
             let kd = (SOFTER * own.kd).max(2.0 * kp * position_delay(delay_ticks));
             PidGains { kp, kd, ki: 0.0, ..own }
         }

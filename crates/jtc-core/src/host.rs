@@ -28,7 +28,8 @@ use slices::{SliceOutcome, SliceProgress};
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// Returns the data status for existing hosts, which do not know data statuses above 6 (J-51).
+/// Returns the data status for hosts that do not use the extensions. Such hosts do not know data statuses above 6
+/// (J-51).
 pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     match data {
         DataStatus::NotAllowed | DataStatus::StartPositionMismatch => DataStatus::IncorrectValue,
@@ -36,7 +37,7 @@ pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     }
 }
 
-/// Share of a tick that the execution of an event has used.
+/// Share of a tick's time that the execution of an event has used.
 enum Served {
     /// The event took a few instructions, so the tick has time for another event.
     Quickly,
@@ -47,8 +48,8 @@ enum Served {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Executes urgent commands first, then the oldest events of the host link: short events up to the first long event, or one slice of a
-    /// long event. Returns the number of completed events.
+    /// Executes urgent commands (Stop and Pause) first, then the oldest events of the host link. A tick executes
+    /// short events up to the first long event, or one slice of a long event. Returns the number of completed events.
     pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
         for (line, commands) in inputs.urgent.iter().enumerate() {
             for (command, count) in commands.iter() {
@@ -56,7 +57,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
         }
         if inputs.host.is_empty() {
-            // In most ticks, the function returns here. A tick that returns here skips the loop, whose preparation takes many instructions.
+            // Most ticks have no host event. The early return skips the preparation of the loop, which takes many
+            // instructions.
             return 0;
         }
         let mut done = 0;
@@ -119,8 +121,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // The refusal of a command that the state does not allow takes no computation. A Jog is the exception, because
-                            // the controller may compute its motion before it refuses the Jog.
+                            // If the state does not allow a command, its refusal takes no computation, so the tick
+                            // can process another event. A Jog is an exception, because the controller may compute
+                            // its motion before the refusal.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
@@ -163,7 +166,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
-            // J-69: the condition to which the controller reacts still exists.
+            // J-69: the controller is still reacting to a finding, so the host cannot clear its cause yet.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
                 if self.is_reacting() =>
             {
@@ -235,9 +238,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21). If a joint still reports a fault, the controller raises this fault again in this tick. If the errors would not
-    /// change for this reason, the controller refuses the command. The controller also does not execute this command later, when the joint
-    /// no longer reports the fault.
+    /// Clears errors (J-21). If a joint still reports a fault, the controller raises the error again in this tick. If
+    /// no error would be cleared for this reason, the controller refuses the command. It does not execute a refused
+    /// command later, when the fault has ended.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -255,7 +258,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
         if command.frame_type().is_default() {
             if self.extensions.unusable {
-                // The built-in arm differs from the stored arm (J-54).
+                // The stored arm could not be loaded. The built-in arm is a different arm, so the controller must not
+                // use it instead (J-54).
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
             if self.extensions.stored.is_there() {
@@ -297,7 +301,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.model_taken(outcome)
     }
 
-    /// Informs the control law about an accepted model while the arm has torque.
+    /// Tells the control law that a model was accepted while the torque was on.
     fn model_taken(&mut self, outcome: SliceOutcome) -> SliceOutcome {
         if self.powered() && matches!(outcome, SliceOutcome::Done) {
             self.motion.law.change_model();
@@ -372,8 +376,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
-            // Execute is refused, for example, if Teaching was accepted and begins as soon as the controller holds the arm, or if joints
-            // are absent (J-53). Execute is also refused if a hand was moving the arm and the arm is not at rest yet.
+            // Execute is refused after a request for Teaching was accepted, during a jog or a held stop, and while
+            // joints are absent (J-53). It is also refused until an arm that a hand has moved is at rest.
             (_, ExecCommand::Execute)
                 if self.teaching
                     || self.motion.set.is_led()

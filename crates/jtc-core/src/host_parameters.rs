@@ -37,7 +37,7 @@ pub(crate) struct HostParameters {
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
-    /// Effective inertia of the joints in the received model, and in the model that is being checked (J-71).
+    /// Effective inertia of the joints in the received model, or in a model while it is being checked (J-71).
     felt: FeltInertia,
     looked_at: FeltInertia,
     /// Trial of gains that were received under torque.
@@ -46,11 +46,12 @@ pub(crate) struct HostParameters {
     /// Friction tables, which contain zeros until tables are received.
     pub tables: [TableOf<f32>; JOINTS],
     pub friction_is_table: bool,
-    /// Friction parameters were received after the last check of the trajectory.
+    /// `true` if friction parameters were received after the last check of the trajectory.
     pub friction_is_new: bool,
 }
 
-/// State of the parameters. The values of the parameters belong to the arm, so this state does not include them.
+/// State of the parameters for a snapshot. The values of the parameters belong to the arm, so this state does not
+/// contain them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HostParametersState {
     received: u8,
@@ -142,8 +143,8 @@ impl HostParameters {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
-    /// Returns `true` if each parameter was received since the start. If each parameter was received, the controller uses a built-in value
-    /// only if a host has requested it.
+    /// Returns `true` if gains, model and friction were all received since the start. The controller then uses a
+    /// built-in value only if a host has requested it.
     pub(crate) fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
@@ -186,9 +187,9 @@ impl HostParameters {
         self.payload.forget();
     }
 
-    /// Returns `true` if every joint can hold the payload in `config` at `at` (rad), or needs less torque than now (J-60). If a position is
-    /// unknown or the model is missing, the controller cannot check this, and the function returns `true`. The controller checks the
-    /// payload again when Init ends.
+    /// Returns `true` if every joint can hold the payload in `config` at `at` (rad), or needs less torque than with
+    /// the present payload (J-60). If a position is unknown or the model is missing, the function returns `true`,
+    /// because the controller checks the payload again when Init ends.
     pub(crate) fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
@@ -269,8 +270,8 @@ impl HostParameters {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
 
-    /// Returns `true` if the joints of the last checked model have too little inertia for the gains. The controller may have accepted or
-    /// refused this model.
+    /// Returns `true` if the joints of the last checked model have too little inertia for the gains, even if the
+    /// controller refused this model.
     #[cfg(test)]
     pub(crate) fn gains_were_too_much(&self, config: &Config) -> bool {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
@@ -327,7 +328,7 @@ impl HostParameters {
             return SliceOutcome::Done;
         }
         if self.missing() & missing_parameter::MODEL != 0 {
-            // The controller checks the model when the host sends the model again.
+            // The inertia is unknown without a model. The controller computes it when the host sends the model again.
             self.felt = FeltInertia::NONE;
             return SliceOutcome::Done;
         }

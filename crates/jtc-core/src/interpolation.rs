@@ -62,17 +62,17 @@ struct Weights {
     acceleration: [f64; 2],
 }
 
-/// Units of the samples, and the changes that one unit causes within a step between two points. The units and the changes are constant for
-/// a trajectory.
+/// Units of the samples of a trajectory, and the changes that one unit causes within a step between two points. All
+/// values are constant for a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     /// Position (rad), velocity (rad/s) and acceleration (rad/s²) that one unit of a sample represents.
     position: f64,
     velocity: f64,
     acceleration: f64,
-    /// Changes that one unit of a sample causes within a step between two points. `way` is the distance (rad) due to one unit of velocity,
-    /// and `half_way` is half of the distance (rad) due to one unit of acceleration. `change` is the change of the velocity (rad/s) due to
-    /// one unit of acceleration.
+    /// Distance within a step (rad) that one unit of velocity causes. `half_way` is half of the distance (rad) that
+    /// one unit of acceleration causes. `change` is the change of the velocity (rad/s) that one unit of acceleration
+    /// causes.
     way: f64,
     half_way: f64,
     change: f64,
@@ -124,7 +124,7 @@ impl Weights {
 /// Step between two points of a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
-    /// Length of the step, ms, and reciprocal of the length.
+    /// Length of the step, ms. `per_ms` is its reciprocal.
     pub ms: u16,
     pub per_ms: f64,
     units: Units,
@@ -162,8 +162,9 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Returns the derivative of the position (rad/s) at the same time as [`interpolate`]. The derivative of the position is the velocity of
-/// the cubic polynomial, plus a term for the distance that the velocities of both points do not explain.
+/// Returns the derivative of the interpolated position (rad/s) at the same time as [`interpolate`]. The derivative is
+/// the velocity of the cubic polynomial, plus a correction. The correction is necessary if the velocities and
+/// accelerations of both points do not explain the whole distance.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {
@@ -213,8 +214,8 @@ mod tests {
             }
         }
 
-        /// If the position of a motion is a quintic polynomial, the interpolation reproduces this position. If the velocity is a cubic
-        /// polynomial, the interpolation reproduces this velocity.
+        /// If the position of a motion is a quintic polynomial, the interpolated position is exact. If its velocity
+        /// is a cubic polynomial, the interpolated velocity is also exact.
         #[test]
         fn j32_reproduces_polynomials(c in prop::array::uniform6(-1.0..1.0f64), h in 0.005..0.5f64, u in 0.0..1.0f64) {
             let at = |t: f64| {
@@ -234,8 +235,8 @@ mod tests {
             prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
         }
 
-        /// Points in the wire format give the same result as points with real numbers, except for a rounding error far below the tolerance
-        /// of the limits.
+        /// Points in the wire format and points with real numbers give the same result. Only a rounding error
+        /// remains, which is far below the tolerance of the limits.
         #[test]
         fn j32_points_of_the_wire_are_interpolated_alike(
             (a, b) in (raw(), raw()), ms in prop::sample::select(&[1, 2, 7, 10, 100, u16::MAX][..]), u in 0.0..1.0f64,
@@ -243,7 +244,8 @@ mod tests {
             let wanted = interpolate(&SetPoint::from(&a), &SetPoint::from(&b), f64::from(ms) * 1e-3, u);
             let mut got = SetPoint::default();
             Step::new(ms).between(&a, &b, u, &mut got);
-            // In a step of one minute, the set values between the points differ greatly from the set values at both points.
+            // A step of one minute amplifies rounding errors, because the values between its points are much larger
+            // than the values at the points.
             let rounding = 0.01 * ROUNDING * (1.0 + f64::from(ms) * 1e-3).powi(2);
             for j in 0..JOINTS {
                 prop_assert!((got.position[j] - wanted.position[j]).abs() < rounding);

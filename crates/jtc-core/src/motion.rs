@@ -99,7 +99,7 @@ impl Motion {
         self.limiter.forget_turns();
     }
 
-    /// Returns `true` if all joints have settled since they were enabled and no joint yields.
+    /// Returns `true` if all joints have been at rest at least once since they were enabled, and if no joint yields.
     pub(crate) fn holds(&self, config: &Config) -> bool {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
@@ -122,9 +122,9 @@ impl Motion {
         (self.set.due(config)[j] - nodes.positions()[j], limit)
     }
 
-    /// Returns `true` if the arm is held at rest and the loads of its joints are known. In a held stop, a `contact` may press on the arm,
-    /// and the controller does not wait for the end of this contact. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the
-    /// controller does not wait for the loads either.
+    /// Returns `true` if Teaching may begin: the arm is held at rest, and the loads of its joints are known. In a
+    /// held stop, an obstacle may press on the arm (`contact`), and Teaching may begin during this contact. If the
+    /// request for Teaching has waited (`waits_ms`) for [`KNOWN_MS`] in a held stop, the loads need not be known.
     pub(crate) fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
@@ -167,8 +167,8 @@ impl Motion {
         }
     }
 
-    /// Executes one tick on the path or during the approach. `at` contains the set values at the time of the `clock`, for full speed
-    /// (J-33).
+    /// Executes one tick on the path or during the approach. `at` contains the set values at the present time of the
+    /// `clock`, as if the motion ran at full speed (J-33). The function scales them with the rate of the clock.
     pub(crate) fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);

@@ -52,7 +52,7 @@ pub(crate) struct Nodes {
     /// Number of consecutive Moves without acknowledgement.
     unacknowledged: u8,
     sent_move: bool,
-    /// Number of Moves since the last frame that the controller sent instead of a Move.
+    /// Number of consecutive Moves that the controller has sent since the last other frame.
     moves: u8,
     configured_last: bool,
     /// Check that compares the positions and speeds of the drives (J-35).
@@ -218,8 +218,8 @@ impl Nodes {
 
     /// Processes the frames that the bus has received since the last tick. `commanded` contains the set values of the last ticks.
     pub(crate) fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
-        // `answered` and `configured_before` are masks of nodes. If a node accepts its configuration in this tick, its answer to the next
-        // Move comes in a later tick.
+        // `answered` and `configured_before` are masks of nodes. A node that accepts its configuration in this tick
+        // answers only the Move of a later tick.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         if self.some_absent {
             self.nodes.iter_mut().for_each(|node| node.unasked = None);
@@ -296,7 +296,8 @@ impl Nodes {
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
-            // When the position becomes valid, it may differ from earlier positions by any distance.
+            // When the position becomes accurate, it may jump by any distance. The earlier measurements are therefore
+            // discarded.
             node.measured.forget();
         }
         node.report = *report;
@@ -315,8 +316,8 @@ impl Nodes {
         }
     }
 
-    /// Uses the `commanded` velocities (rad/s) as the new reference for joints whose set values were restarted. A restart of the set values
-    /// does not change the motion (J-63).
+    /// Uses the `commanded` velocities (rad/s) as the new reference for predictions of the joints in `found`. The set
+    /// values of these joints were restarted, and such a restart does not change their motion (J-63).
     pub(crate) fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {
@@ -440,7 +441,8 @@ impl Nodes {
                 node.restart(config);
             }
         }
-        // If the velocity scale has changed, positions and speeds may agree again.
+        // After a change of the velocity scale, the nodes are configured again, because their positions and speeds
+        // may then agree.
         let bits = |config: &Config| {
             let Config { joint_config_bits, gripper_config_bits, gripper, velocity_full_scale, .. } = *config;
             (joint_config_bits, gripper_config_bits, gripper, velocity_full_scale)

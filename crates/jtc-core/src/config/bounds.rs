@@ -12,8 +12,8 @@ const MEASURED: f64 = 0.5;
 /// Number of speeds at which a friction polynomial is checked. A cubic changes only a little between two of these speeds.
 const SPEEDS: u8 = 16;
 
-/// Bounds of gains, masses and friction. Arms with the known drives have no gains, masses or friction outside these bounds. Gains, masses
-/// or friction outside these bounds could throw or drop the arm (J-06).
+/// Bounds of gains, masses and friction. Arms with the known drives have only values within these bounds. Values
+/// outside the bounds could throw or drop the arm (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
     /// Highest Kp, N·m/rad. The known drives use a Kp of at most 28 000.
@@ -24,7 +24,8 @@ pub struct ParameterBounds {
     pub kd_max: f64,
     /// Largest magnitude of IntMin and IntMax, rad·s. The known arms use magnitudes up to 120.
     pub integral_max: f64,
-    /// Largest torque at rest that the bounds of the integral may cause if they exclude zero, as a share of the torque limit of the joint.
+    /// Largest torque on a joint at rest that the bounds of its integral may force, as a share of its torque limit.
+    /// The bounds force a torque only if they exclude an integral of zero.
     pub integral_bias_max: f64,
     /// Largest mass of a link, kg. A drive of 360 N·m, the full scale of the bus, can hold 50 kg only up to a distance of 0.73 m.
     pub link_mass_max: f64,
@@ -35,8 +36,8 @@ pub struct ParameterBounds {
     pub friction_max: f64,
     /// Like `friction_max`, but for speeds up to half of the velocity limit. In the known arms, this share is at most 0.82.
     pub slow_friction_max: f64,
-    /// Largest friction torque in the direction of the motion, up to half of the velocity limit, as a share of the torque limit.
-    /// Measurement noise can cause a friction torque in this direction.
+    /// Largest friction torque that acts in the direction of the motion, as a share of the torque limit, at speeds up
+    /// to half of the velocity limit. Measurement noise can cause such a torque in the friction parameters.
     pub friction_reversed_max: f64,
     /// Largest friction torque at standstill, as a share of the torque limit.
     pub rest_friction_max: f64,

@@ -137,10 +137,10 @@ impl Turns {
     }
 }
 
-/// Returns a joint error for each set value (position, velocity, acceleration) outside its limits, and for a position `error` (rad, J-62)
-/// above its limit. The position limit applies only to `commanded` positions. The controller holds an arm that is already outside a
-/// position limit. Without the exception for held positions, the host could never move the arm back. A rounding error between two points
-/// that have passed the check of J-36 is not an error.
+/// Returns a joint error for each set value (position, velocity, acceleration) outside its limits, and for a position
+/// `error` (rad, J-62) above its limit. The position limit applies only to `commanded` positions. The controller also
+/// holds an arm that is already outside a position limit, because the host could otherwise never move the arm back. A
+/// rounding error between two points that have passed the check of J-36 is not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
     // With these comparisons, a value of NaN counts as outside the limits.
@@ -214,7 +214,7 @@ mod tests {
             assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, false));
             assert!(saturation.saturated);
         }
-        // A tick within the torque limit is not counted, but does not restart the observed window.
+        // A tick within the torque limit does not count, but it does not restart the observed window either.
         assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, false));
         assert!(!saturation.saturated);
         assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, true));
@@ -258,7 +258,9 @@ mod tests {
         assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, true));
     }
 
-    /// Numbers of the ticks in which the torque is at its upper limit (`true`) or at its lower limit (`false`).
+    /// The control loop is unstable if the torque reaches the upper limit twice and the lower limit twice within 200
+    /// ms. Each pair is a tick number, and `true` for the upper or `false` for the lower limit. The result is the
+    /// index of the pair that shows the instability.
     #[test]
     fn j66_a_torque_that_was_at_both_limits_twice_each_within_200_ms_is_unstable() {
         let seen = |hits: &[(u32, bool)]| {
@@ -287,7 +289,8 @@ mod tests {
         }
     }
 
-    /// A value that has passed the check of J-36 is not an error in motion, even with the largest rounding error.
+    /// A set value that has passed the check of J-36 is not an error during the motion, even if rounding increases it
+    /// by the largest possible amount.
     #[test]
     fn j36_j43_what_rounding_may_add_is_no_error() {
         let l = limits();

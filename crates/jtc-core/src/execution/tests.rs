@@ -20,7 +20,7 @@ fn begin_approach(controller: &mut Controller<[RawPoint; 4]>, position: [f64; JO
     controller.phase = controller.approach_to(&point).expect("an approach");
 }
 
-/// While a pause or stop brakes, errors (J-43) are suppressed only as long as the arm moves.
+/// Errors (J-43) are suppressed while a pause or stop brakes, but only as long as the arm still moves.
 #[test]
 fn j33_braking_ends_where_the_arm_stands() {
     let mut stands = braking(ControllerState::HoldPos, TrajectoryState::Pause);
@@ -75,7 +75,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     for (trajectory, ms, goes_on, error) in [
         (TrajectoryState::Execute, most - 1, true, 0),
         (TrajectoryState::Execute, most, false, joint_error::TORQUE),
-        // In these cases, the arm is held, but an external force moves the arm.
+        // In the next cases the arm is already held, but an external force still moves it. This is no error.
         (TrajectoryState::Pause, most - 1, true, 0),
         (TrajectoryState::Pause, most, false, 0),
     ] {
@@ -90,7 +90,8 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     assert!(!controller.errors.any(), "it stands");
 }
 
-/// The end of a motion may be so slow that the controller ignores it.
+/// At the end of `stop_ms`, an arm that moves only at 0.01 rad/s counts as stopped. At 0.03 rad/s the arm does not
+/// count as stopped.
 #[test]
 fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
     let most = Config::avena().stop_ms;
@@ -195,7 +196,8 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     }
 }
 
-/// A Stop or Pause arrives `after_ms` after the start of an approach to point 0, which is `way` away.
+/// An approach begins at the distance `way` from point 0. A Stop or Pause arrives `after_ms` later. The arm brakes at
+/// once and comes to rest on the way to point 0.
 #[test]
 fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point() {
     for (way, after_ms) in [(0.02, 1), (0.02, 60), (0.02, 150), (-0.3, 60), (0.49, 60), (0.49, 250)] {
@@ -223,8 +225,8 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // The limit `most` is the smaller of two distances: the remaining distance, and the stopping distance of a path that still
-            // accelerates for half of the ramp.
+            // The arm may move at most by the distance `most` after the command. This is the smaller of the remaining
+            // distance and the stopping distance if the approach still accelerates for half of the ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");
@@ -282,7 +284,8 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     }
 }
 
-/// The controller cannot slow down a finished path. A jog ends if it overloads a joint.
+/// Only a path or an approach that goes on can be slowed down. The controller cannot slow down a finished path, a
+/// jog, or an approach that has not begun.
 #[test]
 fn j75_only_a_motion_that_goes_on_is_held_back() {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);

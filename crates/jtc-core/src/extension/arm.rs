@@ -20,10 +20,10 @@ impl Extensions {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Loads the stored arm (J-54). The controller then uses the settings and the name of this arm, and the UseDefault frames refer to this
-    /// arm. The host must still request the parameters. The board calls this function before the first tick. Returns `false` if this
-    /// controller does not accept the image. If the controller does not accept the image, the settings do not change, and the controller
-    /// refuses the UseDefault frames until an arm is stored.
+    /// Loads the stored arm (J-54). The controller then uses the settings and the name of this arm, and the
+    /// UseDefault frames refer to this arm. The host must still request the parameters. The board calls this function
+    /// before the first tick. Returns `false` if this controller does not accept the image. The settings then do not
+    /// change, and the controller refuses the UseDefault frames until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
@@ -60,7 +60,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let before = core::mem::replace(&mut self.extensions.store, state);
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
-            // The next start of the board would use another arm, so no stored arm is available until the next start.
+            // The board could not write the arm, so its next start would use another arm. Therefore the controller
+            // discards the stored arm and does not use a stored arm until the next start.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }
@@ -105,7 +106,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
-            // The host may have sent gains and model at different times, so the gains are checked against the model again (J-71).
+            // The host may have sent the gains and the model at different times, so the controller checks again that
+            // the gains match the inertia of this model (J-71).
             _ if !self.parameters.gains_are_borne(&self.config) => {
                 return SliceOutcome::Refused(DataStatus::IncorrectValue);
             }

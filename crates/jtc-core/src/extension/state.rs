@@ -36,10 +36,10 @@ pub struct Identity {
 pub(crate) struct Extensions {
     pub answers: Answers,
     pub stored: StoredArm,
-    /// The board must write the stored arm to non-volatile memory.
+    /// `true` if the board must write the stored arm to non-volatile memory.
     pub store_requested: bool,
-    /// An arm is stored but not in use, because the controller could not load or write it. The controller does not use the built-in arm
-    /// instead.
+    /// `true` if an arm is stored but the controller could not load or write it. The controller does not use the
+    /// built-in arm instead.
     pub unusable: bool,
     /// Hash of the arm in use; `None` until it is computed again.
     pub hash: Option<u64>,

@@ -25,7 +25,7 @@ mod two_hosts;
 /// Controller on two host lines, and its outputs.
 struct Bench {
     controller: Box<Controller<[RawPoint; 8]>>,
-    /// Answers, each with the index of its line.
+    /// Answers that the controller has sent, each with the index of its line.
     answers: Vec<(usize, Vec<u8>)>,
     records: Vec<(usize, Response)>,
 }
@@ -134,7 +134,8 @@ impl Bench {
         self.controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Executes a command at once, in a state for which the simulated nodes are not prepared.
+    /// Executes a command directly, without a frame and without ticks. The simulated nodes need not be in the state
+    /// that the test has set.
     fn at_once(&mut self, command: Command<'_>) -> DataStatus {
         match self.controller.carry_out_extension(0, command) {
             SliceOutcome::Done => DataStatus::NoError,
@@ -176,7 +177,7 @@ fn j51_on_a_plain_line_no_data_status_is_above_6() {
             assert_eq!(bench.send_as(false, line, frame), DataStatus::NotAllowed);
         }
     }
-    // All other data statuses are the same on a plain line and on any other line.
+    // A plain line reports only data statuses up to 6. These are the same as on any other line.
     for data in DataStatus::ALL {
         let plain = crate::host::in_plain_words(data);
         assert!(plain as u8 <= 6 && (plain == data || data as u8 > 6), "{data:?}: {plain:?}");
@@ -249,7 +250,8 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     assert_eq!(Hash::of_image(&bench.image()), table);
 }
 
-/// The controller refuses a request while an earlier answer waits, so that it does not lose an answer.
+/// The controller refuses a request while the answer to an earlier request waits to be sent. Otherwise the new answer
+/// would replace the earlier one.
 #[test]
 fn j50_a_second_request_waits_for_the_first_answer() {
     let mut bench = Bench::new();

@@ -41,7 +41,8 @@ fn j71_the_default_arm_feels_what_is_said() {
 }
 
 proptest! {
-    /// In a pose for which the controller did not compute the inertia, the effective inertia of a joint is only slightly lower.
+    /// The check uses only a few poses. In any other pose, the effective inertia of a joint is only slightly lower
+    /// than the smallest checked inertia.
     #[test]
     fn j71_a_joint_feels_little_less_in_other_poses(shares in prop::array::uniform6(0.0..1.0f64)) {
         let (model, config) = (Parameters::avena().model, Config::avena());
@@ -87,7 +88,8 @@ fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
 fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
     let limits = Config::avena().joints[1];
     let gains = PidGains { kp: 1_000.0, ki: 100.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
-    // With 1 000 N·m/rad, a position error of at most a quarter of 0.09 rad may hold the arm.
+    // The position error limit is 0.09 rad. With 1 000 N·m/rad, a quarter of this error (0.0225 rad) holds up to 22.5
+    // N·m.
     for (gains, i, holds) in [
         (gains, 100.0, true),
         (gains, 122.0, true),
@@ -134,8 +136,8 @@ proptest! {
         prop_assert_eq!(last, third);
     }
 
-    /// Softer gains require less inertia than the previous gains. The damping of softer gains is at least twice the damping that is lost by
-    /// the delay of the Kp torque.
+    /// Softer gains require less inertia than the previous gains. Their damping is at least twice the damping that
+    /// the delay of the Kp torque cancels.
     #[test]
     fn j66_softer_gains_are_stable_where_the_others_were_borne(kp in 1.0..50_000.0f64, kd in 0.0..500.0f64, delay in 0..8u8) {
         let own = PidGains { kp, ki: 1000.0, kd, ..given()[0] };
@@ -147,8 +149,8 @@ proptest! {
     }
 }
 
-/// Returns the gains after new gains have failed `ms` after the start of their trial. `unstable` is `true` if the control loop of joint 2
-/// is unstable.
+/// Begins a trial of new gains, which fail after `ms`. Returns the cause and the gains that the controller then uses.
+/// `unstable` is `true` if joint 2 has an unstable control loop.
 fn after(ms: u16, unstable: bool) -> Option<(StopKind, [PidGains; JOINTS])> {
     let mut trial = Trial::default();
     trial.begin(&scaled(0.5), &given());
@@ -174,7 +176,8 @@ fn j66_j71_gains_that_fail_are_taken_back() {
     assert_eq!((softer[0], softer[2]), (given()[0], given()[2]), "the others keep theirs");
 }
 
-/// Gains on trial have not yet held the arm for long enough. Therefore the controller restores the last gains that held the arm.
+/// A host sends two sets of gains, and the second set fails. If the first set has held the arm for long enough, the
+/// controller restores the first set. Otherwise it restores the gains before the first set.
 #[test]
 fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     for (ms, back) in [(100, 0.5), (2_000, 1.2)] {
@@ -200,7 +203,7 @@ fn j71_gains_that_held_are_not_on_trial() {
     assert_eq!(trial.end(), Some(scaled(1.2)));
 }
 
-/// Only the time in which all joints are held counts for a trial of gains.
+/// A trial of gains counts only the time in which all joints are held.
 #[test]
 fn j71_a_trial_waits_for_joints_that_are_not_held() {
     let mut trial = Trial::default();
@@ -211,7 +214,8 @@ fn j71_a_trial_waits_for_joints_that_are_not_held() {
     assert!(!trial.is_on());
 }
 
-/// Joints that fail get their previous gains at once. The gains of the other joints are blended back to their previous gains.
+/// A joint that fails gets its previous gains at once. For the other joints, the controller blends back to the
+/// previous gains.
 #[test]
 fn j71_gains_come_back_at_once_where_they_failed() {
     let mut trial = Trial::default();
@@ -257,14 +261,16 @@ fn j71_a_joint_with_the_required_inertia_is_accepted() {
     }
 }
 
-/// The position gain must produce 3 % of the torque limit at the position error limit. The torque that the new integral cannot keep may
-/// deflect the joint by less than a quarter of the position error limit.
+/// The position gain must produce 3 % of the torque limit at the position error limit. If the new gains allow less
+/// integral torque, the missing torque may deflect the joint by less than a quarter of the position error limit.
 #[test]
 fn j71_a_held_joint_keeps_a_stiff_position_and_sags_little() {
-    // 3 % of 100 N·m is 3 N·m, which 6 N·m/rad produce at 0.5 rad. With 8 N·m/rad, the largest sag of 0.125 rad has 1 N·m.
+    // The position gain must produce 3 % of 100 N·m, which is 3 N·m, at 0.5 rad. This requires 6 N·m/rad. With 8
+    // N·m/rad, the largest permitted sag of 0.125 rad holds 1 N·m.
     let limits = JointConfig { torque_max: 100.0, position_error_max: 0.5, ..Config::avena().joints[1] };
     let soft = |kp: f64| PidGains { kp, ki: 0.0, kd: 0.0, int_min: 0.0, int_max: 0.0 };
-    // The integral of these gains keeps torques from −50 to 50 N·m. The largest sag has 0.125 · 800 = 100 N·m.
+    // The integral bounds of these gains allow torques from −50 to 50 N·m. The largest permitted sag of 0.125 rad
+    // holds 0.125 · 800 = 100 N·m.
     let kept = PidGains { kp: 800.0, ki: 100.0, kd: 0.0, int_min: -0.5, int_max: 0.5 };
     for (gains, p, i, holds) in [
         (soft(6.0), 0.0, 0.0, true),
@@ -286,7 +292,7 @@ fn j71_a_held_joint_keeps_a_stiff_position_and_sags_little() {
     }
 }
 
-/// The gains before a trial return only if the controller may still restore them.
+/// The earlier gains are discarded if the controller may not restore them.
 #[test]
 fn j71_gains_that_may_not_return_are_discarded() {
     for may in [false, true] {
@@ -300,7 +306,8 @@ fn j71_gains_that_may_not_return_are_discarded() {
     }
 }
 
-/// The trial runs while gains may return, while gains are blended, or while an instability of a joint is remembered.
+/// The trial runs while the earlier gains may return, while gains are blended, or while an instability of a joint is
+/// remembered.
 #[test]
 fn j71_a_trial_runs_until_its_last_time_has_passed() {
     assert!(!Trial::default().runs());
@@ -309,7 +316,8 @@ fn j71_a_trial_runs_until_its_last_time_has_passed() {
     assert!(Trial { blend_ms: 1, ..Trial::default() }.runs());
 }
 
-/// A failure without an unstable control loop does not change the record of an unstable joint.
+/// Joint 3 was unstable. A later failure of joint 1 without an unstable control loop does not clear this record of
+/// joint 3.
 #[test]
 fn j66_a_joint_that_was_unstable_stays_known_after_a_tick_without_instability() {
     let mut trial = Trial::default();

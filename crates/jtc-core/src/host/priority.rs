@@ -12,8 +12,9 @@ pub(crate) struct Priority {
     pub(super) pauses: u8,
     /// `true` if these Stops and Pauses have cancelled an Execute.
     pub(super) cancelled: bool,
-    /// A Stop has arrived on any line, accepted or refused, so the controller drops an upload that began before this Stop (J-30). The first
-    /// event that arrived after this Stop clears the flag. The response record of an earlier Stop does not clear the flag.
+    /// `true` if a Stop has arrived on any line. The controller then drops an upload that began before this Stop
+    /// (J-30), even if the Stop was refused. The first event that arrived after this Stop clears the flag. The
+    /// response record of an earlier Stop does not clear it.
     pub(super) stopped: bool,
 }
 
@@ -26,9 +27,9 @@ impl Priority {
         *accepted = accepted.saturating_add(count);
     }
 
-    /// Returns the data status of an execution command that an urgent command has overtaken. The status reports success for a Stop or a
-    /// Pause that was accepted. The status also reports success for a Stop or a Pause that has cancelled an Execute, if the `trajectory` is
-    /// in the commanded state.
+    /// Returns the data status of an execution command that was received before an urgent Stop or Pause took effect.
+    /// An Execute is refused. A Stop or Pause is successful if it was accepted as an urgent command. It is also
+    /// successful if it cancelled an Execute and the `trajectory` has the commanded state.
     pub(crate) fn overtaken(
         &mut self,
         exec: ExecCommand,

@@ -14,7 +14,7 @@ mod uploads;
 
 type Bench = Controller<[RawPoint; 64]>;
 
-/// Line and event from which a command comes that the test executes at once.
+/// Event on line 0 for commands that the tests execute directly, without a frame.
 const ON_LINE_0: HostEvent<'_> =
     HostEvent { line: 0, overtaken: false, plain: false, event: LinkEvent::Noise(Response::NONE) };
 
@@ -24,7 +24,7 @@ fn holding() -> Bench {
     controller
 }
 
-/// Sends three equal frames and returns the number of frames that one tick completes.
+/// Sends three equal frames. Returns how many of them one tick completes.
 fn done_of_three(controller: &mut Bench, frame_type: FrameType, body: &[u8]) -> usize {
     let bytes: Vec<u8> = [&[0; 4], body, &[0; 2]].concat();
     let event = LinkEvent::Frame(FrameRef { frame_type, bytes: &bytes });
@@ -43,7 +43,8 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
         (ClearCurrentErrors, &[1, 0x7F, 0, 0], 3),
         (ResetCanDevices, &[0x40, 0, 0, 0], 1),
         (PidParamUseDefault, &[], 1),
-        // A command that the state forbids uses no time.
+        // The state does not allow this command, and its refusal takes no time, so one tick completes all three
+        // frames.
         (TrajSetExecStatus, &[3, 0, 0, 0], 3),
     ] {
         assert_eq!(done_of_three(&mut holding(), frame_type, body), done, "{frame_type:?} {body:?}");
@@ -57,7 +58,8 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
     assert_eq!(done_of_three(&mut error, ClearOccurredErrors, &[]), 1);
 }
 
-/// If the frame of a Stop was lost, the controller does not report a later Stop as accepted because of the lost frame.
+/// The frame of an urgent Stop may be lost. The first event that arrived after the Stop therefore clears the record
+/// of its line, so that a later Stop is not reported as already accepted.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
     let before = Priority { stops: 2, pauses: 1, cancelled: true, stopped: true };
@@ -141,8 +143,8 @@ fn j36_a_segment_is_checked_with_its_last_point() {
     }
 }
 
-/// The controller checks segment 0 against the friction parameters of that time. The controller may check later segments against different
-/// friction parameters.
+/// The check of segment 0 uses the present friction parameters. If friction parameters arrive after segment 0, later
+/// segments do not clear the flag `friction_is_new`, so Execute checks the path again.
 #[test]
 fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     let mut controller = holding();
@@ -155,7 +157,9 @@ fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     assert_eq!(controller.trajectory, TrajectoryState::Stop);
 }
 
-/// The check of each segment is more exact than the check of the whole velocity range, which is used when friction parameters arrive later.
+/// If the friction table is newer than the path, Execute checks the whole velocity range of the path against the
+/// table, and refuses this path. The check of the single segments is more exact, so without new parameters Execute
+/// accepts the path.
 #[test]
 fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     let body = body(0, 1);
@@ -179,7 +183,8 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     }
 }
 
-/// Gravity acts sideways, so the low torque limits cannot hold the arm.
+/// Gravity acts sideways, so a torque limit of 0.01 N·m cannot hold the arm. The controller refuses the model only if
+/// all joint positions are known.
 #[test]
 fn j06_whether_a_model_can_be_held_is_asked_when_every_position_is_known() {
     for (known, torque_max, taken) in [(false, 0.01, true), (true, 0.01, false), (true, 500.0, true)] {

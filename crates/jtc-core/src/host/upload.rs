@@ -7,11 +7,12 @@ use crate::io::HostEvent;
 use crate::trajectory::check::{TrajectoryCheck, Violation};
 use crate::{ControllerState, TrajectoryState};
 
-/// Highest number of ticks for checking a segment (J-36), and highest number of ticks for copying a segment. Checking, copying and the
-/// response record together take less than 40 ms.
+/// Highest number of ticks for checking a segment (J-36). `COPY_TICKS` is the highest number of ticks for copying it.
+/// Checking, copying and the response record together take less than 40 ms.
 const CHECK_TICKS: usize = 28;
 const COPY_TICKS: usize = 10;
-/// Points that are checked, and points that are copied, in one tick for a short segment.
+/// Number of points that a tick checks in a short segment. `COPIED_PER_TICK` is the number of points that a tick
+/// copies.
 const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
@@ -21,13 +22,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // The host repeats this segment until the controller accepts it, and does not forward a Stop before this. Therefore the segment
-            // acts as a Stop, and the controller refuses the segment in this tick.
+            // A host on a plain line repeats this segment until the controller accepts it, and sends no Stop before
+            // that. Therefore the segment acts as a Stop. The controller refuses the segment in this tick.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
-            // The controller state may also change during the processing of a segment. A change from HoldPos during the processing has
-            // cleared the trajectory.
+            // The controller may also leave HoldPos while it processes a segment. It has then cleared the trajectory,
+            // so it refuses the segment.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
         // The controller received this segment before a Stop that has taken effect.
@@ -37,7 +38,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // A Stop may also drop the upload during the processing of a segment.
+        // A Stop may also drop the upload while the controller processes a segment.
         let begun = !first || matches!(self.slice_progress, SliceProgress::PointCopy(_));
         if begun && self.store.dropped() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
@@ -50,7 +51,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Ok(()) => {
                     self.begin_check(segment);
                     match self.store.refused().filter(|_| !first) {
-                        // The first violation is sufficient to refuse the trajectory, and stays stored.
+                        // A violation in an earlier segment is enough to refuse the trajectory. This violation stays
+                        // stored.
                         Some(violation) => self.take_refused(segment, violation, stopped),
                         None => self.check_points(segment, 0, received.plain, stopped),
                     }

@@ -18,8 +18,8 @@ pub(crate) struct PayloadBlend {
     left_ms: u16,
 }
 
-/// State of a payload blend for a snapshot. The blend ends at the arm with its configured payload, so the state does not contain the
-/// inertial parameters of this arm.
+/// State of a payload blend for a snapshot. The end of the blend follows from the arm and its configured payload, so
+/// this state contains only the start of the blend.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::{Config, Parameters};
 
-    /// The total of the added mass is also correct if another payload follows during the blend.
+    /// The blend adds 1.25 kg in total, although a payload follows before the blend of the last payload has ended.
     #[test]
     fn j60_as_much_mass_comes_as_is_given() {
         let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);
@@ -140,7 +140,8 @@ mod tests {
         assert!(blend.state().from.is_none(), "the state of an ended blend needs no inertias");
     }
 
-    /// The last step uses the next arm itself. An interpolation from a heavy payload to a light one would differ from it by rounding.
+    /// At the end of the blend, the model is exactly the model with the next payload. The last step copies this
+    /// model, because an interpolation from a heavy payload to a light one would leave a rounding error.
     #[test]
     fn j60_at_the_end_of_the_blend_the_model_is_exactly_the_next_arm() {
         let (model, gravity) = (Parameters::avena().model, Config::avena().gravity);

@@ -11,8 +11,8 @@ use crate::config::Config;
 use crate::config::limits::JointConfig;
 use crate::motion::deceleration::moves;
 
-/// Time for which a joint must be at rest, with a torque within its limit, before its load is considered caught, ms. The required time at
-/// rest is longer than the low-speed phase of a swing when its direction changes.
+/// Time for which a joint must be at rest, with a torque within its limit, before its load counts as caught, ms. This
+/// time is longer than the slow phase of an oscillation when its direction changes.
 const CALM_MS: u16 = 100;
 
 /// Speed below which growth of a swing is treated as noise, rad/s.
@@ -27,9 +27,10 @@ pub(crate) struct Catch {
     busy_ms: u16,
     /// `true` if the joint has been calm for `CALM_MS` at least once since it was enabled.
     settled: bool,
-    /// Sag of the set position, rad. The set position sags in one direction only.
+    /// Total sag of the set position, rad. It can grow in one direction only.
     sag: f64,
-    /// Highest speed of the present half swing, with its sign, and of the half swing before it, rad/s.
+    /// Highest speed of the present half swing, with its sign, rad/s. `peak_before` is the highest speed of the half
+    /// swing before it.
     peak: f64,
     peak_before: f64,
     /// `true` if the previous half swing was faster than the half swing before it.
@@ -65,7 +66,8 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise around standstill does not count as a half swing. A fall after this noise is therefore not a growing swing.
+            // Noise of a joint at rest does not count as a half swing. Otherwise, a joint that begins to fall after
+            // such noise would look like a growing swing.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -152,8 +154,8 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // If only the derivative term of the PID controller causes a torque above the limit, the set position does not sag. With a
-            // position gain of zero, the set position sags only as far as the measured position.
+            // If the torque above the limit comes only from the derivative, the set position does not sag. With a
+            // position gain of zero, the set position sags to the measured position and not further.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -206,7 +208,8 @@ mod tests {
         assert!(!goes_on(&[0.03, -0.05, 0.101]));
     }
 
-    /// Even after noise of the opposite sign, the controller must catch a load that begins to fall.
+    /// A load begins to fall after noise in the opposite direction. The noise is not half a swing, so the catch
+    /// continues.
     #[test]
     fn j43_noise_around_standstill_is_no_half_of_a_swing() {
         for noise in [0.001, 0.01, 0.02] {
@@ -264,7 +267,8 @@ mod tests {
         }
     }
 
-    /// When a trial of gains begins, the controller must not use a swing from the time before the trial.
+    /// When a trial of gains begins, the record of earlier half swings is cleared. A growing swing needs three new
+    /// half swings.
     #[test]
     fn j71_a_swing_before_the_trial_does_not_count() {
         let mut catch = over();
@@ -272,14 +276,14 @@ mod tests {
         catch.watch_anew();
         assert!(!grows(&mut catch, &[0.4, -0.5]), "two halves since the trial began");
         assert!(grows(&mut catch, &[0.6]));
-        // A growing swing that was already reported is also cleared.
+        // The record is also cleared if a growing swing was already reported.
         let mut catch = over();
         assert!(grows(&mut catch, &[0.2, -0.3, 0.4]));
         catch.watch_anew();
         assert!(!grows(&mut catch, &[0.4]));
     }
 
-    /// After a catch is over, only `watch` records the swing of the joint.
+    /// After a catch is over, calls of `step` do not record the swing of the joint.
     #[test]
     fn j71_a_catch_that_is_over_does_not_record_a_swing() {
         let mut catch = over();
@@ -295,7 +299,7 @@ mod tests {
         assert!(calmed.settled() && !grows(&mut calmed, &[0.4]));
     }
 
-    /// The controller watches the swing of a joint only after the joint has settled and after its catch is over.
+    /// `watch` reports a growing swing only if the joint has settled and its catch is over.
     #[test]
     fn j71_a_swing_is_watched_only_after_the_catch_and_after_the_joint_has_settled() {
         let peaks = [0.2, -0.3, 0.4, -0.5];
@@ -327,7 +331,7 @@ mod tests {
         assert!(catch.settled());
     }
 
-    /// A joint that has settled and is then pushed may swing with a growing amplitude. This swing does not end the catch.
+    /// A push may cause a growing swing of a joint that has settled. Such a swing does not end the catch.
     #[test]
     fn j43_a_growing_swing_ends_only_the_catch_of_a_joint_that_has_not_settled() {
         let mut catch = begun();

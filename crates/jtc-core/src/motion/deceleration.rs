@@ -10,11 +10,11 @@ use crate::interpolation::smooth;
 const STANDING: f64 = 0.02;
 /// Highest deceleration of a joint that falls while it is enabled, rad/s². Gravity requires most of the torque of a falling joint.
 const CATCH_DECELERATION: f64 = 3.0;
-/// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The deceleration peak of a falling joint is in the middle
-/// of the motion.
+/// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The peak is in the middle of the
+/// motion.
 const STEEPEST: f64 = 1.5;
-/// Peak deceleration of a joint that a hand was guiding, as a multiple of the mean deceleration. The deceleration peak of a guided joint is
-/// at the beginning, when the damping of Teaching already decelerates the joint.
+/// Peak deceleration of a joint that a hand has guided, as a multiple of the mean deceleration. The peak is at the
+/// beginning, when the damping of Teaching already decelerates the joint.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 
 /// Returns `true` if a joint with this velocity (rad/s) moves.
@@ -27,19 +27,19 @@ pub(crate) fn moves(velocity: f64) -> bool {
 pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
-    /// Elapsed time, ms. The elapsed time is 0 in the first tick, which commands the measured position and velocity. The position error and
-    /// its derivative therefore begin at 0.
+    /// Elapsed time, ms. The first tick (0 ms) commands the measured position and velocity, so the position error and
+    /// its derivative begin at 0.
     elapsed_ms: f64,
     length_ms: f64,
-    /// `true` if the joint falls. At the beginning, no torque decelerates a falling joint.
+    /// `true` if the joint falls. The deceleration of a falling joint begins at zero.
     falls: bool,
 }
 
 bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// Creates the deceleration of a joint that a hand was guiding. The deceleration of a guided joint starts at a measured position (rad)
-    /// and velocity (rad/s) and takes `length_ms`. The start velocity is clipped to the velocity limit.
+    /// Creates the deceleration of a joint that a hand has guided. It starts at a measured position (rad) and
+    /// velocity (rad/s) and takes `length_ms`. The start velocity is clipped to the velocity limit.
     pub(crate) fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
@@ -67,7 +67,8 @@ impl Deceleration {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
         let (seconds, left) = (self.length_ms * DT, 1.0 - u);
-        // `velocity`, `way` (its integral) and `slope` (its derivative) are shares of v, v·T and v/T.
+        // With the start velocity v and the duration T, `velocity` is a share of v, `way` (its integral) a share of
+        // v·T, and `slope` (its derivative) a multiple of v/T.
         let (velocity, way, slope) = if self.falls {
             (1.0 - smooth(u), u - u * u * u + 0.5 * u * u * u * u, -6.0 * u * left)
         } else {
@@ -184,9 +185,10 @@ mod tests {
         }
     }
 
-    /// A guided joint takes 0.2 s, with the velocity v · (1 − u)² and the acceleration −2 · v / T · (1 − u). A joint that falls at 1 rad/s
-    /// takes 1.5 · 1 rad/s / 3 rad/s² = 0.5 s, with the velocity v · (1 − 3 · u² + 2 · u³) and the acceleration −6 · v / T · u · (1 − u).
-    /// In these formulas, u is the elapsed share of the time T.
+    /// In these formulas, v is the start velocity, T is the duration and u is the elapsed share of T. A guided joint
+    /// takes 0.2 s, with the velocity v · (1 − u)² and the acceleration −2 · v / T · (1 − u). A joint that falls at 1
+    /// rad/s takes 1.5 · 1 rad/s / 3 rad/s² = 0.5 s, with the velocity v · (1 − 3 · u² + 2 · u³) and the acceleration
+    /// −6 · v / T · u · (1 − u).
     #[test]
     fn j16_j25_the_acceleration_is_the_derivative_of_the_velocity() {
         let (config, limits) = (Config::avena(), JointConfig { velocity_max: 2.0, ..limits() });
@@ -202,7 +204,8 @@ mod tests {
                 (led, 200, 0.0, 0.0),
                 // u = 0.25: 1 − 0.1875 + 0.03125 = 0.84375 and −6 / 0.5 · 0.25 · 0.75 = −2.25.
                 (falling, 125, 0.84375, -2.25),
-                // u = 0.5: 1 − 0.75 + 0.25 = 0.5 and −6 / 0.5 · 0.25 = −3, the highest deceleration of a falling joint.
+                // At u = 0.5, the velocity is 1 − 0.75 + 0.25 = 0.5 rad/s. The acceleration is −6 / 0.5 · 0.25 = −3
+                // rad/s², the highest deceleration of a falling joint.
                 (falling, 250, 0.5, -3.0),
                 (falling, 0, 1.0, 0.0),
                 (falling, 500, 0.0, 0.0),

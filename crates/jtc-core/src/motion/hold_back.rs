@@ -1,14 +1,15 @@
 //! Slows down path time while a motion overloads a joint (J-75).
 //!
-//! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
-//! motion along the path needs less torque, because the torque for inertia falls with the square of the rate. Therefore path time slows
-//! down as much as the joints at their limits require (time scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its
-//! normal rate when no joint is at its torque limit.
+//! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is
+//! available. A slower motion along the same path needs less torque, because the torque for inertia falls with the
+//! square of the rate. Therefore the controller slows down path time as much as the overloaded joints require (time
+//! scaling under torque limits, Dahl and Nielsen 1990). Path time returns to its normal rate after all joints have
+//! left their torque limits.
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 use crate::trajectory::path::PathClock;
 
-/// Time for which the controller assumes that the inertia of the arm is constant, ms.
+/// Time for which the controller uses the same computed inertia of the arm, ms.
 const INERTIA_MS: u16 = 60;
 /// Time from the moment when the last joint leaves its torque limit until the path returns to its normal rate, ms.
 const QUIET_MS: u16 = 200;
@@ -16,8 +17,9 @@ const QUIET_MS: u16 = 200;
 const PRESSED_MS: u16 = 250;
 /// Longest total time for which the path may be slowed down during one run of the path, ms.
 const RUN_MS: u16 = 5_000;
-/// Rate of path time below which the arm counts as at rest on the path, and longest time at such a rate before the arm stops, ms. Without
-/// this limit, the arm could stay at rest on the path for ever if the torque is just sufficient to hold the arm.
+/// Rate of path time below which the arm counts as standing on the path. `STANDS_MS` is the longest time at such a
+/// rate before the controller stops the arm, ms. Without this limit, an arm whose torque is only just sufficient to
+/// hold it could stand on the path for ever.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
@@ -25,7 +27,8 @@ const STANDS_MS: u16 = 1_000;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HoldBack {
     active: bool,
-    /// `restores` means that the path is returning to its normal rate. `stands_ms` is the time for which the path has been at rest.
+    /// `true` while path time returns to its normal rate. `stands_ms` is the time for which the arm has stood on the
+    /// path, ms.
     restores: bool,
     stands_ms: u16,
     /// Number of ticks since the inertia was computed.
@@ -36,7 +39,7 @@ pub(crate) struct HoldBack {
     quiet_ms: u16,
     /// Number of ticks of this run of the path in which the path was held back.
     run_ms: u16,
-    /// Mask of the joints that have been at their torque limits since the controller last began to hold back the path.
+    /// Mask of the joints that were at their torque limits since the path was last slowed down.
     pressed: u8,
 }
 
@@ -77,8 +80,8 @@ impl HoldBack {
         true
     }
 
-    /// Stops holding back the motion, because the arm stops or an approach has ended. The time for which the motion was held back still
-    /// counts for the present run of the path.
+    /// Ends the slow motion, because the arm stops or an approach has ended. The time in which the motion was slow
+    /// still counts for the present run of the path.
     pub(crate) fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
@@ -88,7 +91,7 @@ impl HoldBack {
         self.run_ms
     }
 
-    /// Returns `true` if the joint has been at its torque limit since the controller last began to hold back the path.
+    /// Returns `true` if the joint was at its torque limit since the path was last slowed down.
     pub(crate) fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0
     }
@@ -132,7 +135,7 @@ mod tests {
 
     const PRESSED: [bool; JOINTS] = [false, false, true, false, false, false];
 
-    /// Returns a clock that changes to its normal rate along a ramp.
+    /// Returns a clock with this rate, which is on a ramp to its normal rate of 1.
     fn at(rate: f64) -> PathClock {
         let mut clock = PathClock::start(1.0);
         clock.rate = rate;
@@ -241,7 +244,8 @@ mod tests {
         }
     }
 
-    /// While the path is held back, a further overload does not clear the record of the joints and of the time at the limits.
+    /// If another overload occurs while the path is held back, the record of the joints and times at the torque
+    /// limits is kept.
     #[test]
     fn j75_a_further_overload_keeps_the_record_of_the_joints() {
         let mut hold_back = HoldBack::default();
@@ -259,7 +263,8 @@ mod tests {
         assert_eq!(after, Some(251), "the limit is 250 ms without interruption");
     }
 
-    /// When holding back begins again, the joints and the times of the earlier overload do not count.
+    /// When the path is held back again after the first reaction has ended, the record of the joints and times at the
+    /// torque limits begins empty.
     #[test]
     fn j75_holding_back_begins_without_the_joints_and_times_of_the_earlier_overload() {
         let mut hold_back = HoldBack::default();
@@ -280,8 +285,8 @@ mod tests {
         );
     }
 
-    /// After the end, the path is not held back, and the controller does not call `step`. The time at rest starts again. The time for which
-    /// the path was held back remains for this run.
+    /// After `end`, the path is not held back, and `step` need not be called. The time of standing begins at zero
+    /// again. The time in which the path was held back during this run is kept.
     #[test]
     fn j75_the_end_of_holding_back_keeps_only_the_time_of_the_run() {
         let mut hold_back = HoldBack::default();
@@ -296,14 +301,15 @@ mod tests {
         hold_back.begin();
         hold_back.step(&PRESSED, &going());
         assert_eq!(hold_back.run_ms(), 4);
-        // While the path returns to its normal rate, `step` is called, but the path is not held back.
+        // After the path was held back, `step` must still be called until path time has returned to its normal rate.
         let mut hold_back = HoldBack::default();
         hold_back.begin();
         first(&mut hold_back, 200, &[false; JOINTS], &going());
         assert!(!hold_back.is_active() && hold_back.is_watched());
         hold_back.end();
         assert!(!hold_back.is_watched());
-        // 1,000 ms below the rate of 0.02 are permitted. After the end, another 1,000 ms are permitted.
+        // The arm may stand on the path (rate below 0.02) for 1,000 ms. After a call of `end`, it may stand for
+        // another 1,000 ms.
         let mut hold_back = HoldBack::default();
         for _ in 0..2 {
             hold_back.begin();
@@ -314,7 +320,8 @@ mod tests {
         }
     }
 
-    /// The path is at rest below a rate of 0.02, unless this rate is its normal rate.
+    /// A rate of exactly 0.02 does not count as standing. A lower rate does not count either if it is the normal rate
+    /// of the path.
     #[test]
     fn j75_a_path_at_a_rate_of_a_fiftieth_or_at_its_normal_rate_is_not_at_rest() {
         for clock in [at(0.02), PathClock::start(0.0)] {

@@ -58,8 +58,8 @@ impl Jog {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// Sets the commanded velocities, rad/s, and the highest accelerations, rad/s², of all joints. A command that arrives while the joints
-    /// come to rest takes effect when the joints are at rest.
+    /// Sets the commanded velocities, rad/s, and the highest accelerations, rad/s², of all joints. If the joints are
+    /// just coming to rest, the command takes effect when all joints are at rest.
     pub(crate) fn command(
         &mut self,
         wanted: &[f64; JOINTS],
@@ -86,7 +86,7 @@ impl Jog {
         self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
     }
 
-    /// Begins a tick of the jog. Returns `true` if all joints begin to come to rest in this tick.
+    /// Begins a tick of the jog. Returns `true` in the tick in which the joints begin to come to rest.
     pub(crate) fn ends(&mut self) -> bool {
         self.silent_ms = self.silent_ms.saturating_add(1);
         if self.silent_ms > LASTS_MS {
@@ -114,7 +114,8 @@ impl Jog {
         !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
-    /// Executes one tick of the jog, which moves `point`. `ramp` advances the clock while the clock changes to another rate.
+    /// Executes one tick of the jog, and moves the set values in `point`. While the rate of the jog's clock changes,
+    /// `ramp` advances this clock.
     pub(crate) fn step(
         &mut self,
         point: &mut SetPoint,
@@ -173,7 +174,7 @@ impl JointJog {
         *position = within;
     }
 
-    /// Returns the distance, rad, that the joint moves in `tick` seconds from its present state to the state `next`.
+    /// Returns the distance, rad, that the joint moves in `tick` seconds while its state changes to `next`.
     fn way(&self, next: &Self, tick: f64) -> f64 {
         0.5 * (self.velocity + next.velocity) * tick
     }
@@ -292,13 +293,15 @@ mod tests {
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
                     let at_end = position[j] == low || position[j] == high;
-                    // The velocity of a joint when it reaches the end of its range is almost zero.
+                    // A joint reaches the end of its range with a velocity of almost zero, so the jump to standstill
+                    // is small.
                     let step = (v[j] - last.0[j]).abs();
                     assert!(step <= most * DT + 1e-9 || (at_end && step < 0.005), "{} {}", v[j], last.0[j]);
                     let jerk = (a[j] - last.1[j]).abs();
                     assert!(ramps || jerk <= 2.0 * most / RISE_S * DT + 1e-9 || v[j] == 0.0 || a[j] == 0.0);
                     let way = 0.5 * (v[j] + last.0[j]) * DT;
-                    // While the clock ramps, its rate is assumed to be constant within a tick.
+                    // While the rate of the clock changes, the check assumes a constant rate within each tick, so it
+                    // needs a wider tolerance.
                     let precise = if ramps { 1e-7 } else { 1e-12 };
                     assert!((position[j] - before[j] - way).abs() < precise || at_end, "{way}");
                 }
@@ -354,8 +357,8 @@ mod tests {
         Rate(f64),
     }
 
-    /// Number of ticks after the end of a jog. The controller detects missing Jogs after [`LASTS_MS`]. The acceleration then needs
-    /// [`RISE_S`] to reach zero.
+    /// Number of ticks that the test runs after the end of a jog. The controller detects missing Jogs after
+    /// [`LASTS_MS`]. The acceleration then needs [`RISE_S`] to reach zero.
     const AFTER: u16 = LASTS_MS + 120;
 
     proptest! {
@@ -481,8 +484,9 @@ mod tests {
                     tick(&mut jog, &mut position, &config);
                     position[0] = position[0].min(0.0);
                 }
-                // At the same speed as this jog, a motion along a path would stop within the time of the ramp, after half of the distance.
-                // A fast joint stops with its acceleration limit.
+                // At the same speed, a motion on a path would stop within the time of the ramp, and would travel half
+                // of the distance at constant speed. A fast joint takes longer, because its acceleration limit
+                // applies.
                 let hard = config.joints[0].acceleration_max;
                 let longest = 20 + config.ramp_ms.max((1_600.0 * share * fastest / hard) as u16);
                 for (end, wait) in [(End::Stop, 0), (End::Rate(0.0), 0), (End::Silence, LASTS_MS)] {
@@ -495,9 +499,9 @@ mod tests {
         }
     }
 
-    /// Before the arm is at rest, the operator presses the same jog key, the opposite key or another key. The arm comes to rest first, and
-    /// no joint becomes faster before the arm is at rest. A joint that moves after the arm was at rest does not exceed the acceleration of
-    /// a jog.
+    /// While the arm comes to rest after a jog, the operator presses the same jog key, the opposite key or another
+    /// key. The arm comes to rest first, and no joint becomes faster before. The new jog then begins with the
+    /// acceleration of a normal jog.
     #[test]
     fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {
         let then = [[1.0, 0.0], [-0.4, 0.0], [0.0, 1.0]];

@@ -15,26 +15,27 @@ use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::{JOINTS, friction, gains, joint_error};
 
-/// Speed, rad/s, below which an error of the friction model may cause the torque that the integral finds in motion. The controller does not
-/// take such a torque as a load.
+/// Speed, rad/s, up to which a joint in motion only creeps. The integral of a creeping joint may contain an error of
+/// the friction model, so the controller does not learn a load from it.
 const CREEPS: f64 = 0.05;
 
-/// Share of the torque limit up to which friction can hold a joint. If the missing torque in addition to the learned load is below this
-/// share, the load counts as known.
+/// Share of the torque limit up to which friction can hold a joint. If the torque that is missing in addition to the
+/// learned load is below this share, the load counts as known.
 const LITTLE: f64 = 0.04;
 
 /// Control mode, which determines the active parts of the control law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ControlMode {
-    /// Gravity and PID are active.
+    /// Mode for an arm that is held. Gravity and PID are active.
     Hold,
-    /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration are active.
+    /// Mode for a motion on the path. Gravity, PID, friction compensation, and inertia at the commanded velocity and
+    /// acceleration are active.
     Follow,
-    /// Mode for the approach to the path. In this mode, all parts are active that are active in `Follow`. The limits of the path do not
-    /// apply in this mode, because the approach begins at the measured position.
+    /// Mode for the approach to the path. It is like `Follow`, but the limits of the path do not apply, because the
+    /// approach begins at the measured position.
     Approach,
-    /// Mode for an arm that a hand has moved. The arm comes to rest and is then held. In this mode, all parts are active that are active in
-    /// `Hold`. In addition, friction and inertia at the commanded velocity and acceleration are active.
+    /// Mode for an arm that a hand has moved and that comes to rest before it is held. It is like `Hold`, with
+    /// additional friction compensation and inertia at the commanded velocity and acceleration.
     Rest,
     /// Gravity and the torques for hand guiding are active (J-25).
     Teach,
@@ -46,7 +47,7 @@ impl ControlMode {
         matches!(self, Self::Hold | Self::Rest)
     }
 
-    /// Returns `true` if the commanded velocity and acceleration affect the torque.
+    /// Returns `true` if the torque depends on the commanded velocity and acceleration.
     pub(crate) fn commands_motion(self) -> bool {
         self.moves() || self == Self::Rest
     }
@@ -57,7 +58,8 @@ impl ControlMode {
     }
 }
 
-/// Longest time after the configuration of a payload in which the integral releases the torque that it contained for this payload, ms.
+/// After a payload is configured, the integral releases the torque that it contained for this payload. This constant
+/// is the longest time of this release, ms.
 const UNWINDS_MS: u16 = 3_000;
 
 /// Inputs of a tick of the control law.
@@ -86,7 +88,7 @@ pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
     /// Torque of each joint in the last tick, by parts.
     pub torque: [JointTorque; JOINTS],
-    /// State of Teaching. The state of Teaching exists only during Teaching, and the flight recorder does not store it.
+    /// State of Teaching. It exists only during Teaching, and the flight recorder does not store it.
     pub(super) taught: Option<Taught>,
     transfer: Transfer,
     /// State of the joints that yield or lower a load (J-68, J-70).
@@ -96,7 +98,7 @@ pub(crate) struct ControlLaw {
     loads: [Load; JOINTS],
     /// Index of the joint whose load is observed in this tick.
     observed: u8,
-    /// Remaining time in which the integral releases the torque that it contained for a payload that is now configured, ms (J-60).
+    /// Remaining time in which the integral releases the torque of a payload that the model now contains, ms (J-60).
     pub(super) unwinds_ms: u16,
 }
 
@@ -122,15 +124,16 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// Like [`Self::change_mode`], but no torque may step, because the torque that decelerates the arm belongs to the model torque after
-    /// the change.
+    /// Like [`Self::change_mode`], but no part of the torque may step. After this change, the model torque also
+    /// contains the torque that decelerates the arm.
     pub(crate) fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
 
     /// Prepares a change of the arm model while the arm is held. The transfer is bumpless, so no torque may step.
     pub(crate) fn change_model(&mut self) {
-        // The integral contains torque that was missing in the last model, and must release this torque now.
+        // The integral contains torque that the last model did not contain. The new model contains this torque, so
+        // the integral must release it.
         self.payload_comes();
         self.transfer.change_model();
     }
@@ -194,12 +197,13 @@ impl ControlLaw {
             }
             return;
         }
-        // The yielding joint starts from the commanded torque, not from the computed torque, which may be above the limit.
+        // The computed torque may be above the limit. A yielding joint therefore starts from the commanded torque,
+        // which is within the limit.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // Before the load of a pushed joint is known, its integral does not count as a load. After hand guiding, the integral of a joint
-        // contains the torque that Teaching used for the load.
+        // While the load of a pushed joint is unknown, its integral may contain the push, so it does not count as a
+        // load. After hand guiding, the integral contains the torque that Teaching used for the load.
         let load = if lowers {
             Load::bounded(load.torque(torque.pid.i), limits)
         } else if led {
@@ -231,8 +235,8 @@ impl ControlLaw {
         self.yields.iter_mut().flatten().for_each(Yield::clear);
     }
 
-    /// Drags the free end of the spring of a yielding joint along with the joint. Returns the position to which the spring pulls, rad.
-    /// Returns `None` if the joint does not yield.
+    /// Moves the free end of the spring of a yielding joint along with the joint. Returns the position to which the
+    /// spring pulls, rad. Returns `None` if the joint does not yield.
     pub(crate) fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
@@ -242,7 +246,8 @@ impl ControlLaw {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
 
-    /// Returns the feedback torque, which corrects the torques of the model and of the load, N·m. The feedback torque opposes a push.
+    /// Returns the feedback torque of the position controller, N·m, in addition to the torques of the model and of
+    /// the load. The feedback torque opposes a push.
     pub(crate) fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
         pid.p + pid.d + (pid.i - self.load(joint))
@@ -266,12 +271,12 @@ impl ControlLaw {
         ended
     }
 
-    /// Returns `true` if the load of every held joint is known, so that Teaching can hold this load. In addition, the feedback torque of
-    /// each of these joints must be small. If the integral is still changing, or releases torque that is now part of the model, the load is
-    /// not known yet. A person who leans on the arm may stop leaning at any time.
+    /// Returns `true` if the load of every held joint is known, so that Teaching can hold it. The feedback torque of
+    /// each of these joints must also be small. A load is not known while the integral is still changing, or while it
+    /// releases torque that the model now contains. A person who leans on the arm may stop leaning at any time.
     ///
-    /// If a `contact` may press on the arm, the controller does not wait for the end of this contact. A load that was cleared must be
-    /// learned again even in this case.
+    /// If an obstacle may press on the arm (`contact`), the function does not require that this contact ends. A load
+    /// that was cleared must be learned again even during a contact.
     pub(crate) fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
@@ -306,8 +311,8 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Reduces the mass that Teaching has estimated by `mass` (kg), because from this tick on the model contains this mass. The mass is a
-    /// part of the payload that the host has configured during Teaching (J-60).
+    /// Reduces the mass that Teaching has estimated by `mass` (kg). This mass is a part of the payload that the host
+    /// has configured during Teaching, and the model contains it from this tick on (J-60).
     pub(crate) fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
@@ -325,7 +330,7 @@ impl ControlLaw {
         speeds
     }
 
-    /// Ends Teaching. The integral then contains the torque that held each joint.
+    /// Ends Teaching. The integral takes over the torque that held each joint.
     pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let q = nodes.positions();
         if let Some(taught) = &self.taught {
@@ -337,7 +342,8 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Shifts the position controllers by the sag of the set positions, rad. A sag of a set position does not count as a motion.
+    /// Shifts the position controllers by the sag of the set positions, rad, so that a sag does not look like a
+    /// motion.
     pub(crate) fn sag(&mut self, sag: &[f64; JOINTS]) {
         for (pid, way) in self.pid.iter_mut().zip(sag) {
             pid.shift(*way);
@@ -365,9 +371,10 @@ impl ControlLaw {
         let v = nodes.velocities();
         // J-62: a measurement is compared with the set position at the time of the measurement.
         let due = set.due(config);
-        // J-40: the model uses the measured position. The model also uses the commanded velocity and acceleration, in Operate, in a jog,
-        // and while the arm comes to rest after Teaching. In all other cases, the model uses zeros. The model torque acts at the present
-        // time, so the motion that was commanded since the measurement is added to the measured position.
+        // J-40: the model uses the measured position. In Operate, in a jog, and while the arm comes to rest after
+        // Teaching, it also uses the commanded velocity and acceleration. Otherwise it uses zeros. The model torque
+        // acts later than the measurement, so the motion that was commanded since the measurement is added to the
+        // measured position.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {
@@ -431,17 +438,19 @@ impl ControlLaw {
         self.observed = (j as u8 + 1) % JOINTS as u8;
         let speed = set.point.velocity[j].abs();
         let creeps = speed > 0.0 && speed < CREEPS;
-        // While the integral releases torque that is now part of the model, the integral does not show a load.
+        // While the integral releases torque that the model now contains, it does not show the load of the joint.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
-            // Until the integral has reached the holding torque of the joint, its load is not known.
+            // The load is unknown until the integral alone holds the joint, so that the other parts of the PID torque
+            // are small.
             let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
             load.observe(pid.i, found && set.settled(j), limits);
         }
     }
 
-    /// Computes the torque that Teaching adds to the torque of the model (J-25). Slowly changing values are computed in separate ticks, in
-    /// which the torques of Teaching do not change. Returns `true` if the torques of Teaching were computed in this tick.
+    /// Computes the torque that Teaching adds to the torque of the model (J-25). Some ticks compute only a slowly
+    /// changing value, and leave the torques of Teaching unchanged. Returns `true` if this tick computed the torques
+    /// of Teaching.
     #[inline(never)]
     fn teach(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) -> bool {
         let (q, v) = (nodes.positions(), nodes.velocities());
@@ -496,7 +505,7 @@ impl ControlLaw {
     }
 }
 
-/// Ends all yields in place. An assignment of an array of `None` would create and copy the array, including the space for unused values.
+/// Ends all yields in place. An assignment of a new array of `None` would build and copy the whole array.
 fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
     for yields in yields {
         *yields = None;

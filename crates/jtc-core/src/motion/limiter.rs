@@ -7,18 +7,19 @@ use crate::{JOINTS, joint_error};
 
 /// Speed, rad/s, above which a torque at the limit in the direction of the motion is not considered part of a catch.
 pub(super) const DRIVEN: f64 = 0.05;
-/// Lowest speed of a joint that comes to rest after Teaching, as a share of its set velocity. If a joint is slower, the controller assumes
-/// that an obstacle stops it.
+/// Lowest speed of a joint that comes to rest after Teaching, as a share of its set velocity. The controller assumes
+/// that an obstacle stops a slower joint.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit at and above which the feedback torque may be twice as high, because the model may have wrong friction and
-/// inertia. If a fast joint hits an obstacle, its feedback torque exceeds the doubled share a few milliseconds later.
+/// Share of the velocity limit from which a joint may use twice its permitted feedback torque, because the friction
+/// and inertia of the model may be wrong. If a fast joint hits an obstacle, its feedback torque exceeds even the
+/// double value a few milliseconds later.
 const FAST: f64 = 0.2;
 /// Highest number of ticks, among the last 100, in which the feedback torque of a joint may exceed its permitted share. After more ticks,
 /// the joint counts as pushed (J-66).
 const PUSHED_MS: u16 = 20;
-/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit. The second constant is the distance that this
-/// excess has added, rad. A joint that exceeds both limits counts as pushed, even with weak gains. With weak gains, a joint with little
-/// inertia exceeds its speed limit before the feedback torque shows the push.
+/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit. `RUSH_WAY` is the distance
+/// by which the joint is ahead of its set position, rad. A joint above both values counts as pushed. With weak gains,
+/// this detects a push of a joint with little inertia earlier than the feedback torque.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
@@ -48,7 +49,8 @@ pub(crate) struct Found {
     pub strained: bool,
     /// `true` if the joint has settled since it was enabled.
     pub settled: bool,
-    /// `true` if the position controller is unstable: the torque jumps from limit to limit, or a swing grows.
+    /// `true` if the control loop is unstable: the torque jumps between its limits, or an oscillation of the joint
+    /// grows.
     pub unstable: bool,
 }
 
@@ -66,7 +68,8 @@ pub(crate) struct Limited {
     pub torque: [f64; JOINTS],
     /// Findings of this tick for each joint. `None` if no joint needs a reaction.
     pub found: Option<[Found; JOINTS]>,
-    /// Sag of the set positions of joints whose loads are being caught, rad. `None` if no set position has sagged.
+    /// Sag of the set position of each joint whose load is being caught, rad. `None` if no set position sags in this
+    /// tick.
     pub sag: Option<[f64; JOINTS]>,
 }
 
@@ -90,10 +93,11 @@ impl Limiter {
         self.turns = Default::default();
     }
 
-    /// Executes one tick of the limiter, which limits the torque of the `law` and checks the torque and the set values. While the arm
-    /// brakes with all available torque, the limiter does not report an overload. If a motion is also commanded, the limiter does not
-    /// report position error and acceleration either (J-33). For a joint that yields, the limiter reports only a torque of NaN, or a torque
-    /// that jumps from limit to limit. No other report is needed, because the torque of such a joint is bounded by construction.
+    /// Executes one tick of the limiter, which limits the torque of the `law` and checks the torque and the set
+    /// values. While the arm brakes with all available torque, the limiter does not report an overload. If the arm
+    /// brakes during a commanded motion, it does not report position error and acceleration either (J-33). For a
+    /// yielding joint, it reports only a torque of NaN or a torque that jumps between its limits, because this torque
+    /// is already bounded.
     pub(super) fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -103,12 +107,13 @@ impl Limiter {
         limited: &mut Limited,
     ) {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        // The exceptions for braking apply only while the set values move, because an arm at rest yields to a push (J-66).
+        // Braking excuses these errors only while the set values move. An arm at rest must still yield to a push
+        // (J-66).
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
         } else if held_back || mode == ControlMode::Rest {
-            // A change of the rate of path time adds an acceleration to the set values. An arm that a hand has moved may have any
-            // acceleration.
+            // If the rate of path time changes, the set values have an additional acceleration. An arm that a hand
+            // has moved may come to rest with any acceleration.
             joint_error::ACCELERATION
         } else {
             0
@@ -130,7 +135,7 @@ impl Limiter {
             if parameters.on_trial && stands {
                 unstable |= set.catch[j].watch(v[j]);
             }
-            // A torque that accelerates a joint instead of stopping the joint does not belong to a catch or a deceleration.
+            // A torque that accelerates the joint, instead of stopping it, is not part of a catch or a deceleration.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
             let excuses = braking || stopping || yields;
@@ -159,7 +164,7 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // The distance is checked first, because the distance exceeds its limit only rarely.
+            // The distance is checked first, because it is rarely above its limit.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
             if catching && self.saturation[j].saturated {
@@ -196,7 +201,8 @@ mod tests {
 
     const GAINS: PidGains = PidGains { kp: 100.0, ki: 0.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
 
-    /// Limiter of an arm at position 0 with a torque of the control law that the test sets. All joints have the same values.
+    /// Limiter and an arm at position 0. The test sets the torque of the control law, which is the same for all
+    /// joints.
     struct Bench {
         config: Config,
         law: ControlLaw,
@@ -228,14 +234,14 @@ mod tests {
             self
         }
 
-        /// Sets the feedback torque of joint 2 to `shares` times its permitted share.
+        /// Sets the feedback torque of joint 2 to `shares` times the permitted value.
         fn with_feedback(mut self, shares: f64) -> Self {
             self.law.torque[1].pid.p =
                 shares * self.config.yield_torque_share * self.config.joints[1].torque_max;
             self
         }
 
-        /// Sets the set velocity of joint 2 to a share of its velocity limit. Returns the set velocity, rad/s.
+        /// Commands joint 2 to move at a share of its velocity limit. Returns this set velocity, rad/s.
         fn set_velocity(&mut self, share: f64) -> f64 {
             self.set.point.velocity[1] = share * self.config.joints[1].velocity_max;
             self.set.point.velocity[1]
@@ -286,7 +292,7 @@ mod tests {
         assert_eq!(Bench::settled().run(1, HOLD, STILL), (0.0, Found::default()));
     }
 
-    /// A settled joint is pushed if its feedback torque exceeds its share in more than 20 ticks.
+    /// A settled joint counts as pushed if its feedback torque is above the permitted value in more than 20 ticks.
     #[test]
     fn j66_a_settled_joint_with_too_much_feedback_torque_is_pushed() {
         for (shares, ticks, pushed) in
@@ -295,7 +301,8 @@ mod tests {
             let (_, found) = Bench::settled().with_feedback(shares).run(ticks, HOLD, STILL);
             assert_eq!(found.pushed, pushed, "{shares} {ticks}");
         }
-        // A joint that has not settled may need its feedback torque to catch a load.
+        // A joint that has not settled needs feedback torque to catch a load, so it does not count as pushed. In
+        // Teaching, a joint does not count as pushed either.
         let mut bench = Bench::settled().with_feedback(1.5);
         bench.set.catch = [crate::motion::catch::Catch::begin(&bench.config); JOINTS];
         assert!(!bench.run(60, HOLD, STILL).1.pushed);
@@ -334,8 +341,9 @@ mod tests {
         }
     }
 
-    /// A joint that comes to rest after Teaching has met a person if it is slower than 0.7 times its set velocity, and its feedback torque
-    /// has the direction of the motion. The joint need not have settled.
+    /// A joint that comes to rest after Teaching counts as pushed if it is slower than 0.7 times its set velocity
+    /// while its feedback torque acts along the motion. It may then have met a person. The joint need not have
+    /// settled.
     #[test]
     fn j25_j66_a_joint_that_lags_on_the_way_to_rest_is_pushed() {
         for (mode, shares, share, pushed) in [
@@ -357,8 +365,8 @@ mod tests {
         }
     }
 
-    /// A joint with weak gains shows a push only by its speed: 20 % of its velocity limit above the commanded speed, and more than 1 mrad
-    /// ahead of its set position.
+    /// With weak gains, a push is visible only in the speed. A joint counts as pushed if it is faster than commanded
+    /// by 20 % of its velocity limit, and is more than 1 mrad ahead of its set position.
     #[test]
     fn j66_a_joint_that_runs_ahead_of_its_set_values_is_shoved_at_once() {
         let most = Config::avena().joints[1].velocity_max;
@@ -377,8 +385,8 @@ mod tests {
         }
     }
 
-    /// A change of the rate of path time adds an acceleration, and so does an arm that a hand has moved. An arm that brakes with its whole
-    /// torque on the path may also deviate from the path.
+    /// A set acceleration above its limit is no error while the path is held back, or while an arm comes to rest
+    /// after hand guiding. While a commanded motion brakes, a position error is no error either.
     #[test]
     fn j33_j66_errors_of_the_set_values_are_excused_where_the_controller_causes_them() {
         let (position, acceleration) = (joint_error::POSITION_ERROR, joint_error::ACCELERATION);
@@ -422,8 +430,8 @@ mod tests {
         }
     }
 
-    /// A swing of 0.2 rad/s in one direction and 0.25 rad/s in the other direction grows. On a path, and while the arm comes to rest, a
-    /// growing speed belongs to the motion.
+    /// A swing grows from 0.2 rad/s in one direction to 0.25 rad/s in the other. The loop counts as unstable only if
+    /// the joint is held. On a path, or while the arm comes to rest, the growing speed belongs to the motion.
     #[test]
     fn j43_j66_a_swing_that_grows_is_unstable_only_while_the_joint_is_held() {
         for (mode, yields, unstable) in [
@@ -441,7 +449,8 @@ mod tests {
         }
     }
 
-    /// A settled joint makes three half swings, each faster than the half swing before it.
+    /// While gains are on trial, a settled joint is unstable after three half swings, each faster than the half swing
+    /// before it.
     #[test]
     fn j71_a_swing_of_a_settled_joint_counts_while_gains_are_on_trial() {
         for (on_trial, mode, unstable) in [(true, HOLD, true), (false, HOLD, false), (true, FOLLOW, false)] {
@@ -451,7 +460,8 @@ mod tests {
         }
     }
 
-    /// The torque reaches each limit twice. In Teaching, a hand causes the torque.
+    /// The torque reaches each limit twice, so the loop is unstable. In Teaching, a hand can cause such a torque, so
+    /// this is not an instability.
     #[test]
     fn j66_a_torque_that_jumps_between_its_limits_is_unstable_except_in_teaching() {
         for (mode, unstable) in [(HOLD, true), (FOLLOW, true), ((ControlMode::Teach, false, false), false)] {
@@ -464,8 +474,8 @@ mod tests {
         }
     }
 
-    /// 10 ticks at the limit, 20 ticks with too much feedback torque, and three changes of the limit are permitted. After the counters were
-    /// cleared, the same number of ticks is permitted again.
+    /// Without a finding, a joint may have 10 ticks at the limit, 20 ticks with too much feedback torque, and three
+    /// jumps between the limits. After the counters are cleared, the same numbers are permitted again.
     #[test]
     fn j66_a_joint_that_begins_to_yield_starts_with_cleared_counters() {
         let mut pushed = Bench::settled().with_feedback(1.5);
@@ -481,7 +491,7 @@ mod tests {
         for unstable in [false, true] {
             for (n, torque) in [300.0, -300.0, 300.0, -300.0].into_iter().enumerate() {
                 jumps.law.torque[1].model = torque;
-                // The counters are cleared after three of the first four ticks at a limit.
+                // The counters are cleared after the torque has reached a limit three times.
                 if n == 3 && !unstable {
                     jumps.limiter.forget(1);
                 }
@@ -491,19 +501,21 @@ mod tests {
         }
     }
 
-    /// Feedback torque at the permitted share, speed at the limit for braking, and a shove at both of its limits are still permitted.
+    /// A joint is not pushed if a value is exactly at its limit: the permitted feedback torque, or the speed and
+    /// distance of a sudden push.
     #[test]
     fn j66_the_limits_of_a_push_themselves_are_permitted() {
         for shares in [1.0, -1.0] {
             assert!(!Bench::settled().with_feedback(shares).run(60, HOLD, STILL).1.pushed, "{shares}");
         }
-        // A fast joint may use twice its share.
+        // A fast joint may use exactly twice the permitted feedback torque.
         for shares in [2.0, -2.0] {
             let mut bench = Bench::settled().with_feedback(shares);
             let velocity = bench.set_velocity(0.8);
             assert!(!bench.run(60, FOLLOW, (0.0, velocity)).1.pushed, "{shares}");
         }
-        // At exactly 0.05 rad/s, the torque does not count as braking yet, so the joint is pushed.
+        // The speed of exactly 0.05 rad/s is not above the limit for braking. The feedback torque therefore does not
+        // count as braking, and the joint is pushed.
         let braking = (ControlMode::Hold, true, false);
         assert!(Bench::settled().with_feedback(1.5).run(21, braking, (0.0, -0.05)).1.pushed);
         let most = Config::avena().joints[1].velocity_max;
@@ -515,7 +527,8 @@ mod tests {
         }
     }
 
-    /// A joint that decelerates needs its feedback torque to stop. A joint that has not settled is still caught.
+    /// A decelerating joint needs its feedback torque to stop, and a joint in a catch needs it to hold its load.
+    /// Neither counts as pushed.
     #[test]
     fn j43_j66_a_joint_that_decelerates_or_is_caught_is_not_pushed() {
         for (decelerates, pushed) in [(false, true), (true, false)] {
@@ -530,8 +543,9 @@ mod tests {
         assert!(!Bench::settled().catching().run(1, HOLD, (1.1e-3, 0.21 * most)).1.pushed);
     }
 
-    /// The set velocity is 1 rad/s. A joint that moves at 0.5 rad/s is slower than its set velocity, even if it is ahead of its set
-    /// position. A joint that moves at 1.4 rad/s exceeds its set velocity by more than a fifth of its velocity limit of 1.5 rad/s.
+    /// The set velocity is 1 rad/s, and the velocity limit is 1.5 rad/s. A joint at 0.5 rad/s is too slow to count as
+    /// pushed, even if it is ahead of its set position. A joint at 1.4 rad/s is faster than its set velocity by more
+    /// than a fifth of the limit, so it is pushed.
     #[test]
     fn j66_only_a_joint_that_is_faster_than_its_set_velocity_is_pushed_by_its_speed() {
         for (velocity, pushed) in [(0.5, false), (1.2, false), (1.4, true)] {
@@ -541,7 +555,8 @@ mod tests {
         }
     }
 
-    /// A joint at exactly `LAGS` times its set velocity does not lag. A joint whose set velocity is zero has come to rest and cannot lag.
+    /// A joint at exactly 0.7 times its set velocity does not lag. A joint with a set velocity of zero has come to
+    /// rest, so it cannot lag.
     #[test]
     fn j25_j66_a_joint_lags_below_its_share_of_a_set_velocity_only() {
         for sign in [1.0, -1.0] {

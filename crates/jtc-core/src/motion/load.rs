@@ -10,8 +10,8 @@ const PERIOD: f64 = crate::JOINTS as f64;
 const TIME_S: f64 = 1.0;
 /// Highest load of a joint, as a share of the torque limit.
 const HIGHEST: f64 = 0.3;
-/// Difference between integral and load, as a share of the torque limit, up to which the load follows the integral. The controller
-/// attributes a larger difference to a contact, and does not change the load.
+/// Largest difference between the integral and the load, as a share of the torque limit, at which the load follows
+/// the integral. A larger difference may come from a contact, so the load does not change.
 const APART: f64 = 0.1;
 /// Largest change of the integral, as a share of the torque limit, at which the joint is still considered held steadily.
 const STEADY: f64 = 0.03;
@@ -25,7 +25,8 @@ pub(crate) struct Load {
     torque: f32,
     /// `true` if the joint has settled since it was enabled, or since its load was cleared.
     known: bool,
-    /// Integral at the beginning of steady holding, N·m. The next field is the number of observations since that time.
+    /// Torque of the integral when steady holding began, N·m. `observations` is the number of observations since
+    /// then.
     steady: f32,
     observations: u16,
 }
@@ -48,7 +49,7 @@ impl Load {
         self.torque.into()
     }
 
-    /// Returns a torque (N·m), clipped to the range that is accepted as a load without observation.
+    /// Returns a torque (N·m), clipped to the range in which the controller accepts a load that it has not observed.
     pub(crate) fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
@@ -120,7 +121,8 @@ mod tests {
     fn j66_the_load_follows_the_integral_within_a_second_and_no_contact() {
         let mut load = Load::default();
         observe(&mut load, 10.0, 0.1);
-        // If integral and load differ by at most a tenth of the torque limit, the load changes by 63 % of this difference in a second.
+        // If integral and load differ by at most a tenth of the torque limit, 63 % of this difference is added to the
+        // load within a second.
         observe(&mut load, 20.0, 1.0);
         assert!((load.torque(0.0) - 16.3).abs() < 0.1, "{}", load.torque(0.0));
         observe(&mut load, 16.3, 5.0);
@@ -142,7 +144,8 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// A load that a joint has lowered may be above the bound for a load. A lowered load above the bound does not jump back to the bound.
+    /// A load that was learned while a joint lowered it may be above the bound for a load. Further observations do
+    /// not reduce it to this bound.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();
@@ -195,7 +198,8 @@ mod tests {
         }
         load.observe(3.0, true, &round_limits());
         assert_eq!(load.known_torque(), 3.0);
-        // An integral that changes by more is not steady.
+        // The integral changes by more than 3 % of the torque limit, so it is not steady and the load does not
+        // change.
         let mut load = Load::default();
         for k in 1..=1_667 {
             load.observe(if k % 2 == 0 { 0.0 } else { 3.5 }, true, &round_limits());

@@ -80,7 +80,8 @@ mod tests {
         }
     }
 
-    /// If the allowed time is zero, an over-speed is an error in the first tick. A slow joint still has no error.
+    /// If the allowed time is zero, a joint above the threshold has an error in the first tick. A slow joint has no
+    /// error.
     #[test]
     fn j35_no_time_at_all_is_a_setting_too() {
         let config = Config { overspeed_ms: 0, ..Config::avena() };

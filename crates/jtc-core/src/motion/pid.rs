@@ -8,7 +8,8 @@ const WINDOW: usize = 5;
 /// Inverse of the length of the derivative window, 1/s.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
-/// Position error at rest, in encoder steps, above which the integral acts again. A joint that slips comes to rest within this distance.
+/// Position error, in encoder steps, above which the integral of a joint at rest acts again. A joint that slips comes
+/// to rest within this distance.
 const RELEASE_STEPS: f64 = 4.0;
 /// Rounding error of the positions on the bus, in encoder steps.
 const ROUNDING: f64 = 0.01;
@@ -52,9 +53,9 @@ impl Pid {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// Resets the state like [`reset`](Self::reset) with an error of 0, and sets the integral to `torque` (N·m). The transfer from an
-    /// earlier state with this torque is then bumpless. If the integral gain is zero or the integral reaches its bounds, the integral
-    /// contains less torque.
+    /// Resets the state like [`reset`](Self::reset) with an error of 0, and sets the integral to `torque` (N·m). If
+    /// an earlier state held this torque, the torque continues without a step. If the integral gain is zero or the
+    /// integral reaches its bounds, the integral holds less torque.
     pub(crate) fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);
@@ -126,7 +127,7 @@ mod tests {
             d = pid.step(&GAINS, slope * f64::from(k) * DT, false, None).d;
         }
         assert!((d - GAINS.kd * slope).abs() < 1e-12);
-        // The effect of a step of the error on the derivative is spread over five ticks. In each of the five ticks, the torque is at most
+        // A step of the error affects the derivative for five ticks. In each of these ticks, the torque is at most
         // Kd·step/(5 ms).
         pid.reset(0.0);
         let first = pid.step(&GAINS, 0.01, false, None).d;
@@ -155,8 +156,8 @@ mod tests {
             }
             pid.integral - before
         };
-        // In motion, every error changes the integral. At rest, an error within one encoder step does not change the integral. After the
-        // joint has settled, an error of up to four steps does not change the integral either.
+        // In motion, every error changes the integral. At rest, an error within one encoder step does not change it.
+        // After the joint has settled, errors up to four steps do not change it either.
         assert!(run(&mut pid, 0.5, false) > 0.0);
         assert!(run(&mut pid, 2.0, true) > 0.0);
         assert_eq!(run(&mut pid, 1.0, true), 0.0);
@@ -196,7 +197,8 @@ mod tests {
         assert_eq!((taken(GAINS, 24.0), taken(GAINS, -24.0)), (10.0 * 0.003, 10.0 * -0.002));
         let none = PidGains { ki: 0.0, ..wide };
         assert_eq!((taken(none, 24.0), taken(none, 0.0)), (0.0, 0.0));
-        // After a transfer to gains without an integral, gains that are set later hold no torque either.
+        // A transfer to gains without an integral clears the integral. If gains with an integral follow, the integral
+        // still holds no torque.
         for torque in [24.0, -24.0, 0.0] {
             let mut pid = Pid::default();
             pid.take_over(&none, torque);

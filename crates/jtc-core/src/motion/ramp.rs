@@ -10,12 +10,12 @@ use crate::nodes::Nodes;
 use crate::trajectory::path::{Bounds, PathClock, SlopeBounds};
 use crate::{DT, JOINTS};
 
-/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use. The remainder of each limit is for changes within
-/// a tick and for the position controller.
+/// Share of the acceleration limits that a pause, a stop or a resume may use. `RAMP_TORQUE` is the share of the
+/// torque limits. The remainder of each limit is for changes within a tick and for the position controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Share of the remaining torque that a stop may use after a hand has moved the arm. The position controller must produce this torque, and
-/// its torque overshoots.
+/// Share of the remaining torque that a stop may use after a hand has moved the arm. The position controller produces
+/// the torque of such a stop and overshoots, so the other part of the torque is a reserve.
 const STOP_TORQUE: f64 = 0.5;
 /// Least share of the torque limit that a stop may use, even if the holding torque leaves hardly any torque.
 const LEAST_LEFT: f64 = 0.1;
@@ -66,7 +66,8 @@ impl PathRamp {
         for j in 0..JOINTS {
             let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
             let (limit, held) = (config.joints[j].torque_max, law.torque[j].model + law.torque[j].load);
-            // The holding torque either helps to stop the joint, or reduces the torque that is available for the stop.
+            // In one direction of the motion, the holding torque helps to stop the joint. In the other direction, it
+            // reduces the torque that is available for the stop.
             let left = (STOP_TORQUE * (limit + held * momentum.signum())).max(LEAST_LEFT * limit);
             longest = longest.max(STEEPEST_LED * momentum.abs() / (left * DT));
         }
@@ -94,9 +95,9 @@ impl PathRamp {
         clock.hold_back(self.slope_bounds(at, law, clock.rate, clock.slope, config).full);
     }
 
-    /// Returns the slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The remaining torque of
-    /// each joint is computed from the last torque of the `law` with all its parts. A joint that already lags therefore has less remaining
-    /// torque. Joints that yield do not move along the path, so the rate of path time does not change their torque.
+    /// Returns the slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The
+    /// remaining torque of each joint is its limit minus the last torque of the `law`, so a joint that already lags
+    /// has less remaining torque. Joints that yield do not move along the path, so they do not bound the slope.
     fn slope_bounds(
         &self,
         at: &SetPoint,
@@ -122,7 +123,7 @@ impl PathRamp {
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
-            // If a joint does not move along the path, a change of path time does not reduce its torque.
+            // If a joint does not move along the path, path time has no effect on its torque.
             narrow(
                 &mut full,
                 if moves(at.velocity[j]) { (low, high) } else { (low.min(0.0), high.max(0.0)) },
@@ -163,8 +164,9 @@ mod tests {
     }
 
     proptest! {
-        /// A slope within the bounds keeps the acceleration and torque limits. A slope outside the bounds violates a limit. A joint at rest
-        /// that exceeds a limit does not prevent path time from keeping its present rate.
+        /// A slope within the bounds keeps the acceleration and torque limits, and a slope outside the bounds
+        /// violates a limit. If a joint at rest is already above a limit, path time may at least keep its present
+        /// rate.
         #[test]
         fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
             velocity in velocities(),
@@ -249,27 +251,31 @@ mod tests {
         assert_eq!((ramp.coupling(0, 1), ramp.coupling(1, 0), ramp.coupling(1, 1)), (0.5, 0.25, 4.0));
     }
 
-    /// The peak torque of the stop is twice the momentum divided by its time. Half of the torque that remains within the limit of 64 N·m is
-    /// available, and at least a tenth of the limit.
+    /// The peak torque of a stop is twice the momentum divided by the duration. A stop may use half of the torque
+    /// that the holding torque leaves of the limit of 64 N·m, and at least a tenth of the limit.
     #[test]
     fn j25_a_stop_after_teaching_takes_the_time_that_its_slowest_joint_needs() {
         let config = limited(64.0);
         let torque = |model: f64, load: f64| JointTorque { model, load, ..JointTorque::default() };
-        // Joint 1 has the momentum 2·0.25 + 1·0.5 = 1 kg·m²/s, and joint 2 has no momentum.
+        // Joint 1 has the momentum 2·0.25 + 1·0.5 = 1 kg·m²/s. Joint 2 has no momentum.
         let coupled = [[2.0, 1.0], [0.0, 0.0]];
         for (inertia, velocity, torques, ms) in [
-            // Half of 64 + 16 N·m: 2·1 / 40 s = 50 ms.
+            // The holding torque of 16 N·m helps. Half of 64 + 16 N·m is 40 N·m, so the stop takes 2·1 / 40 s = 50
+            // ms.
             (coupled, [0.25, 0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 50.0),
-            // In the other direction, the holding torque reduces the available torque. Half of 64 − 16 N·m: 2·1 / 24 s.
+            // In the other direction, the holding torque reduces the available torque. Half of 64 − 16 N·m is 24 N·m,
+            // so the stop takes 2·1 / 24 s.
             (coupled, [-0.25, -0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 2_000.0 / 24.0),
             (coupled, [0.25, 0.5], [torque(-12.0, -4.0), torque(0.0, 0.0)], 2_000.0 / 24.0),
-            // The holding torque needs all torque. A tenth of 64 N·m: 2·1 / 6.4 s = 312.5 ms.
+            // The holding torque needs the whole limit. A tenth of 64 N·m is used, so the stop takes 2·1 / 6.4 s =
+            // 312.5 ms.
             (coupled, [-0.25, -0.5], [torque(60.0, 4.0), torque(0.0, 0.0)], 312.5),
             (coupled, [-0.25, -0.5], [torque(100.0, 4.0), torque(0.0, 0.0)], 312.5),
-            // Half of 64 N·m: 2·4 / 32 s = 250 ms for joint 2, and 2·1 / 32 s = 62.5 ms for joint 1.
+            // Without a holding torque, half of 64 N·m is available. One joint has a momentum of 4 kg·m²/s, so the
+            // stop takes 2·4 / 32 s = 250 ms. The other joint needs less time.
             ([[2.0, 0.0], [0.0, 4.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
             ([[8.0, 0.0], [0.0, 1.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
-            // Opposite momenta cancel each other.
+            // The motions of both joints cause opposite momenta of joint 1, which cancel each other.
             (coupled, [0.25, -0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 0.0),
             (coupled, [0.0, 0.0], [torque(12.0, 4.0), torque(0.0, 0.0)], 0.0),
         ] {
@@ -309,8 +315,8 @@ mod tests {
         assert!(after_250_ms(slows).rate > 0.5);
     }
 
-    /// Joint 1 needs 60 N·m of 50 N·m. Its inertia of 2 kg·m² moves at 1 rad/s at full speed, so a slope of −5 1/s removes the excess. The
-    /// slope of path time covers a tenth of the difference in one tick.
+    /// Joint 1 needs 60 N·m, but its limit is 50 N·m. It has 2 kg·m² and moves at 1 rad/s at full speed, so a slope
+    /// of −5 1/s removes the excess. In one tick, the slope of path time changes by a tenth of the difference.
     #[test]
     fn j75_path_time_that_is_held_back_follows_the_slope_at_the_torque_limit() {
         let config = limited(50.0);
@@ -322,17 +328,19 @@ mod tests {
         assert!(close(clock.slope, -0.5) && close(clock.rate, 1.0 - 0.0005), "{clock:?}");
     }
 
-    /// Joint 2 yields, so it does not move along the path. Its coupling does not push joint 1, and its own limits do not bound the slope.
-    /// Joint 1 has a torque of 40 N·m and an inertia of 2 kg·m².
+    /// Joint 2 yields, so it does not move along the path. Its coupling inertia does not load joint 1, and its own
+    /// limits do not bound the slope. Joint 1 has a torque of 40 N·m and an inertia of 2 kg·m².
     #[test]
     fn j68_a_joint_that_yields_does_not_bound_the_slope_of_path_time() {
         let config = limited(50.0);
         let at = SetPoint { velocity: [1.0, 1.0, 0.0, 0.0, 0.0, 0.0], ..SetPoint::default() };
         for (yields, full, easy) in [
-            // (−50 − 40) / 2 and (50 − 40) / 2; with 0.95·50 N·m, (−47.5 − 40) / 2 and (47.5 − 40) / 2.
+            // Joint 1 alone bounds the slope. With the full limit of 50 N·m, the bounds are (−50 − 40) / 2 and (50 −
+            // 40) / 2. With 0.95 of the limit, they are (−47.5 − 40) / 2 and (47.5 − 40) / 2.
             (true, (-45.0, 5.0), (-43.75, 3.75)),
-            // The push on joint 1 is 2 + 4 = 6 N·m·s, and on joint 2 it is 4 + 8 = 12 N·m·s at a torque of 0: the bounds are
-            // max(−90 / 6, −50 / 12) and min(10 / 6, 50 / 12); with the easy limits max(−87.5 / 6, −47.5 / 12) and 7.5 / 6.
+            // Both joints bound the slope. A slope of 1 1/s needs 2 + 4 = 6 N·m at joint 1, and 4 + 8 = 12 N·m at
+            // joint 2, whose torque is 0. With the full limit, the bounds are max(−90 / 6, −50 / 12) and min(10 / 6,
+            // 50 / 12). With 0.95 of the limit, they are max(−87.5 / 6, −47.5 / 12) and 7.5 / 6.
             (false, (-50.0 / 12.0, 10.0 / 6.0), (-47.5 / 12.0, 7.5 / 6.0)),
         ] {
             let mut law = ControlLaw::default();

@@ -8,34 +8,35 @@ use super::law::{LawInputs, compensation};
 use crate::JOINTS;
 use crate::motion::jog;
 
-/// Highest share of a torque limit that an approach uses. The feedback torque of a fast approach needs up to a fifth of the torque limit.
+/// Highest share of a torque limit that an approach uses. The remaining share is for the feedback torque, which needs
+/// up to a fifth of the limit in a fast approach.
 const APPROACH_TORQUE: f64 = 0.8;
 /// Highest share of a torque limit that a jog uses. The remaining share is for the feedback torque, and for the return from a position with
 /// a higher holding torque.
 const JOG_TORQUE: f64 = 0.92;
-/// Share of the remaining torque that a jog may use. An approach uses this share if the holding torque is so high that the share allows
-/// more torque than [`APPROACH_TORQUE`].
+/// Share of the remaining torque that a jog may use. An approach also uses this share if the holding torque is so
+/// high that [`APPROACH_TORQUE`] would allow less.
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
-/// Top speed of a minimum-jerk polynomial as a multiple of distance/duration, and highest acceleration as a multiple of distance/duration².
+/// Top speed of a minimum-jerk polynomial, as a multiple of distance/duration. `TOP_ACCELERATION` is its highest
+/// acceleration, as a multiple of distance/duration².
 const TOP_SPEED: f64 = 1.875;
 const TOP_ACCELERATION: f64 = 5.774;
 
 /// Time within which a jogged joint can come to rest with its share of the remaining torque, s.
 const REST_S: f64 = 0.3;
-/// Speed of a slow jog, rad/s. If friction leaves no torque for the requested speed, the remaining torque may still be sufficient for this
-/// slow speed.
+/// Speed of a slow jog, rad/s. If friction leaves no torque for the requested speed, the controller tries this speed.
 const CREEP: f64 = 0.02;
-/// Speed of a joint, rad/s, at and above which the full friction of the model acts.
+/// Speed of a joint, rad/s, from which the controller uses the full friction of the model.
 const SLIDES: f64 = 0.1;
 /// Highest speed that counts as zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
-/// Least share of the torque limit that the controller assumes to remain for a motion that reduces the load of the joint.
+/// Least share of the torque limit that a motion to a lower holding torque may use.
 const UNLOADING: f64 = 0.01;
-/// Least share of the tool speed limit that remains for joints that become faster, because the jog must be able to continue.
+/// Least share of the tool speed limit for joints that become faster, so that a jog can always continue.
 const LEAST_ROOM: f64 = 0.005;
-/// Least share of a jog's highest acceleration.
+/// Lower bound for the acceleration of a jog, as a share of its highest acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
 
 /// Limits of a jog that follow from the remaining torque.
@@ -83,8 +84,8 @@ impl Motion {
             times.fold(shortest, f64::max)
         };
         let longest = shortest + LONGER_MS;
-        // A slower approach has less friction. If the friction of the fastest approach leaves too little torque, the friction of the
-        // slowest approach is used.
+        // The friction of an approach is computed at its top speed. If the fastest approach leaves too little torque,
+        // the friction of the slowest permitted approach is used.
         let time = enough(shortest);
         if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
     }
@@ -109,7 +110,7 @@ impl Motion {
         }
         let velocity = wanted.map(|v| share * v);
         let hardest = |j: usize| jog::hardest(&config.joints[j]);
-        // A joint that already moves may need torque to slow down.
+        // A joint that already moves may need torque to slow down, even if its requested velocity is zero.
         let moves = |j: usize| wanted[j] != 0.0 || self.set.point.velocity[j] != 0.0;
         let needed = |j: usize| {
             (0..JOINTS).filter(|&k| moves(k)).map(|k| self.ramp.coupling(j, k).abs() * hardest(k)).sum()
@@ -118,9 +119,10 @@ impl Motion {
         Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
     }
 
-    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The absolute contributions of all joints to the flange
-    /// speed are added, because joints whose contributions cancel out may accelerate differently. Joints that become faster share the
-    /// flange speed that remains. Joints that do not become faster become slower or keep their present speed.
+    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The speed of the flange is bounded
+    /// by the sum of the absolute contributions of all joints. Contributions of opposite signs are not subtracted,
+    /// because the joints may accelerate differently. A joint that must not become faster slows down or keeps its
+    /// speed. The other joints share the remaining flange speed.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // Distance of the flange from the axis of each joint, m.
@@ -132,14 +134,16 @@ impl Motion {
         }
         let speed: f64 = (0..JOINTS).map(|j| reach[j] * wanted[j].abs()).sum();
         let share = if speed > most { most / speed } else { 1.0 };
-        // A joint continues to accelerate or to reverse until its acceleration is zero.
+        // A joint with an acceleration still changes its speed until its acceleration is zero, and may reverse.
+        // `peak` is its highest speed in this time.
         let peak: [f64; JOINTS] = core::array::from_fn(|j| {
             let (v, a) = (set.velocity[j], set.acceleration[j]);
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
             v.abs().max(after.abs())
         });
-        // The present speed of the joints that must not become faster is subtracted first. If less speed remains for the other joints, the
-        // function may find more joints that must not become faster.
+        // The speed of the joints that must not become faster is subtracted from the limit first. This reduces the
+        // share of the other joints. With a lower share, further joints may already be too fast, so the computation
+        // is repeated.
         let mut rising = share;
         for _ in 0..JOINTS {
             let (mut slower, mut faster) = (0.0, 0.0);
@@ -159,7 +163,8 @@ impl Motion {
         })
     }
 
-    /// Returns the share of the `wanted` velocities (rad/s) from which the joints can come to rest with a share of the remaining torque.
+    /// Returns the highest share of the `wanted` velocities (rad/s) from which the joints can come to rest with the
+    /// torque that a jog may use.
     fn jog_speed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> f64 {
         let needed = |j: usize| {
             (0..JOINTS).map(|k| self.ramp.coupling(j, k).abs() * wanted[k].abs()).sum::<f64>() / REST_S
@@ -188,7 +193,7 @@ impl Motion {
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
-        // The jog continues until a command expires, and then comes to rest.
+        // The joints still move until the last Jog expires, and then while they come to rest.
         let ahead_s = f64::from(jog::LASTS_MS) / 1_000.0 + 0.5 * REST_S;
         let rest = core::array::from_fn(|j| {
             let (low, high) = config.position_range(j);
@@ -202,7 +207,8 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that moves towards a lower holding torque may move if any torque is available.
+            // A joint that moves to a position with a lower holding torque may use a small torque, even if no torque
+            // remains. It must not have to lift its load beyond the torque limit.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;
@@ -210,8 +216,9 @@ impl Motion {
         })
     }
 
-    /// Returns the torques that hold the arm at `q` (rad). Each torque is gravity plus the learned load, or gravity plus the integral if
-    /// this sum is larger. While the integrals release the torque of a payload that is now part of the model, returns gravity alone.
+    /// Returns the torques that hold the arm at `q` (rad): gravity plus the learned load, or gravity plus the
+    /// integral if this sum is larger. While the integrals release torque that the model now contains, returns
+    /// gravity alone.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {

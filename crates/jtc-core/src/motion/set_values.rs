@@ -11,8 +11,8 @@ use crate::nodes::Nodes;
 use crate::trajectory::path::PathClock;
 use crate::{DT, JOINTS};
 
-/// Commanded motion of the arm, including joints that have not come to rest yet. In HoldPos, [`hold`](Self::hold) steps the motion. In
-/// Operate, [`approach`](Self::approach) and [`follow`](Self::follow) step the motion.
+/// Set values of the arm, including those of joints that have not come to rest yet. In HoldPos, [`hold`](Self::hold)
+/// executes each tick. In Operate, [`approach`](Self::approach) and [`follow`](Self::follow) execute each tick.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SetValues {
     /// Set values of the present tick.
@@ -23,7 +23,7 @@ pub(crate) struct SetValues {
     pub(super) holding: [bool; JOINTS],
     /// `true` if the joint is marked as absent (J-53), so that the controller need not hold the joint.
     absent: [bool; JOINTS],
-    /// Joints whose set values have been restarted from the measured motion since the last tick.
+    /// `true` for each joint whose set values were restarted from its measured motion since the last tick.
     found_moving: [bool; JOINTS],
     /// State of the catch of each joint.
     pub(super) catch: [Catch; JOINTS],
@@ -38,7 +38,7 @@ pub(crate) struct SetValues {
 bit_codec!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
 
 impl SetValues {
-    /// Releases all joints, because the torque is off. No joint is then held, and the set position is equal to the measured position.
+    /// Releases all joints, because the torque is off. The set positions are then equal to the measured positions.
     pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog } = self;
         *point = SetPoint::still(*nodes.positions());
@@ -59,7 +59,8 @@ impl SetValues {
     /// Restarts all set values at rest at `position`, except the set values of the last ticks.
     fn restart(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
-        // J-63: the restart of the set values does not stop a joint, even if the joint did not follow its set values.
+        // J-63: a restart of the set values does not stop a joint. The prediction of missing answers must therefore
+        // not count it as a change of the velocity.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
         self.led = false;
@@ -72,8 +73,8 @@ impl SetValues {
         self.commanded.rest(nodes.positions());
     }
 
-    /// Begins the next tick of the set values. Returns the joints whose set values were restarted in the last tick. The restart did not
-    /// change the motion of these joints, because the new set values began with the measured motion.
+    /// Begins the next tick of the set values. Returns `true` for each joint whose set values were restarted in the
+    /// last tick. Such a restart began at the measured motion, so it did not change the motion of the joint.
     pub(crate) fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
         core::mem::take(&mut self.found_moving)
@@ -95,7 +96,7 @@ impl SetValues {
         self.jog.as_mut().is_some_and(Jog::ends)
     }
 
-    /// Executes one tick of a jog. `ramp` advances the clock of the jog for the commanded set values.
+    /// Executes one tick of a jog. `ramp` advances the clock of the jog while its rate changes.
     pub(crate) fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
         let Some(jog) = &mut self.jog else { return };
         jog.step(&mut self.point, config, ramp);
@@ -146,7 +147,7 @@ impl SetValues {
                 self.decelerate(j, led, config);
                 self.led = true;
             } else {
-                // A joint that is enabled later begins with its own latch.
+                // A joint that is not held gets its set position when it is enabled later.
                 self.commanded.begin(j, from[j], 0.0, 0);
             }
         }
@@ -155,8 +156,8 @@ impl SetValues {
         }
     }
 
-    /// Returns `true` if the joints that a hand has moved have come to rest. After this tick, a joint may swing, and the controller must
-    /// then catch it.
+    /// Returns `true` if the joints that a hand has moved have come to rest. A catch then begins, because a joint may
+    /// swing after it has come to rest.
     pub(crate) fn led_to_rest(&mut self, config: &Config) -> bool {
         self.led = self.deceleration.iter().any(Option::is_some);
         if !self.led {
@@ -174,13 +175,14 @@ impl SetValues {
     fn decelerate(&mut self, j: usize, mut deceleration: Deceleration, config: &Config) {
         let (from, velocity) = deceleration.start();
         self.commanded.begin(j, from, velocity, config.delay_ticks);
-        // J-62: the joint has moved since the encoder was read.
+        // J-62: the joint has moved further since its encoder was read, so the deceleration begins at the present
+        // position.
         deceleration.shift(self.commanded.position(0)[j] - from);
         self.deceleration[j] = Some(deceleration);
         self.found_moving[j] = true;
     }
 
-    /// Returns `true` for each joint whose set velocity or measured velocity shows a motion.
+    /// Returns `true` for each joint that moves according to its set velocity or to its measured velocity.
     pub(crate) fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
         core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
     }
@@ -191,8 +193,8 @@ impl SetValues {
         self.holding = [true; JOINTS];
     }
 
-    /// Moves the set position of a yielding joint to the `position` to which its spring pulls, rad. The change of the set values of a
-    /// yielding joint does not count as a motion.
+    /// Moves the set position of a yielding joint to the `position` to which its spring pulls, rad. This change does
+    /// not count as a motion.
     pub(crate) fn lead(&mut self, j: usize, position: f64) {
         (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
         self.commanded.begin(j, position, 0.0, 0);
@@ -200,7 +202,8 @@ impl SetValues {
         self.found_moving[j] = true;
     }
 
-    /// Returns `true` if the joint has come to rest within its torque limit at least once since it was enabled.
+    /// Returns `true` if the joint has come to rest, with a torque within its limit, at least once since it was
+    /// enabled.
     pub(crate) fn settled(&self, joint: usize) -> bool {
         self.catch[joint].settled()
     }
@@ -213,8 +216,8 @@ impl SetValues {
             && !self.catch.iter().any(Catch::busy)
     }
 
-    /// Latches the set positions of joints that have just been enabled. If such a joint moves, the function brings it to rest. The set
-    /// position of a joint that is not enabled, and therefore has no torque, is its measured position. Returns the joints that were already
+    /// Latches the set positions of joints that have just been enabled. A joint that moves is brought to rest. The
+    /// set position of a joint that is not enabled is its measured position. Returns the joints that were already
     /// held, and the joints that have just been enabled.
     pub(crate) fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
@@ -237,7 +240,8 @@ impl SetValues {
                     self.decelerate(j, falling, config);
                 }
             } else if another {
-                // Another joint was just enabled. If the load of that joint moves, the load of this joint moves as well.
+                // Another joint was just enabled. If the load of that joint moves, it can also move the load of this
+                // joint.
                 self.catch[j] = Catch::begin(config);
             }
         }
@@ -259,8 +263,8 @@ impl SetValues {
         }
     }
 
-    /// Executes one tick on the path or during the approach. The values `at` for full speed are scaled with the rate of path time and with
-    /// the slope (1/s) of this rate (J-33).
+    /// Executes one tick on the path or during the approach. `at` contains the set values for full speed. They are
+    /// scaled with the `rate` of path time and with its `slope` (1/s) (J-33).
     pub(crate) fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {

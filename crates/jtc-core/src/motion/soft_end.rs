@@ -13,7 +13,8 @@ pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     above - below
 }
 
-/// Returns the torque of a soft-end spring that is compressed by `depth` (rad), N·m. At the position limit, the torque is `most`.
+/// Returns the torque of the spring of a soft end that is compressed by `depth` (rad), N·m. At the position limit,
+/// the torque is `most`.
 pub(crate) fn spring(depth: f64, most: f64) -> f64 {
     -most * depth / SOFT_END
 }

@@ -19,29 +19,29 @@ use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
 use joint::{TaughtJoint, rotor};
 
-/// Number of ticks in a round that computes the slowly changing values. The second constant is the number of ticks before the first round.
-/// Before the first round, one tick begins Teaching, and one tick computes the mass at the flange. Another tick computes the inertia of the
-/// whole arm, which a ramp needs, and one tick per joint computes the inertia of this joint.
+/// Number of ticks in a round. Each round computes all slowly changing values once. `FIRST` is the number of ticks
+/// before the first round: the start of Teaching, the mass at the flange, the inertia of the whole arm for a ramp,
+/// and the inertia of each of the six joints.
 const TURNS: u8 = 76;
 const FIRST: u8 = 9;
-/// Time between two comparisons of the load with the motion, in ticks and in s.
+/// Time between two comparisons of the load with the motion, ticks. `PERIOD` is the same time in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Two thresholds for the torque of 1 kg at the flange on all joints together, as the root of the sum of squares (N·m/kg). If the torque of
-/// 1 kg is below the first threshold, the controller does not attribute any load to a mass. Above the second threshold, the controller uses
-/// the complete fitted mass. HoldPos cannot distinguish a load from static friction. A small friction torque must not become a large mass
-/// in another pose.
+/// Thresholds for the torque of 1 kg at the flange on all joints together, as the root of the sum of squares
+/// (N·m/kg). Below the first threshold, the controller does not attribute any load to a mass. Above the second
+/// threshold, it uses the whole fitted mass. HoldPos cannot distinguish a load from static friction. In a pose in
+/// which a mass hardly loads the joints, a small friction torque would look like a large mass.
 const LOADS: (f64, f64) = (2.0, 6.0);
-/// Time for which a mass must have driven the arm without a hand before the controller removes the mass, ms. The second constant is the
-/// time constant of the removal, s.
+/// Time for which a mass must have driven the arm without a hand before the controller begins to remove the mass, ms.
+/// `GOES_S` is the time constant of the removal, s.
 const DRIVEN_MS: u16 = 1_000;
 const GOES_S: f64 = 1.5;
-/// Time for which a joint must have sunk without the removed mass before the controller adds the mass again, ms. The second constant is the
-/// time constant of the return of the mass, s.
+/// Time for which a joint must have sunk without the removed mass before the controller begins to add the mass again,
+/// ms. `COMES_BACK_S` is the time constant of this return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed above which the controller assumes that a hand moves a joint, rad/s. Distance of the fastest joint over which a torque that no
-/// mass explains falls to a third, rad.
+/// Speed above which the controller assumes that a hand moves a joint, rad/s. `WAY` is the distance of the fastest
+/// joint over which the torque that no mass explains falls to a third, rad.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 
@@ -52,7 +52,7 @@ enum Turn {
     Begin,
     /// Computes the mass at the flange that explains the learned loads.
     Mass,
-    /// Leaves the time of the tick for the ramp, which computes the inertia of the whole arm.
+    /// Computes nothing for Teaching. In this tick, the ramp computes the inertia of the whole arm.
     Ramp,
     Inertia(usize),
     /// Computes the friction of a joint, and the torque of 1 kg at the flange on all joints.
@@ -100,11 +100,11 @@ pub(crate) struct Taught {
     mass: f32,
     /// Torque of 1 kg at the flange on each joint, N·m.
     unit: [f32; JOINTS],
-    /// Time for which the mass alone has explained the motion, ms. The next field is the time for which a joint has sunk because the mass
-    /// was removed, ms.
+    /// Time for which the mass alone has explained the motion, ms. `sinks_ms` is the time for which a joint has sunk
+    /// because the mass was removed, ms.
     driven_ms: u16,
     sinks_ms: u16,
-    /// Excess of the flange speed over the tool speed limit, scaled to the range from 0 to 1.
+    /// Excess of the flange speed over the tool speed limit, from 0 (no excess) to 1 (twice the limit).
     haste: f32,
     /// Tick counter, which selects the computation of a tick.
     turn: u8,
@@ -142,8 +142,9 @@ impl Taught {
         }
     }
 
-    /// Reduces the estimated mass by `mass` (kg), because the model contains this mass at the flange from this tick on (J-60). The
-    /// estimated mass does not change its sign. If `mass` is larger, the excess was not present when the controller estimated the mass.
+    /// Reduces the estimated mass by `mass` (kg), because the model contains this mass at the flange from this tick
+    /// on (J-60). The estimated mass is reduced at most to zero. A larger `mass` was not yet on the arm when the
+    /// controller estimated the mass.
     pub(crate) fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
@@ -162,19 +163,21 @@ impl Taught {
         Turn::of(self.turn) == Turn::Begin
     }
 
-    /// Returns `true` in the tick that computes no other value, because this tick leaves its time for the inertia of the whole arm.
+    /// Returns `true` in a tick in which Teaching computes nothing, so that the ramp has time to compute the inertia
+    /// of the whole arm.
     pub(crate) fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
 
-    /// Returns the load torque of a joint in the first tick of Teaching, N·m. The load torque in the first tick is the whole learned load,
-    /// because no part of the load has been attributed to a mass yet.
+    /// Returns the load torque of a joint in the first tick of Teaching, N·m. This is the whole learned load, because
+    /// the controller has not attributed any part of it to a mass yet.
     pub(crate) fn first_load(&self, j: usize) -> f64 {
         self.carried[j].rest.into()
     }
 
-    /// Computes the slowly changing values, at most one of them per tick. Returns `true` if this tick has no time left to compute the
-    /// torques of the joints. The first tick of Teaching adds only the load, because the torque would have a step without the load.
+    /// Computes at most one of the slowly changing values. Returns `true` if the tick then has no time left for the
+    /// torques of the joints. In the first tick of Teaching, only the load torque is set, so that the torque has no
+    /// step.
     #[inline(never)]
     pub(crate) fn look(
         &mut self,
@@ -261,7 +264,7 @@ impl Taught {
         }
     }
 
-    /// Returns the torque that holds a joint at `position` (rad), N·m. The holding torque is the sum of the torques of the load and of the
+    /// Returns the torque that holds a joint at `position` (rad), N·m: the torque of the load plus the torque of the
     /// dry friction.
     pub(crate) fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         self.carried[j].torque(self.by_mass(j)) + self.joints[j].dry_spring(position, limits, config)

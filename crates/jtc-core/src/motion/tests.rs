@@ -31,8 +31,8 @@ fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_posi
     assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
-/// If an arm is at rest, the controller must hold it at once. During a ramp to rest, the torque limits would not apply although the arm is
-/// at rest, and no motion could begin.
+/// An arm that is already at rest is held at once, without a ramp to rest. Otherwise the torque limits would not
+/// apply during this ramp, and no motion could begin.
 #[test]
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
@@ -83,8 +83,8 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching begins when the arm is held and the loads of its joints are known. If a contact may press on the arm, Teaching begins after
-/// `KNOWN_MS`, even if the loads are not known.
+/// Teaching begins when the arm is held and the loads of its joints are known. If a contact may press on the arm,
+/// Teaching begins after 2 s even if the loads are unknown.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     for (held, contact, waits_ms, known, may) in [
@@ -109,7 +109,8 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     }
 }
 
-/// Returns the motion of an arm that holds the other joints, after joint 4 was measured at this velocity (rad/s), enabled or not.
+/// Returns the motion of an arm after joint 4 was measured at this `velocity` (rad/s). `held` and `enabled` are the
+/// states of joint 4. All other joints are held.
 fn latched(held: bool, enabled: bool, velocity: f64) -> Motion {
     let (config, at, off) = (Config::avena(), [0.3; JOINTS], 3);
     let mut velocities = [0.0; JOINTS];
@@ -129,12 +130,11 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
     for (held, enabled, velocity, follows, catches, falls) in [
         (true, true, 0.0, false, false, false),
         (true, true, 0.5, false, false, false),
-        // The joint was just enabled, so it is latched at its measured position. The load of this joint also moves the loads of the other
-        // joints.
+        // Joint 4 was just enabled, so it is latched at its measured position. Its load may also move the other
+        // joints, so their catch begins again.
         (false, true, 0.0, true, true, false),
         (false, true, 0.5, true, true, true),
-        // If the joint is not enabled, its set values are equal to its measured values. After a joint was disabled, its set values are also
-        // equal to its measured values.
+        // Joint 4 is not enabled, so its set values follow its measured values, even if it was held before.
         (false, false, 0.0, true, false, false),
         (false, false, 0.5, true, false, false),
         (true, false, 0.5, true, false, false),
@@ -156,7 +156,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
 #[test]
 fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
-        // If a single joint moves, all joints decelerate.
+        // If joint 2 moves faster than 0.02 rad/s, all joints that are held decelerate.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = holding([true, true, true, false, true, true]);
         motion.set.hold_measured(&nodes, 200.0, &Config::avena());
@@ -166,8 +166,8 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     }
 }
 
-/// An arm that a hand has moved comes to rest, and the controller catches it like a load. If the arm is at rest, the controller holds it at
-/// once.
+/// At the end of Teaching, an arm that moves comes to rest, and the controller catches it like a load. An arm at rest
+/// is held at once.
 #[test]
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
     for (velocity, moves) in [(0.0, false), (0.02, false), (0.3, true)] {
@@ -196,7 +196,7 @@ fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     motion.set.begin_at(&[0.1; JOINTS]);
     motion.release(&nodes);
     assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
-    // J-62: the due position is also the measured position.
+    // J-62: the due position is equal to the measured position, so the position error is zero.
     assert_eq!(motion.set.due(&Config::avena()), &[0.3; JOINTS]);
     assert_eq!((motion.set.holding, motion.law.torque), Default::default());
     assert!(!motion.set.catch[1].busy());

@@ -12,9 +12,9 @@ const FALL_MS: u16 = 10;
 /// Parts of the last torque that the next torque must continue without a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
-    /// All parts of the torque except the model torque.
+    /// All parts of the torque except the model torque, because only the model torque may step.
     Correction,
-    /// All parts of the torque.
+    /// All parts of the torque, including the model torque.
     Everything,
 }
 
@@ -33,7 +33,7 @@ pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
 /// Torque steps that are being blended out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Transfer {
-    /// Torque step that is being blended out, N·m, and the time since its start.
+    /// Torque step that is being blended out, N·m. `step_ms` is the time since its start, ms.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
     /// `true` if the step is blended out within [`FALL_MS`].
@@ -63,7 +63,7 @@ impl BitCodec for Continued {
 impl Transfer {
     /// Prepares a change of the control mode, at which only the torque of the model may step.
     pub(super) fn change_mode(&mut self) {
-        // If the model changes in the same tick, no torque may step.
+        // A change of the model in the same tick has priority, because then no part of the torque may step.
         self.next.get_or_insert(Continued::Correction);
     }
 
@@ -72,8 +72,8 @@ impl Transfer {
         self.next = Some(Continued::Everything);
     }
 
-    /// Prepares the yield of a joint from the next tick on. Only the torque of the model may step, and the excess torque falls within
-    /// [`FALL_MS`] (J-68).
+    /// Prepares the yield of a joint from the next tick on. Only the model torque may step. If the torque must become
+    /// lower, it falls to its new value within [`FALL_MS`] (J-68).
     #[inline(always)]
     pub(super) fn begin_yield(&mut self, joint: usize) {
         self.next.get_or_insert(Continued::Correction);
@@ -149,7 +149,8 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Returns the blended torque in each tick after a change of state. `last` was the torque before this change.
+    /// Returns the torque steps that are still blended in each tick after a change of state. `last` is the torque
+    /// before this change.
     fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
         let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);
@@ -204,9 +205,9 @@ mod tests {
         (0..10).map(|_| blended(transfer, 0.0)).last().unwrap_or_default()
     }
 
-    /// Another change of the torques comes `ms` after joint 3 has begun to yield. If the torque of joint 3 still falls, it falls to its new
-    /// value within 10 ms. After the fall, the torque of joint 3 is blended out like the torques of the other joints: 10 of 100 ms leave
-    /// 1 - 3 · 0.1² + 2 · 0.1³, which is 0.972.
+    /// Another change of the torques comes `ms` after joint 3 has begun to yield. If the torque of joint 3 is still
+    /// falling, it reaches its new value within 10 ms. Otherwise its torque is blended out like that of the other
+    /// joints. After 10 of 100 ms, 1 - 3 · 0.1² + 2 · 0.1³ = 0.972 of the step is left.
     #[test]
     fn j44_j68_a_torque_that_falls_goes_on_falling_when_another_joint_yields() {
         for (ms, falls) in [(1, true), (5, true), (9, true), (10, false), (15, false)] {

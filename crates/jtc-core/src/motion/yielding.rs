@@ -22,20 +22,23 @@ use swing::Swing;
 const STRETCH: f64 = 0.02;
 /// Highest natural frequency of the spring together with the inertia of the joint, 1/s.
 pub(crate) const SPRING_RATE: f64 = 30.0;
-/// Rate at which the damper of a lowered load reduces a speed, 1/s. If several joints lower loads, these joints share this rate. Held
-/// joints affect each other at frequencies at which a delayed speed measurement makes the control loop unstable. The effective inertia of a
-/// joint is then only a third of its inertia while the other joints are fixed.
+/// Highest rate at which the damper of a lowered load reduces a speed, 1/s. Several joints that lower loads share
+/// this rate. Held joints affect each other at frequencies at which a delayed speed measurement makes the loop
+/// unstable. At these frequencies, the effective inertia of a joint is only a third of its inertia with all other
+/// joints fixed.
 const LOWERING_RATE: f64 = 40.0;
-/// Change of the damper and the spring per tick, as a fraction of the remaining change.
+/// Share of the remaining change by which the damping and the stiffness approach their final values in each tick.
 const SETTLES: f64 = 0.2;
-/// Change of the brake per tick, as a fraction of the remaining change, like [`SETTLES`].
+/// Share of the remaining change by which the brake approaches its full effect in each tick, like [`SETTLES`].
 const BRAKE_SETTLES: f64 = 0.5;
-/// Highest rate at which a damper reduces the speed of a joint, 1/s. Measured speeds are about 8 ms old, because the drives average these
-/// speeds. A rate above 200 1/s would make a joint oscillate, and this bound is lower if joints affect each other.
+/// Highest rate at which a damper reduces the speed of a joint, 1/s. Measured speeds are about 8 ms old, because the
+/// drives average them. A single joint would oscillate above 200 1/s, and joints that affect each other oscillate at
+/// lower rates.
 const DAMPING_RATE: f64 = 100.0;
-/// Speeds, as multiples of the velocity limit, at which the brake of a joint begins to act and at which the brake uses the whole torque
-/// limit. The brake acts if its torque is higher than the torque of the damper. `BRAKES_LOWERED` applies to a joint that lowers a load.
-/// `BRAKE_RATE` bounds the rate at which the brake reduces a speed, 1/s, because positions are about 4 ms old.
+/// Speeds, as multiples of the velocity limit. At the first speed, the brake of a joint begins to act. At the second
+/// speed, it uses the whole torque limit. The brake replaces the damper if its torque is higher. `BRAKES_LOWERED`
+/// applies to a joint that lowers a load. `BRAKE_RATE` bounds the rate at which the brake reduces a speed, 1/s,
+/// because positions are about 4 ms old.
 const BRAKES: (f64, f64) = (0.2, 0.8);
 const BRAKES_LOWERED: (f64, f64) = (0.4, 1.0);
 const BRAKE_RATE: f64 = 250.0;
@@ -43,8 +46,8 @@ const BRAKE_RATE: f64 = 250.0;
 const CALM: f64 = 0.05;
 /// Speed below which a lowered load is at rest, rad/s.
 const AT_REST: f64 = 0.02;
-/// Time for which a joint must be calm before the controller holds the joint again, ms. A joint does not count as calm if its load seems to
-/// have driven it for `DRIVEN_CALM_MS`.
+/// Time for which a joint must be calm before the controller holds it again, ms. If the load seems to have driven the
+/// joint for `DRIVEN_CALM_MS`, the joint does not count as calm.
 const CALM_MS: u16 = 200;
 const DRIVEN_CALM_MS: u16 = 50;
 /// Lowest torque of gravity and load on a joint, as a share of the torque limit, at which a motion counts as sinking.
@@ -53,10 +56,10 @@ const LOADED: f64 = 0.05;
 const SINKS: (f64, u16) = (0.5, 3_000);
 /// Time constant for the torque of the damper to become part of the load, s.
 const LEARNS_S: f64 = 0.5;
-/// Range of the torque of spring and damper against a joint that its load drives, as shares of this load. The remaining share of this load
-/// is friction. If a load has driven the joint for [`DRIVEN_MS`], the controller assumes that a person leaned on the arm while the load was
-/// learned. A load that drives its joint fades with the time constant [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint
-/// sinks without the load.
+/// Range of the torque of spring and damper, as a share of the load, in which the load seems to drive its joint.
+/// Friction takes the remaining share. If this lasts for [`DRIVEN_MS`], the controller assumes that a person leaned
+/// on the arm while the load was learned. The load then fades with the time constant [`GOES_S`] (s). It returns with
+/// [`COMES_BACK_S`] (s) if the joint sinks without the load.
 const DRIVEN: (f64, f64) = (0.5, 1.2);
 /// Speed above which a load seems to drive its joint, rad/s.
 const CREEPS: f64 = 0.002;
@@ -67,10 +70,10 @@ const COMES_BACK_S: f64 = 0.3;
 const HOLDABLE: f64 = 0.95;
 /// Number of missing answers after which the spring of a yielding joint does not act.
 const MISSING: u8 = 2;
-/// Number of the yield of a joint that does not end without the host. This yield continues until the host clears the yield. Yields are
-/// counted together if each yield of the arm begins within [`AGAIN_MS`] after the previous yield.
+/// Number of consecutive yields of a joint after which the last yield lasts until the host clears it. Yields count as
+/// consecutive if each yield of the arm begins within [`AGAIN_MS`] after the previous one.
 const TIMES: u8 = 3;
-/// Time within which yields are counted together (see [`TIMES`]), ticks.
+/// Longest time between two consecutive yields (see [`TIMES`]), ticks.
 const AGAIN_MS: u16 = 10_000;
 
 /// State of a joint that yields.
@@ -92,18 +95,19 @@ pub(crate) struct Yield {
     driven_ms: u16,
     /// Damping of the joint, N·m·s/rad.
     damping: f64,
-    /// Acting share of the brake. The next field is the acting share of the spring.
+    /// Acting share of the brake. `grip` is the acting share of the spring.
     braking: f64,
     grip: f64,
     swing: Swing,
-    /// `holdable` is `true` if the position controller can hold the load of the joint. `cleared` is `true` if the host requires the
-    /// position controller to hold the load.
+    /// `true` if the position controller can hold the load of the joint. `cleared` is `true` if the host requests
+    /// that it holds the load.
     holdable: bool,
     cleared: bool,
     calm_ms: u16,
     /// Number of consecutive missing answers of the joint.
     missing: u8,
-    /// Distance (rad) and time (ms) for which the joint has sunk in the direction of gravity.
+    /// Distance by which the joint has sunk in the direction of gravity, rad. `sinks_ms` is the time of this motion,
+    /// ms.
     sunk: f64,
     sinks_ms: u16,
 }
@@ -200,7 +204,7 @@ impl Yield {
         self.lowers
     }
 
-    /// Makes the joint lower its load after this call. The torque of the `spring`, N·m, becomes part of the load.
+    /// Makes a yielding joint lower its load from now on. The torque of the `spring`, N·m, becomes part of the load.
     pub(crate) fn lower(&mut self, spring: f64) {
         (self.lowers, self.calm_ms) = (true, 0);
         self.load += spring;
@@ -212,9 +216,10 @@ impl Yield {
         self.lowers || self.load != self.least
     }
 
-    /// Returns the torque that the position controller must continue after the yield, N·m. The spring (`spring`, N·m) may have opposed a
-    /// part of the load. The opposed part of the load no longer acts after the yield. If the spring held a part of a doubted load, the
-    /// position controller continues to hold this part.
+    /// Returns the torque that the position controller must produce after the yield, N·m: the load plus the torque of
+    /// the `spring` (N·m). If the spring has opposed a part of the load, this part does not act after the yield. If
+    /// the spring has held a part of a reduced load, the position controller continues to hold this part. The result
+    /// is never larger than the load at the beginning.
     pub(crate) fn left(&self, spring: f64) -> f64 {
         if self.lowers {
             self.load
@@ -223,8 +228,8 @@ impl Yield {
         }
     }
 
-    /// Returns the load torque for Teaching, N·m. If the load is doubted, Teaching uses only the part that the `spring` (N·m) has not
-    /// opposed, because the opposed part may not exist.
+    /// Returns the load torque for Teaching, N·m. If the controller has reduced the load to less than half, the load
+    /// may not exist. Teaching then uses only the part that the `spring` (N·m) has not opposed.
     pub(crate) fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }
@@ -242,7 +247,8 @@ impl Yield {
         self.missing = if joint.fresh { 0 } else { self.missing.saturating_add(1) };
 
         let soft = self.swing.step(velocity);
-        // With the damping `wanted`, the damper torque at half of the velocity limit is the torque limit minus the share.
+        // `wanted` is the damping at which the damper and the full spring together reach the torque limit at half of
+        // the velocity limit.
         let wanted = 2.0 * (limit - most) / joint.limits.velocity_max;
         let damping = if self.lowers {
             LOWERING_RATE / f64::from(joint.lowering.max(1)) * self.inertia
@@ -250,7 +256,8 @@ impl Yield {
             wanted.min(soft * DAMPING_RATE * self.inertia)
         };
         self.damping += SETTLES * (damping - self.damping);
-        // The brake is zero in the first tick, because a torque in this tick would be blended in.
+        // The brake has no effect in the first tick of a yield. Otherwise the transfer would treat its torque as a
+        // torque step and blend it out.
         let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
         let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);
@@ -277,8 +284,8 @@ impl Yield {
         if !self.lowers {
             self.doubt(velocity, p + d);
         } else if loaded {
-            // The sum of model torque and load never exceeds the torque limit. If the joint is lifted, the load does not fall below its
-            // torque at the beginning.
+            // The sum of model torque and load never exceeds the torque limit. If a hand lifts the joint, the load
+            // does not fall below its value at the beginning.
             let learned = self.load + damper * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
             self.load = learned.max(-limit - joint.model).min(limit - joint.model);
@@ -293,8 +300,8 @@ impl Yield {
         PidTorque { p, i: self.load, d }
     }
 
-    /// Reduces a load that drives the joint against the `torque` (N·m) of spring and damper. The load returns if the joint sinks without
-    /// this load.
+    /// Reduces a load that seems to drive the joint against the `torque` (N·m) of spring and damper. The load returns
+    /// if the joint sinks without it.
     fn doubt(&mut self, velocity: f64, torque: f64) {
         let (along, has) = (velocity * self.least.signum(), self.load.abs());
         let against = -torque * self.least.signum();

@@ -7,7 +7,7 @@ use crate::{JOINTS, NODES};
 
 /// Number of Moves between two frames that the controller sends instead of a Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
-/// Like [`MOVES_BETWEEN`], while the torque is on and only the gripper needs such a frame.
+/// Like [`MOVES_BETWEEN`], if the torque is on and only the gripper needs a frame other than Move.
 const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {
@@ -33,7 +33,7 @@ impl Nodes {
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         if goal == Goal::Enabled && self.all().iter().all(Node::wants_nothing_enabled) {
-            // In nearly every tick with torque, the function returns at this point.
+            // Almost every tick with torque ends here, because no node needs another frame than Move.
             return None;
         }
         let present = self.present();
@@ -55,7 +55,8 @@ impl Nodes {
             && self.gripper_answers(config)
             && self.gripper_node().is_some_and(Node::wants_configuration);
         if goal == Goal::Enabled && self.moves < MOVES_ASIDE && all_unchanged(&target[..JOINTS]) {
-            // A frame for the gripper alone is sent rarely, because nearly every tick must send the torque of the arm (J-23).
+            // Nearly every tick must send the torque of the arm, so a frame that only the gripper needs must wait
+            // (J-23).
             return None;
         }
         // Enabled nodes refuse a configuration. Therefore the controller first disables enabled nodes.
@@ -80,7 +81,7 @@ impl Nodes {
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
-            // J-16: a falling arm is not enabled, because enabling would stop the arm with a jolt.
+            // J-16: the controller does not enable a falling arm, because enabling would stop the arm with a jolt.
             let request = node.request(goal);
             let held_back = request == Target::Enable && !self.may_enable(config);
             *target = if held_back { Target::NoChange } else { request };

@@ -1,14 +1,18 @@
 //! Measured position and velocity of a joint, and their prediction while its answers are missing (J-35, J-63).
 //!
-//! An answer is *usable* if the joint can have moved from the last usable answer to this position in the time between both answers. In a
-//! tick without a usable answer, the controller uses the *prediction*. The prediction is the last usable answer, extrapolated with the rate
-//! of the joint, plus the change of its commanded velocity since that answer. The first usable answer after missing answers differs from
-//! the prediction by an *offset*. The offset fades, so that missing and returning answers do not cause a step of the position or of the
-//! derivative of the position error. A *late* answer ([`Lateness`]) belongs to the time at which it was due. The late answer is compared
-//! with the prediction for that time, and the new prediction starts from this answer. A late answer that is close to its prediction is used
-//! directly, like an answer that arrives on time. An offset that fades in each tick would act as a filter in the position loop, and the
-//! loop would swing. The offset is not a part of the prediction. The prediction depends only on answers and commands, so the position loop
-//! stays closed even if many answers are lost.
+//! An answer is *usable* if the joint can have moved from the last usable answer to this position in the time between
+//! both answers. In a tick without a usable answer, the controller uses the *prediction*: the last usable answer,
+//! extrapolated with the rate of the joint, plus the change of its commanded velocity since that answer. The first
+//! usable answer after missing answers differs from the prediction by an *offset*. The offset fades, so that missing
+//! and returning answers do not cause a step of the position or of the derivative of the position error.
+//!
+//! A *late* answer ([`Lateness`]) belongs to the time at which it was due. It is compared with the prediction for
+//! that time, and the new prediction starts from it. A late answer that is close to its prediction is used directly,
+//! like an answer that arrives on time. If it caused a fading offset in each tick, the offset would act as a filter
+//! in the position loop, and the loop would oscillate.
+//!
+//! The offset is not a part of the prediction. The prediction depends only on answers and commands, so the position
+//! loop stays closed even if many answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -26,24 +30,24 @@ pub(super) use jump::Ways;
 use jump::{Jumps, Seen};
 use lateness::Lateness;
 
-/// Speed that a joint cannot reach, as a multiple of its velocity limit. If the distance between an answer and the prediction is more than
-/// a joint could move at this speed, the answer is not usable (J-35).
+/// Speed that a joint cannot reach, as a multiple of its velocity limit. An answer is not usable if its distance from
+/// the prediction is larger than the distance at this speed (the *implausible distance*, J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Distance from the prediction, as a share of the implausible distance, above which an answer is not used for the rate of the joint. An
-/// answer far from the prediction may show a jump of the encoder, in which the joint has not moved.
+/// Largest distance from the prediction at which an answer is used for the rate of the joint, as a share of the
+/// implausible distance. An answer farther away may show a jump of the encoder instead of a motion.
 const UNEXPECTED: f64 = 0.1;
-/// Largest difference between a late answer and its prediction for which the answer is used directly, in steps of the encoder. The
-/// positions and the predicted rates have the resolution of the encoder.
+/// Largest distance between a late answer and its prediction at which the answer is used directly, in encoder steps.
+/// A few steps are permitted, because positions and predicted rates have only the resolution of the encoder.
 const IN_ITS_PLACE: f64 = 2.0;
 /// Largest encoder step to which [`IN_ITS_PLACE`] is applied, rad. An answer that is used directly may cause a position step of this size.
 const COARSEST: f64 = 1e-4;
-/// Highest distance from the prediction, as a share of the implausible distance, after the jump of the encoder is subtracted from an
-/// answer.
+/// Largest distance from the prediction at which an answer is used after an encoder jump was subtracted from it, as a
+/// share of the implausible distance.
 const NEAR: f64 = 0.5;
 /// Highest difference between the predicted rate of a joint and its reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
-/// Highest ratio of two deviations from the due velocity. The first deviation belongs to the velocity over the last 5 ms, the second to the
-/// reported mean over 10 ms. With a constant acceleration, this ratio is 2.
+/// Largest ratio of two deviations from the due velocity. The first is the deviation of the velocity over the last 5
+/// ms, and the second is the deviation of the reported mean over 10 ms. At a constant acceleration, the ratio is 2.
 const YOUNGER: f64 = 2.5;
 /// Highest rate of a joint in a prediction, as a multiple of the velocity limit.
 const FASTEST: f64 = 1.2;
@@ -69,7 +73,7 @@ pub(crate) struct Tick {
     pub answer: Option<Reading>,
     /// `true` if a Move requested an answer in this tick.
     pub expected: bool,
-    /// `true` if the bus acknowledged this Move.
+    /// `true` if the bus acknowledged the Move that requested this answer.
     pub asked: bool,
     /// Number of answers in this tick. All answers except the last one were late.
     pub answers: u8,
@@ -99,9 +103,9 @@ pub(crate) enum Outcome {
 /// Answer that is far from its predicted position.
 struct Unexpected {
     answer: Reading,
-    /// Prediction minus answer, rad.
+    /// Predicted position minus answered position, rad.
     off: f64,
-    /// Implausible distance, rad.
+    /// Implausible distance of this answer, rad. See [`IMPLAUSIBLE`].
     reach: f64,
     /// Time at which the answer was due, ms.
     at_ms: u32,
@@ -111,7 +115,7 @@ struct Unexpected {
     joint: usize,
 }
 
-/// Lateness of a late answer, and the motion that was commanded since the answer was due.
+/// Data about a late answer: its lateness, and the motion that was commanded since the answer was due.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
     /// Lateness of the answer, ms.
@@ -131,15 +135,15 @@ pub(crate) struct Measurement {
     known: bool,
     /// Time of the measurement, ms. The clock overflows after 49 days, which does not affect time differences.
     clock_ms: u32,
-    /// Last usable answer. Its position is extrapolated to the present tick.
+    /// Last usable answer, with its position extrapolated to the present tick.
     answer: Reading,
     /// Time to which the last usable answer belongs, ms.
     answered_ms: u32,
     /// Velocity that was commanded at the time of the last usable answer, rad/s.
     commanded: f64,
-    /// Rate of the answered positions at the time of the last usable answer, rad/s.
+    /// Rate at which the positions in the answers changed at the time of the last usable answer, rad/s.
     rate: f64,
-    /// Rate that a prediction uses, rad/s. The rate for a prediction is limited to values near the reported velocity.
+    /// Rate that the prediction uses, rad/s. It is limited to values near the reported velocity.
     carried: f64,
     /// Last usable answers of the joint.
     history: History,
@@ -147,18 +151,19 @@ pub(crate) struct Measurement {
     lateness: Lateness,
     /// State of the detection of encoder jumps.
     jumps: Jumps,
-    /// `true` if an answer has been missing since the last usable answer.
+    /// `true` if at least one answer is missing since the last usable answer.
     missing: bool,
-    /// Remainder of the difference between prediction and answer that has not faded yet.
+    /// Remainder of the position difference between prediction and answer that has not faded yet. `velocity_offset`
+    /// is the same for the velocity.
     position_offset: Fading,
     velocity_offset: Fading,
     /// `true` if at least one offset has not faded yet.
     fading: bool,
 }
 
-/// Offset that fades without a step of its value or slope, like a critically damped filter of second order. The offset continues to fade
-/// when a further difference is added to the offset. If the fading restarted instead, the offset would never fade while every second answer
-/// is lost.
+/// Offset that fades without a step of its value or slope, like a critically damped filter of second order. When a
+/// further difference is added, the fading continues from its present state. If the fading restarted instead, the
+/// offset would never fade while every second answer is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
     /// Remainder of the offset, rad or rad/s.
@@ -193,7 +198,7 @@ impl Fading {
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
         let x = pole * ms;
-        // 1/eˣ is computed from its series, which is stable for any length of the tick.
+        // 1/eˣ is computed from the series of eˣ. The result is stable for any length of the tick.
         let decay = 1.0 / (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)));
         let both = self.slope + pole * self.left;
         (self.left, self.slope) = ((self.left + both * ms) * decay, (self.slope - pole * both * ms) * decay);
@@ -241,17 +246,19 @@ impl Measurement {
         self.used
     }
 
-    /// Returns the highest known speed of the joint, rad/s. The speed is the reported velocity or the rate of the positions, whichever is
-    /// higher. The reported velocities alone are not sufficient, because the full scale of the velocity depends on the drive (J-11).
+    /// Returns the highest known speed of the joint, rad/s: the reported velocity or the rate of the positions. The
+    /// reported velocity alone is not sufficient, because its full scale depends on the drive (J-11).
     pub(super) fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Returns the velocity over the last 5 ms, rad/s, which is more recent than the reported velocity. The difference from the `due`
-    /// velocity (rad/s) is limited to [`YOUNGER`] times the difference between the reported and the `due` velocity. If the two differences
-    /// have opposite signs, an encoder has jumped and the joint has not moved. The function then returns the `due` velocity.
+    /// Returns the velocity over the last 5 ms, rad/s, which is more recent than the reported velocity. Its
+    /// difference from the `due` velocity (rad/s) is limited to [`YOUNGER`] times the difference between the reported
+    /// and the `due` velocity. If these two differences have opposite signs, the encoder has jumped while the joint
+    /// did not move, and the function returns the `due` velocity.
     pub(super) fn young_velocity(&self, due: f64) -> f64 {
-        // The reported velocity includes the remainder of a fading offset, which is even older. The remainder of the offset is subtracted.
+        // The reported velocity includes the remainder of a fading offset, which is older than the measurement. This
+        // remainder is subtracted.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
@@ -308,7 +315,8 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
-        // Answers are rarely late. The code for late answers is therefore compiled as a separate function.
+        // Answers are rarely late. The code for late answers is a separate function, so that the normal tick stays
+        // short.
         if self.lateness.stands(tick.answers) {
             self.take(tick, None, config)
         } else {
@@ -369,12 +377,14 @@ impl Measurement {
             self.answer = Reading { position: answer.position + since(self.carried), ..answer };
             self.answered_ms = at_ms;
             self.commanded = late.map_or(tick.commanded, |late| late.commanded);
-            // While answers may be late, the lateness of this answer may differ from the lateness of earlier answers.
+            // After missing or late answers, this answer may differ from the prediction. The difference is bridged,
+            // so that it causes no step.
             if known && (self.missing || late.is_some()) {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
-            // If later answers do not confirm a suspected jump, the difference is bridged like a missing answer.
+            // While a suspected jump is not confirmed, the joint is treated as if an answer were missing. The next
+            // answer is then bridged.
             self.missing = self.jumps.watching();
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
@@ -393,7 +403,8 @@ impl Measurement {
     #[inline(never)]
     fn unexpected(&mut self, unexpected: Unexpected, config: &Config) -> (Option<Reading>, Outcome) {
         let Unexpected { answer, off, reach, at_ms, looked_at, joint } = unexpected;
-        // A position minus the jump of its encoder may be on the other side of the point at which the positions of the drive wrap around.
+        // The positions of a drive wrap around at ±π. After the jump of the encoder is subtracted, a position may be
+        // on the other side of this point.
         let turn = if self.jumps.taken_off() == 0.0 || off.abs() <= PI { 0.0 } else { off.signum() * TAU };
         let (answer, off) = (Reading { position: answer.position + turn, ..answer }, off - turn);
         let seen = if off.abs() <= UNEXPECTED * reach || !looked_at {
@@ -403,8 +414,8 @@ impl Measurement {
             let twist = torque_max / config.gear_stiffness;
             self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
         };
-        // After the jump is subtracted, the position must be near the predicted position. If the position is not near the predicted
-        // position, the reported speed is also wrong.
+        // After the jump is subtracted, the position must be near the predicted position. Otherwise the reported
+        // speed is also wrong, so the jump is not confirmed.
         let near = |way: f64| (off + way).abs() <= NEAR * reach;
         let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
         match seen {
@@ -420,9 +431,9 @@ impl Measurement {
         }
     }
 
-    /// Bridges the difference between the answer of this tick and `predicted`, so that this difference does not cause a step. An answer
-    /// close to its prediction does not cause a step. An answer close to its prediction reduces the remaining offset of earlier
-    /// differences, because these differences would otherwise add up.
+    /// Bridges the difference between the answer of this tick and `predicted`, so that it does not cause a step. An
+    /// answer close to its prediction (`in_its_place`) causes no step. It reduces the remaining offset of earlier
+    /// differences, which would otherwise add up.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -448,8 +459,8 @@ impl Measurement {
         if !self.known || in_its_place(&counted) {
             return Some(counted);
         }
-        // If a joint is fast, the controller detects a lost answer at once, because the positions in the next answers correspond to less
-        // lateness.
+        // If a lost answer was counted as a late answer, the counted lateness is too high. For a fast joint, the
+        // positions show this at once: they match the prediction for a lower lateness.
         let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
             return Some(counted);
         };
@@ -457,10 +468,10 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Computes the rate of the joint from this answer and the most recent answer that is old enough. The rate is computed only from
-    /// answers, not from predictions. While every second answer is lost, a rate computed from predictions would confirm itself for any
-    /// motion of the joint. `as_predicted` is `true` if the answer was close to its prediction. The function is inlined, so that ticks
-    /// without a late answer need less code.
+    /// Computes the rate of the joint from this answer and the most recent answer that is old enough. Predictions are
+    /// not used. While every second answer is lost, a rate that is computed from predictions would confirm itself for
+    /// any motion of the joint. `as_predicted` is `true` if the answer was close to its prediction. The function is
+    /// inlined, so that ticks without a late answer need less code.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;

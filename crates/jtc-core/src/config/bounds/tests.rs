@@ -106,8 +106,9 @@ fn j06_a_polynomial_is_bounded_up_to_the_velocity_limit() {
             let c3 = most * 100.0 / (fastest * fastest * fastest);
             BOUNDS.check_polynomial(&[0.0, 0.0, 0.0, sign * c3, 0.0, 0.0], &joint()).map_err(|e| e.velocity)
         };
-        // A friction torque against the motion first reaches the bound for high speeds, at the highest speed. A friction torque along the
-        // motion first reaches the bound for slow speeds.
+        // A cubic friction torque is largest at the highest speed. Friction against the motion is first refused at
+        // this speed, by the bound for high speeds. Friction along the motion has a narrow bound only for slow
+        // speeds, so it is refused at half of the highest speed.
         let most = if sign > 0.0 { 1.5 } else { 0.05 * 8.0 };
         assert_eq!(cubic(0.999 * most), Ok(()));
         assert_eq!(cubic(1.001 * most), Err(Some(if sign > 0.0 { fastest } else { 0.5 * fastest })));
@@ -142,15 +143,17 @@ fn j06_what_is_refused_is_told_with_its_value() {
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
     for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
-        // The friction torque reaches the bound for slow speeds, 100 N·m, after `reached` steps. A sixteenth of the velocity limit is
-        // divided into sixteen of these steps.
+        // The check divides a sixteenth of the velocity limit into sixteen steps. The friction torque reaches 100
+        // N·m, the bound for slow speeds, after `reached` steps. The check therefore refuses the next whole step,
+        // `found`.
         let c1 = 100.0 / (sixteenth * reached / 16.0);
         let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
         assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");
     }
 }
 
-/// A row that is out of bounds is reported before the torque of the table at standstill.
+/// If several rows of a table are out of bounds, the check reports the first row in motion, not the row at
+/// standstill.
 #[test]
 fn j06_of_a_table_the_first_row_in_motion_is_named() {
     let table = TableOf {

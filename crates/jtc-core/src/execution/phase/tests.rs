@@ -20,7 +20,7 @@ fn j56_every_phase_reads_back_as_it_was_written() {
     for phase in approaches.into_iter().chain(runs).chain(others) {
         let mut bits = Bits::default();
         phase.write(&mut bits);
-        // The value after the phase shows whether the phase was read to its end.
+        // The test writes a byte after the phase. If this byte is read correctly, the phase was read to its end.
         0xA5_u8.write(&mut bits);
         assert_eq!(Phase::read(&mut bits), phase);
         assert_eq!(u8::read(&mut bits), 0xA5, "{phase:?}");
@@ -35,7 +35,8 @@ fn j34_only_the_wait_before_the_approach_waits_for_the_joints() {
     assert!(!approaching(0.0, 1.0, None).waits());
 }
 
-/// The approach and the path continue until the controller accepts a Pause or a Stop. The approach continues from its first tick on.
+/// A motion goes on until the controller accepts a Pause or a Stop. An approach goes on only after its first tick,
+/// because the arm does not move before that.
 #[test]
 fn j75_a_motion_goes_on_until_a_pause_or_stop() {
     for leave in LEAVES {

@@ -34,7 +34,8 @@ fn has_inertia(controller: &Controller<[RawPoint; 4]>) -> bool {
     controller.motion.ramp.inertia() != [0.0; JOINTS]
 }
 
-/// Joint 3 is at its torque limit in 50 of every 100 ms, which neither ends the reaction nor is too long without interruption.
+/// The path may be held back for 5 s in total. Joint 3 is at its torque limit for 50 ms in every 100 ms. This is too
+/// often to end the slow motion, but too short to stop the arm, so only the total time stops the arm.
 #[test]
 fn j75_a_path_that_is_held_back_for_too_long_is_a_stop_of_the_joint_at_its_limit() {
     for (before_ms, stops) in [(RUN_MS - 1, false), (RUN_MS, true)] {
@@ -55,7 +56,8 @@ fn j75_a_path_that_is_held_back_for_too_long_is_a_stop_of_the_joint_at_its_limit
     }
 }
 
-/// The maximum position error is 0.5 rad, so a joint lags if its position error is above 0.25 rad. The set position of joint 5 is 0.
+/// Joint 5 lags if its position error is above 0.25 rad, half of its maximum of 0.5 rad. The set position of joint 5
+/// is 0.
 #[test]
 fn j75_a_joint_that_lags_while_the_path_is_held_back_stops_the_arm() {
     let error = joint_error::POSITION_ERROR;
@@ -65,9 +67,9 @@ fn j75_a_joint_that_lags_while_the_path_is_held_back_stops_the_arm() {
         (0.26, false, None, true, [0, 0, 0, 0, error, 0]),
         (-0.26, false, None, true, [0, 0, 0, 0, error, 0]),
         (0.25, true, None, true, [0; JOINTS]),
-        // A joint that was at its torque limit is also a cause of the stop.
+        // Joint 3 was also at its torque limit, so both joints are causes of the stop.
         (0.26, true, None, true, [0, 0, joint_error::TORQUE, 0, error, 0]),
-        // The arm already stops, or the path is not held back.
+        // The arm does not stop for joint 5 if it already stops, or if the path is not held back.
         (0.26, true, Some(TrajectoryState::Stop), true, [0; JOINTS]),
         (0.26, false, None, false, [0; JOINTS]),
     ] {
@@ -94,7 +96,8 @@ fn j75_a_joint_that_lags_while_the_path_is_held_back_stops_the_arm() {
     }
 }
 
-/// The arm stands on the path if the clock of its present motion is slower than 0.02. The clock of the approach differs from path time.
+/// The arm counts as standing if the clock of its present motion runs at a rate below 0.02. An approach has its own
+/// clock, so the rate of path time does not matter during an approach.
 #[test]
 fn j75_the_clock_of_the_present_motion_shows_whether_the_arm_stands() {
     let approach = |clock| Phase::Approaching { from: [0.0; JOINTS], length_ms: 500.0, clock, leave: None };
@@ -118,7 +121,8 @@ fn j75_the_clock_of_the_present_motion_shows_whether_the_arm_stands() {
     }
 }
 
-/// The ramp back to the normal rate begins 200 ms after the last joint has left its torque limit. Its bounds need the inertia of the arm.
+/// The ramp back to the normal rate begins 200 ms after the last joint has left its torque limit. The controller
+/// computes the inertia of the arm in this tick, because the bounds of the ramp depend on it.
 #[test]
 fn j75_the_inertia_is_computed_when_the_path_returns_to_its_rate() {
     for (quiet_ms, returns) in [(QUIET_MS - 2, false), (QUIET_MS - 1, true)] {
@@ -134,7 +138,8 @@ fn j75_the_inertia_is_computed_when_the_path_returns_to_its_rate() {
     }
 }
 
-/// The bounds of the rate need the inertia of the arm from the first tick on. The next tick uses this inertia, and has no time for another.
+/// When the path begins to be held back, the controller computes the inertia of the arm, because the bounds of the
+/// rate need it at once. In the next tick, the inertia is known and is not computed again.
 #[test]
 fn j75_the_inertia_is_computed_when_the_path_begins_to_be_held_back() {
     let mut controller = held_back();
@@ -144,7 +149,8 @@ fn j75_the_inertia_is_computed_when_the_path_begins_to_be_held_back() {
     assert!(controller.hold_back() && !has_inertia(&controller));
 }
 
-/// A change of the override begins a ramp, whose bounds need the inertia of the arm. Without a change, or at standstill, no ramp begins.
+/// A change of the speed override in motion begins a ramp, and the controller computes the inertia of the arm for its
+/// bounds. If the override does not change, or if the arm is at rest, no ramp begins.
 #[test]
 fn j57_the_inertia_is_computed_when_the_speed_changes_in_motion() {
     for (clock, speed, ramps) in [
@@ -163,8 +169,9 @@ fn j57_the_inertia_is_computed_when_the_speed_changes_in_motion() {
     }
 }
 
-/// Joint 1 moves along the path, and its torque is a tenth above its limit. The slope that removes this excess is −0.1·limit/(M·v), and the
-/// slope of path time covers a tenth of the difference in one tick. At full speed without an overload, the rate does not change.
+/// Joint 1 moves along the path with the inertia M at the velocity v. Its torque is a tenth above its limit, so the
+/// slope −0.1·limit/(M·v) of the rate would remove this excess. In one tick, the slope changes by a tenth of this
+/// value. At full speed without an overload, the rate does not change.
 #[test]
 fn j75_a_path_at_full_speed_slows_down_while_it_is_held_back() {
     for held in [false, true] {

@@ -11,8 +11,9 @@ fn stopped_at(held: f64) -> Controller<[RawPoint; 4]> {
     controller
 }
 
-/// With such a torque limit, no approach is possible. Before all joints are enabled, the controller does not know from which positions it
-/// will hold the arm, so it accepts Execute and checks the approach later.
+/// With a torque limit of 1e-6 N·m, no approach is possible. If all joints are held, the controller refuses Execute.
+/// If some joints are not enabled yet, the start positions are unknown, so the controller accepts Execute and checks
+/// the approach later.
 #[test]
 fn j34_an_impossible_approach_refuses_execute_only_if_all_joints_are_held() {
     for (torque_max, held, accepted) in
@@ -48,7 +49,8 @@ fn j34_j36_an_approach_does_not_leave_the_range_of_a_joint() {
     }
 }
 
-/// Path time begins to run when the arm is at the paused point, but not before the approach has ended.
+/// If the arm is already at the paused point, path time continues at once. If the arm is away from this point, path
+/// time waits until the approach has ended.
 #[test]
 fn j34_path_time_stands_until_the_arm_is_at_the_paused_point() {
     for (held, runs) in [(0.0, true), (0.01, false)] {
@@ -84,7 +86,8 @@ fn j34_j69_a_cancelled_approach_is_the_cause_of_the_stop() {
     }
 }
 
-/// While a payload is added to the model, the torque of the integral is not a load, even if the arm waits for its path.
+/// If the payload changes while the arm waits for the start of its path, the learned loads are cleared. The integral
+/// still holds the torque of the payload, so it does not show a load.
 #[test]
 fn j60_a_payload_that_is_added_before_the_path_clears_the_learned_loads() {
     for changes in [false, true] {
@@ -101,8 +104,8 @@ fn j60_a_payload_that_is_added_before_the_path_clears_the_learned_loads() {
     }
 }
 
-/// The approach adds the friction of its velocity. At its first tick, only the torque of the model may step, so the step of the friction is
-/// blended out.
+/// In the approach, the friction compensation begins. In the first tick, only the torque of the model may step, so
+/// the new friction torque is blended in.
 #[test]
 fn j44_the_friction_of_an_approach_begins_without_a_step() {
     let from = [0.02, 0.0, 0.0, 0.0, 0.0, 0.0];

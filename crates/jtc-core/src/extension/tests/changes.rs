@@ -48,7 +48,7 @@ fn j53_a_standing_arm_accepts_16_values_in_a_frame() {
     }
 }
 
-/// The speed override is not part of the arm. During a motion, the controller must change nothing else.
+/// The speed override can change in every state, and it does not change the hash of the arm.
 #[test]
 fn j52_j57_the_speed_does_not_change_the_hash_of_the_arm() {
     for state in [ControllerState::Operate, ControllerState::Init] {
@@ -60,7 +60,8 @@ fn j52_j57_the_speed_does_not_change_the_hash_of_the_arm() {
     }
 }
 
-/// Only a change of the payload is checked against the torque limits. In Init, other settings are checked when Init ends.
+/// If the host changes the payload, the controller checks it at once against the torque limits. Other settings in
+/// Init, such as gravity, are checked when Init ends.
 #[test]
 fn j60_only_a_payload_is_checked_against_the_torque_limits() {
     let mut bench = Bench::new();
@@ -96,7 +97,7 @@ fn j60_settings_with_an_unchanged_payload_do_not_begin_a_blend() {
     assert_eq!(bench.controller.config.payload.com, [0.0, 0.1, 0.0]);
 }
 
-/// The blend takes 500 ms. The first tick therefore adds 1/500 of the difference of the masses.
+/// The blend takes 500 ms, so the first tick adds 1/500 of the difference of the masses.
 #[test]
 fn j60_the_blend_adds_the_difference_of_the_masses() {
     for (before, after) in [(0.0, 1.5), (1.0, 1.5), (1.5, 0.5), (1.5, 0.0)] {
@@ -108,8 +109,9 @@ fn j60_the_blend_adds_the_difference_of_the_masses() {
     }
 }
 
-/// Six slices check the six tables. If the position range of a joint changes, the sixth slice also computes the inertia in the first of 17
-/// poses. The remaining 16 poses take 16 slices, and the last slice uses the settings.
+/// The controller checks the six friction tables in six slices. If the position range of a joint changes, the sixth
+/// slice also computes the inertia in the first of 17 poses. The remaining 16 poses take 16 slices, and the last
+/// slice applies the settings.
 #[test]
 fn j07_j53_tables_are_checked_one_in_each_slice() {
     let mut bench = Bench::new();
@@ -132,7 +134,8 @@ fn j23_the_pump_stops_when_nodes_are_configured_again() {
     }
 }
 
-/// A Stop or a Pause that arrives before the earlier frames is also a sign of its host.
+/// A Stop or a Pause on any line shows that a host is alive, even before the frames that arrived earlier have been
+/// processed.
 #[test]
 fn j59_an_urgent_command_of_any_line_ends_the_silence() {
     for line in [None, Some(0), Some(1)] {
@@ -148,7 +151,8 @@ fn j59_an_urgent_command_of_any_line_ends_the_silence() {
     }
 }
 
-/// J-33: the pause for silent hosts must not turn a Stop into a Pause, and must not change a path that is not executed.
+/// J-33: the silence of the hosts pauses a path that is executed. It does not turn a Stop into a Pause, and does not
+/// change a path that is not executed.
 #[test]
 fn j59_silent_hosts_pause_only_a_path_that_is_executed_and_not_stopped() {
     let (pause, stop) = (Some(TrajectoryState::Pause), Some(TrajectoryState::Stop));

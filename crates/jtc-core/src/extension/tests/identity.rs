@@ -10,7 +10,7 @@ use crate::config::defaults;
 fn j52_the_capabilities_are_those_of_the_board() {
     let always = capability::SETTINGS | capability::SPEED | capability::JOG | capability::PAYLOAD;
     let always = always | capability::STOP_CAUSE;
-    // Bits 0 and 2 to 4 and 6.
+    // Bits 0, 2, 3, 4 and 6 are always set.
     assert_eq!(always, 1 + 4 + 8 + 16 + 64);
     for (store, log, more) in [
         (StoreState::Absent, LogState::Absent, 0),
@@ -108,7 +108,8 @@ fn j56_points_are_read_from_the_requested_point() {
     }
 }
 
-/// The board may report a failure of an earlier start, or that the storage of the arm has ended well.
+/// The stored arm is discarded only if the board reports that writing this arm has failed. A failure without earlier
+/// writing, or the successful end of writing, does not discard it.
 #[test]
 fn j54_only_a_storage_that_failed_discards_the_stored_arm() {
     let (image, _) = other_arm();
@@ -128,7 +129,8 @@ fn j54_only_a_storage_that_failed_discards_the_stored_arm() {
     }
 }
 
-/// The image contains other settings, another name, a friction table and other gains. A value that is not finite makes it unusable.
+/// The image contains other settings, another name, a friction table and other gains. With a value that is not
+/// finite, the controller refuses the image and changes nothing.
 #[test]
 fn j54_an_image_that_is_refused_changes_nothing() {
     let (image, _) = other_arm();
@@ -147,7 +149,7 @@ fn j54_an_image_that_is_refused_changes_nothing() {
     }
 }
 
-/// A host can read the gains of the stored arm before it requests the parameters.
+/// After the stored arm was loaded, a host can read its gains, even before it has requested the parameters.
 #[test]
 fn j54_the_values_of_a_loaded_arm_are_kept_for_the_request() {
     let (image, _) = other_arm();

@@ -70,7 +70,8 @@ fn j58_each_condition_alone_refuses_a_jog() {
     }
 }
 
-/// Only a Jog with a velocity in a held stop starts the time in which the controller refuses Jogs.
+/// In a held stop, a Jog with a velocity is refused, and the following Jogs are refused for 200 ms. A Jog without a
+/// velocity, or a Jog that is refused for another reason, does not start this time.
 #[test]
 fn j58_a_pressed_key_in_a_held_stop_is_refused_for_200_ms_more() {
     for (stop, velocity, refused_ms) in [
@@ -131,7 +132,8 @@ fn j53_a_jog_of_an_absent_joint_is_refused() {
     }
 }
 
-/// A Jog without a velocity does not begin a motion, so it does not continue the time in which the controller refuses Jogs.
+/// The remaining time in which Jogs are refused is 7 ms. A Jog with a velocity is refused and sets this time to 200
+/// ms. A Jog without a velocity is accepted, because it starts no motion.
 #[test]
 fn j58_a_jog_without_a_velocity_is_accepted_while_jogs_are_refused() {
     for (velocity, expected, refused_ms) in
@@ -145,7 +147,8 @@ fn j58_a_jog_without_a_velocity_is_accepted_while_jogs_are_refused() {
     }
 }
 
-/// The end of a jog changes the commanded velocities, but no acceleration limit and no inertia.
+/// A Jog without a velocity ends the jog. The acceleration limits of the jog and the inertia of the arm do not
+/// change.
 #[test]
 fn j58_a_jog_without_a_velocity_ends_the_jog() {
     let mut bench = held();
@@ -158,7 +161,8 @@ fn j58_a_jog_without_a_velocity_ends_the_jog() {
     assert!(bench.controller.motion.set.jog_ends());
 }
 
-/// With 0.01 N·m in each joint, no torque remains for a motion.
+/// The torque limit of each joint is 0.01 N·m, so no torque remains for a motion. A new jog is refused, and an active
+/// jog ends.
 #[test]
 fn j58_a_jog_for_which_no_torque_remains_is_refused_or_ends() {
     for (jogs, expected) in [(false, DataStatus::NotAllowed), (true, DataStatus::NoError)] {
@@ -172,13 +176,13 @@ fn j58_a_jog_for_which_no_torque_remains_is_refused_or_ends() {
     }
 }
 
-/// The start of a jog changes the control mode, so a torque of friction (8 N·m) that ends with the last mode is blended out. A Jog that
-/// continues the jog does not change the mode.
+/// The last torque contains 8 N·m of friction. The start of a jog changes the control mode, so these 8 N·m are
+/// blended out. If a jog is already active, a further Jog does not change the mode and blends nothing.
 #[test]
 fn j44_a_jog_begins_without_a_torque_step() {
     for (jogs, blended) in [(false, 8.0), (true, 0.0)] {
         let mut bench = held();
-        // The first tick completes the change of the mode at the start of the controller.
+        // This tick completes the mode change that the start of the controller has prepared.
         bench.controller.control(ControlMode::Hold);
         if jogs {
             bench.controller.motion.set.jog(&[0.1; JOINTS], &[1.0; JOINTS], &Config::avena());
@@ -191,7 +195,7 @@ fn j44_a_jog_begins_without_a_torque_step() {
     }
 }
 
-/// J-04: the controller received this Jog before a Stop or a Pause.
+/// J-04: a Jog that arrived before a Stop or a Pause does not move the arm.
 #[test]
 fn j04_j58_an_overtaken_jog_does_not_move_the_arm() {
     let mut frame = [0; 30];
@@ -205,7 +209,7 @@ fn j04_j58_an_overtaken_jog_does_not_move_the_arm() {
     }
 }
 
-/// J-53: live settings that affect the torque may change only while the arm stands.
+/// J-53: live settings that affect the torque are refused while the arm moves or yields.
 #[test]
 fn j53_an_arm_that_moves_or_yields_does_not_stand() {
     let changes: [Change; 6] = [

@@ -31,7 +31,7 @@ fn j53_disable_is_for_an_arm_that_is_held_at_rest_or_not_held() {
             assert_eq!(bench.controller.state, next);
         }
     }
-    // During a jog, the arm does not count as at rest.
+    // During a jog the arm does not count as at rest, so Disable is refused.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.force(ControllerState::HoldPos);
@@ -116,7 +116,8 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         for _ in 0..520 {
             hold(&mut bench.controller);
             position = bench.controller.motion.set.point.position;
-            // The joint may still become slightly faster, because its acceleration must first change its sign.
+            // The joint may still become faster by up to 0.1 rad/s, because its acceleration cannot change its sign
+            // at once.
             assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");
         }
         assert!(!bench.controller.motion.set.jogging() && position[2] > 0.0);

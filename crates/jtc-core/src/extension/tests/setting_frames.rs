@@ -50,7 +50,7 @@ fn j53_settings_change_whole_and_without_torque_only() {
     }
 }
 
-/// In the tick after the change, the torque of the model uses the new gravity.
+/// After the change, the model torque uses the new gravity.
 #[test]
 fn j53_gravity_that_is_set_is_computed_with() {
     let mut bench = Bench::new();
@@ -109,8 +109,9 @@ fn j07_j53_settings_in_motion_are_few() {
     }
 }
 
-/// A setting of the arm in a frame with a payload is accepted or refused like a setting in a separate frame. The speed override may change
-/// together with the payload.
+/// A payload is accepted in every state in which the arm is at rest. A frame that also contains a setting of the arm
+/// is accepted only in a state in which this setting may change. The speed override may change together with the
+/// payload.
 #[test]
 fn j53_j60_a_payload_is_set_wherever_the_arm_stands() {
     for (state, stands, bare) in [

@@ -70,7 +70,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "it is busy");
 }
 
-/// The controller loads an image only if it would also accept the arm frame by frame.
+/// The controller loads an image only if it would also accept the same values in single frames.
 #[test]
 fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     let mut bench = Bench::new();
@@ -85,15 +85,16 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
             let before = bench.info(0);
             if bench.controller.load_arm(&image) {
                 if bench.asks_for_defaults().contains(&DataStatus::IncorrectValue) {
-                    // The joints of this arm have too little inertia for its gains (J-71), so the controller does not hold the arm.
+                    // The controller refuses the parameters of this arm, because its joints have too little inertia
+                    // for its gains (J-71).
                     let (own, config) = (&bench.controller.parameters, &bench.controller.config);
                     assert!(own.gains_were_too_much(config), "byte {at}");
                     assert_ne!(own.missing(), 0, "byte {at}");
                     continue;
                 }
                 let info = bench.info(0);
-                // If the flipped bit makes one setting a duplicate of another, and the missing setting has its default value, the arm is
-                // unchanged.
+                // One bit may change the number of a setting to the number of another setting. If the replaced
+                // setting had its default value, the arm is unchanged.
                 let same = bench.controller.config() == &Config::avena();
                 assert!(info.hash != hash || at >= image.len() - 32 || same, "byte {at}");
                 assert!(bench.controller.config.check().is_ok());

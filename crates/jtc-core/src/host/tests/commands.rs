@@ -53,7 +53,7 @@ fn j69_parameters_are_refused_while_a_joint_yields() {
     }
 }
 
-/// A clear of nodes alone does not allow a joint to end its yield.
+/// ClearCurrentErrors with node bits only does not end the yield of a joint.
 #[test]
 fn j69_a_clear_of_nodes_does_not_end_a_yield() {
     let mut controller = holding();
@@ -63,7 +63,8 @@ fn j69_a_clear_of_nodes_does_not_end_a_yield() {
     assert_eq!(format!("{:?}", controller.motion.law), before);
 }
 
-/// The clear has an effect on joint 1, so the controller accepts it, although the fault of joint 2 stays.
+/// The clear succeeds for one of the two faulty joints, so the controller accepts it, although the fault of the other
+/// joint stays.
 #[test]
 fn j21_a_clear_of_one_of_two_faulty_joints_is_accepted() {
     for (nodes, expected) in [(0x01, Ok(())), (0x40, Err(DataStatus::NotAllowed))] {
@@ -115,8 +116,8 @@ fn j52_commands_that_are_refused_do_not_clear_the_hash() {
     }
 }
 
-/// Before the change, the learned load is 0 N·m, although the integral holds 4 N·m. While no load is learned, the integral counts as the load.
-/// A load of 4 N·m therefore shows that the learned load was cleared.
+/// The learned load is 0 N·m, and the integral holds 4 N·m. While no load is learned, the integral counts as the
+/// load. A load of 4 N·m therefore shows that the learned load was cleared.
 #[test]
 fn j60_j66_only_an_accepted_model_under_torque_clears_the_learned_loads() {
     let unfinished = || SliceOutcome::Unfinished(SliceProgress::Begin);

@@ -17,7 +17,8 @@ fn send(controller: &mut Bench, number: u8, plain: bool, overtaken: bool) -> Res
     }
 }
 
-/// The host of a plain line repeats segment 0 until it is accepted, and does not send a Stop before that.
+/// On a plain line, the host repeats segment 0 until it is accepted, and sends no Stop before. Therefore segment 0
+/// stops the path.
 #[test]
 fn j30_segment_0_on_a_plain_line_stops_a_path() {
     let stop = Some(TrajectoryState::Stop);
@@ -30,8 +31,8 @@ fn j30_segment_0_on_a_plain_line_stops_a_path() {
     }
 }
 
-/// A Stop that arrived after segment 0 refuses the upload. On a plain line, the host can complete the upload, but the controller does not
-/// execute it.
+/// A Stop arrives after segment 0. The controller refuses the upload. On a plain line, it accepts all segments
+/// instead and refuses Execute.
 #[test]
 fn j30_a_stop_after_segment_0_refuses_the_upload_or_its_execution() {
     let not_allowed = Err(DataStatus::NotAllowed);
@@ -49,7 +50,8 @@ fn j30_a_stop_after_segment_0_refuses_the_upload_or_its_execution() {
     }
 }
 
-/// The line of segment 0 was plain, so its host can complete the upload. The later segment comes after an extension request.
+/// Segment 0 came on a plain line, so a Stop does not refuse the later segment, although the host has used an
+/// extension since then. The controller refuses Execute instead.
 #[test]
 fn j30_j51_a_stop_does_not_refuse_a_later_segment_of_an_upload_that_began_plain() {
     let mut controller = holding();
@@ -60,7 +62,7 @@ fn j30_j51_a_stop_does_not_refuse_a_later_segment_of_an_upload_that_began_plain(
     assert_eq!(controller.execute(ExecCommand::Execute), Err(DataStatus::NotAllowed));
 }
 
-/// The Stop arrives between the check and the copy of segment 0.
+/// A Stop that arrives between the check and the copy of segment 0 drops the upload.
 #[test]
 fn j30_a_stop_drops_an_upload_whose_segment_0_is_copied() {
     for (stops, expected) in [(false, Ok(())), (true, Err(DataStatus::NotAllowed))] {
@@ -85,7 +87,7 @@ fn j30_a_stop_drops_an_upload_whose_segment_0_is_copied() {
     }
 }
 
-/// The violation belongs to the upload in which the check has found it.
+/// A violation that the check found in one upload is cleared by segment 0 of the next upload.
 #[test]
 fn j36_a_new_upload_is_not_refused_for_the_last_violation() {
     let violation =

@@ -17,8 +17,8 @@ fn take_model(parameters: &mut HostParameters, at: Option<&[f64; JOINTS]>, confi
     panic!("the model needs too many slices")
 }
 
-/// Gains that need more inertia than any joint has. The derivative acts at least 3 ms late, so a Kd of 1e6 N·m·s/rad needs more than
-/// 0.75 · 0.003 s · 1e6 N·m·s/rad, which is over 2000 kg·m².
+/// Returns gains that need more inertia than any joint has. The derivative torque is delayed by at least 3 ms. A Kd
+/// of 1e6 N·m·s/rad therefore needs more than 0.75 · 0.003 s · 1e6 N·m·s/rad, which is over 2000 kg·m².
 fn too_stiff() -> [PidGains; JOINTS] {
     defaults::PID.map(|gains| PidGains { kd: 1e6, ..gains })
 }
@@ -55,7 +55,8 @@ fn j71_gains_are_borne_only_by_a_known_inertia_that_is_high_enough() {
     assert!(!parameters.gains_are_borne(&config));
 }
 
-/// The torque limits of 0.01 N·m cannot hold the arm, whose gravity acts sideways. The refused model does not make the inertia known.
+/// Gravity acts sideways, and torque limits of 0.01 N·m cannot hold the arm, so the model is refused. The inertia of
+/// a refused model is not used.
 #[test]
 fn j71_a_refused_model_does_not_change_the_inertia() {
     let mut config = Config::avena();
@@ -87,7 +88,8 @@ fn j71_settings_that_affect_the_inertia_make_the_controller_compute_it_again() {
         let outcome = parameters.look_again(SliceProgress::Begin, config, &before);
         assert_eq!(matches!(outcome, SliceOutcome::Unfinished(SliceProgress::Pose(1))), again, "{name}");
         assert_eq!(matches!(outcome, SliceOutcome::Done), !again, "{name}");
-        // Without a model, the inertia is not known any longer. The controller checks the model when the host sends it again.
+        // After the model was withdrawn, the inertia is not computed. The controller checks the model when the host
+        // sends it again.
         parameters.withdraw_model();
         let outcome = parameters.look_again(SliceProgress::Begin, config, &before);
         assert!(matches!(outcome, SliceOutcome::Done), "{name}");
@@ -95,7 +97,8 @@ fn j71_settings_that_affect_the_inertia_make_the_controller_compute_it_again() {
     }
 }
 
-/// The torque of gravity is zero before the change, so the torque limit decides. A joint may need its whole torque limit.
+/// Without gravity, the joints need no torque before the change. After the change, each joint may need exactly its
+/// torque limit, but not more.
 #[test]
 fn j60_a_payload_may_need_the_whole_torque_limit() {
     let at = [0.0; JOINTS];
@@ -130,7 +133,8 @@ fn j60_without_torque_the_model_contains_the_whole_payload() {
     assert_eq!((parameters.blend_left_ms(), parameters.next_mass()), (0, 0.0));
 }
 
-/// A polynomial that is not in use need not be within the bounds. The polynomial of 1e6 N·m is above the torque limit of every joint.
+/// The friction polynomial of 1e6 N·m exceeds the torque limit of every joint. The settings are refused only if the
+/// polynomial is in use, not if a friction table is in use.
 #[test]
 fn j53_settings_need_not_fit_a_polynomial_that_is_not_in_use() {
     let config = Config::avena();

@@ -2,7 +2,7 @@
 use super::*;
 use crate::config::defaults;
 
-/// Returns the next number of a count, so that every value of the parameters is different.
+/// Returns the next whole number, so that every parameter in a test has a different value.
 fn next(count: &mut f64) -> f64 {
     *count += 1.0;
     *count

@@ -27,8 +27,8 @@ struct Arm {
 }
 
 impl Arm {
-    /// Creates a held arm. The controller compares measurements with the set values of the same tick, so that one tick shows the result of
-    /// the control law.
+    /// Creates a held arm without a measurement delay. Measurements are then compared with the set values of the same
+    /// tick, so that one tick shows the result of the control law.
     fn held(gains: PidGains) -> Self {
         let config = Config { delay_ticks: 0, ..Config::avena() };
         let mut motion = Motion::default();
@@ -39,7 +39,8 @@ impl Arm {
         Self { config, dynamics, pid: [gains; JOINTS], polynomial, table: None, motion }
     }
 
-    /// Executes a tick at the pose, with the measured `velocity` (rad/s) of all joints. Returns the torques and the findings.
+    /// Executes a tick in the pose `POSE`, with the measured `velocity` (rad/s) of all joints. Returns the torques
+    /// and the findings of the limiter.
     fn tick(&mut self, mode: ControlMode, braking: bool, velocity: f64) -> ([f64; JOINTS], [Found; JOINTS]) {
         self.tick_of(mode, braking, &Nodes::enabled_at(POSE, [velocity; JOINTS]))
     }
@@ -66,7 +67,8 @@ impl Arm {
 
 const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_max: 1.0 };
 
-/// In HoldPos, velocity, acceleration and friction do not act even if the set values move while a joint comes to rest.
+/// In HoldPos, the commanded velocity and acceleration and the friction do not affect the torque, even if the set
+/// values move while a joint comes to rest.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
     for mode in MODES {
@@ -85,7 +87,7 @@ fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_onl
     }
 }
 
-/// A path cannot use this friction table, but the controller can hold the arm with it.
+/// A friction table without standstill causes an error on a path, but not while the arm is held.
 #[test]
 fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
     for (mode, error) in
@@ -131,7 +133,8 @@ fn j25_a_load_that_nobody_has_found_is_not_carried() {
     assert_eq!(arm.motion.law.torque.map(|torque| torque.load), [0.0; JOINTS]);
 }
 
-/// While the integral releases torque, the controller cannot learn a load. The controller does not learn a load for absent joints.
+/// Teaching needs the load of every joint that is held. No load is known while the integral releases torque. Absent
+/// joints need no known load.
 #[test]
 fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     let mut arm = taught(&[1.0; JOINTS]);
@@ -139,8 +142,8 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     law.torque = Default::default();
     law.torque.iter_mut().for_each(|torque| torque.pid.i = 1.0);
     assert!(law.knows_loads(&[true; JOINTS], config, false));
-    // A person leans on joint 2, or the integral of joint 2 has not settled. The highest permitted feedback torque is 0.04 times 180 N·m,
-    // which is 7.2 N·m.
+    // A person leans on joint 2, or its integral has not settled. The highest permitted feedback torque is 0.04 · 180
+    // N·m = 7.2 N·m.
     for (p, known) in [(7.1, true), (-7.1, true), (7.3, false), (-7.3, false)] {
         law.torque[1].pid.p = p;
         assert_eq!(law.knows_loads(&[true; JOINTS], config, false), known, "{p} N·m");
@@ -169,7 +172,8 @@ fn j25_above_the_tool_speed_limit_every_joint_is_braked_harder() {
     let (off, below, at, twice) =
         (brakes(0.0), brakes(1.01 * speed), brakes(speed / 1.5), brakes(0.5 * speed));
     assert_eq!(off, below);
-    // Joints 4 to 6 already have the highest damping that their inertia tolerates.
+    // Only joints 1 to 3 get more damping. Joints 4 to 6 already have the highest damping that their inertia
+    // tolerates.
     for j in 0..JOINTS {
         assert!(off[j] < 0.0 && at[j] <= off[j] && twice[j] <= at[j], "joint {}: {off:?} {at:?}", j + 1);
         assert!(j > 2 || twice[j] < off[j], "joint {}: {off:?} {twice:?}", j + 1);
@@ -192,7 +196,8 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     }
 }
 
-/// In each of these cases, gravity exceeds the torque limit of joint 2. The motion of the joint decides whether this overload is an error.
+/// Gravity exceeds the torque limit of joint 2. This overload is not an error if the torque stops the joint. It is an
+/// error if the torque drives the joint.
 #[test]
 fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
     let along = Arm::held(NONE).dynamics.gravity_torque(&POSE)[1].signum();
@@ -202,14 +207,15 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         (ControlMode::Hold, true, false, false, 0.0, false),
         (ControlMode::Follow, true, false, false, 0.0, true),
         (ControlMode::Hold, false, true, false, 0.0, false),
-        // Torque against the motion stops the joint. Torque along the motion accelerates the joint.
+        // A torque against the motion stops the joint and is permitted. A torque along the motion drives the joint,
+        // and is an error at more than 0.05 rad/s.
         (ControlMode::Hold, true, false, false, -0.06, false),
         (ControlMode::Hold, true, false, false, 0.06, true),
         (ControlMode::Hold, false, true, false, 0.06, true),
         (ControlMode::Hold, true, false, false, DRIVEN, false),
         (ControlMode::Hold, true, false, true, 0.06, false),
     ] {
-        // Without a position error, a set position does not sag.
+        // Gains of zero and no position error: the set position does not sag during a catch.
         let mut arm = Arm::held(NONE);
         arm.config.joints[1].torque_max = 10.0;
         let limits = arm.config.joints[1];
@@ -257,8 +263,7 @@ fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
     assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
 }
 
-/// The braking torque is the requested torque, or the part of this torque that the torque limit allows. The braking torque never has the
-/// opposite sign.
+/// The braking torque is reduced to the part that the torque limit leaves. It never changes its sign.
 #[test]
 fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     for (wanted, torque, taken) in [
@@ -277,7 +282,8 @@ fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     }
 }
 
-/// A joint that is not enabled yet may have any position and speed. The limits do not apply to such a joint.
+/// The limits do not apply to a joint that is not enabled, which may have any position and speed. Its torque and its
+/// braking torque are zero, and it has no error.
 #[test]
 fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
     let off = 3;
@@ -292,7 +298,8 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
         let nodes = Nodes::enabled_at(POSE, [velocity; JOINTS]).with_torque_off(off);
         if mode == ControlMode::Teach {
-            // Before the first braking torque, Teaching computes the inertia of the arm and of each joint.
+            // The first ticks of Teaching compute the inertia of the arm and of each joint. Teaching brakes only
+            // after them.
             (0..10).for_each(|_| {
                 arm.tick_of(mode, false, &nodes);
             });

@@ -19,7 +19,7 @@ mod tool_speed;
 const LIMIT: f64 = 100.0;
 const PID: [PidGains; JOINTS] = [PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: 0.0, int_max: 0.0 }; JOINTS];
 
-/// Arm at rest, with joint settings that are simple numbers.
+/// Arm at rest, whose joint settings are round numbers.
 struct Bench {
     config: Config,
     model: ArmModel,
@@ -81,8 +81,9 @@ impl Bench {
         self
     }
 
-    /// Attaches a mass (kg) to the link of joint 1, 1 m from the axis. Gravity acts in the direction of −y, and the mass is on the x axis at
-    /// position 0. So the holding torque of joint 1 is 10 N·m per kg, multiplied by the cosine of its position.
+    /// Attaches a mass (kg) to the link of joint 1, 1 m from the axis. Gravity acts in the direction of −y. At
+    /// position 0 the mass is on the x axis, so the holding torque of joint 1 is 10 N·m per kg times the cosine of
+    /// its position.
     fn mass(mut self, mass: f64) -> Self {
         (self.model.links[1].mass, self.model.links[1].origin.xyz) = (mass, [1.0, 0.0, 0.0]);
         self
@@ -94,7 +95,7 @@ impl Bench {
         self
     }
 
-    /// Calls a function of the motion with the inputs that the controller uses for an approach and for a jog.
+    /// Calls a function of the motion with the same inputs that the controller uses.
     fn ask<R>(&self, function: impl FnOnce(&Motion, &LawInputs<'_>) -> R) -> R {
         let (nodes, dynamics) =
             (Nodes::new(&Config::avena()), Dynamics::new(&self.model, self.config.gravity));
@@ -122,7 +123,7 @@ impl Bench {
     }
 }
 
-/// Returns values for all joints, with these values for the first two joints and zero for the others.
+/// Returns values for all joints: the two given values for joints 1 and 2, and zero for the others.
 fn two(first: f64, second: f64) -> [f64; JOINTS] {
     [first, second, 0.0, 0.0, 0.0, 0.0]
 }
@@ -156,8 +157,8 @@ fn j34_the_approach_takes_the_time_of_its_ramp_speed_or_acceleration() {
     }
 }
 
-/// Returns an arm whose approach of 1 rad takes `ramp_ms` if the torque is sufficient. With `left` N·m for the acceleration, the approach
-/// takes 3 s: 5.774/3² · inertia = left.
+/// Returns an arm whose approach of 1 rad takes 3 s if `left` N·m remain for the acceleration: 5.774/3² · inertia =
+/// left. Without a torque limit, the approach takes `ramp_ms`.
 fn three_seconds(ramp_ms: u16, left: f64) -> Bench {
     let mut bench = Bench::new().inertia(&[(0, 0, 9.0 * left / 5.774)]);
     bench.config.ramp_ms = ramp_ms;
@@ -165,21 +166,23 @@ fn three_seconds(ramp_ms: u16, left: f64) -> Bench {
     bench
 }
 
-/// The approach uses 80 % of the torque limit. If that is more, the approach uses the holding torque and half of the remaining torque. The
-/// friction is that of the top speed of the shortest approach: 1.875 · 1 rad / 2 s = 0.9375 rad/s.
+/// An approach may use 80 N·m of the limit of 100 N·m, or the holding torque plus half of the remaining torque if
+/// this is more. The friction is computed at the top speed of the fastest approach, 1.875 · 1 rad / 2 s = 0.9375
+/// rad/s. In each row, the result is the torque that remains for the acceleration.
 #[test]
 fn j34_the_approach_uses_the_torque_that_holding_and_friction_leave() {
     for (held, viscous, way, left) in [
         (0.0, 0.0, 1.0, 80.0),
-        // 80 − 32 · 0.9375 = 50, for both directions of the motion.
+        // 80 N·m minus the friction of 32 · 0.9375 = 30 N·m leave 50 N·m, in both directions of the motion.
         (0.0, 32.0, 1.0, 50.0),
         (0.0, 32.0, -1.0, 50.0),
-        // 80 − 50 = 30, because half of the remaining torque is only 25 N·m.
+        // 80 N·m minus the holding torque of 50 N·m leave 30 N·m. Half of the remaining 50 N·m would be only 25 N·m.
         (50.0, 0.0, 1.0, 30.0),
         // (70 + 15) − 70 = 15.
         (70.0, 0.0, 1.0, 15.0),
         (-70.0, 0.0, 1.0, 15.0),
-        // (80 + 10) − 80 = 10, and friction against the holding torque does not increase the demand.
+        // The holding torque of 80 N·m plus half of the remaining 20 N·m allow 90 N·m, which leaves 10 N·m. Friction
+        // that helps to hold the load leaves the same torque.
         (80.0, 0.0, 1.0, 10.0),
         (-80.0, 3.2, 1.0, 10.0),
         (80.0, 3.2, -1.0, 10.0),
@@ -212,22 +215,24 @@ fn j34_a_joint_without_remaining_torque_prevents_only_the_approaches_that_need_i
     }
 }
 
-/// Friction of 80 N·m leaves exactly 0 N·m of the torque of an approach, at every speed.
+/// Friction of 80 N·m at every speed leaves exactly 0 N·m for an approach, so no approach is possible.
 #[test]
 fn j34_an_approach_is_not_possible_if_friction_needs_all_of_its_torque() {
     let bench = three_seconds(2_000, 1.0);
     assert_eq!(bench.friction(80.0, 0.0).approach_ms(1.0), None);
 }
 
-/// The speed and acceleration limits allow an approach of 1 s. The torque limits may add exactly 2 s. The friction is 45 − 8·v or 48·v, with
-/// a top speed v of 1.875 rad/s (1 s) or 0.625 rad/s (3 s).
+/// The speed and acceleration limits allow an approach of 1 s, and the torque limits may add at most 2 s. With the
+/// top speed v, the friction is 45 − 8·v or 48·v. The top speed is 1.875 rad/s for 1 s, and 0.625 rad/s for 3 s.
 #[test]
 fn j34_the_torque_limits_may_lengthen_the_approach_by_two_seconds() {
     assert_eq!(5.774 * (9.0 * 50.0 / 5.774), 450.0, "the time of 3 s is exact");
     for (coulomb, viscous) in [
-        // With the friction at 1 s, 80 − 30 = 50 N·m remain, which allow 3 s. The friction at 3 s (40 N·m) is not used.
+        // The friction of the fastest approach (1 s) is 30 N·m, which leaves 50 N·m for an approach of 3 s. The
+        // friction of the slowest approach (40 N·m at 3 s) is not used.
         (45.0, -8.0),
-        // The friction at 1 s (90 N·m) leaves nothing. The friction at 3 s leaves 80 − 30 = 50 N·m, which allow 3 s.
+        // The friction of the fastest approach (90 N·m at 1 s) leaves no torque. The friction of the slowest approach
+        // (30 N·m at 3 s) leaves 50 N·m, which allow 3 s.
         (0.0, 48.0),
     ] {
         let bench = three_seconds(1_000, 50.0).friction(coulomb, viscous);
@@ -235,7 +240,7 @@ fn j34_the_torque_limits_may_lengthen_the_approach_by_two_seconds() {
         let heavier = three_seconds(1_000, 50.1).friction(coulomb, viscous);
         assert_eq!(heavier.approach_ms(1.0), None, "{coulomb}");
     }
-    // Without friction, the approach takes less than 3 s: the square root of 450/80 is 2.3717.
+    // Without friction, 80 N·m allow an approach of √(450/80) s = 2.3717 s.
     let time = three_seconds(1_000, 50.0).approach_ms(1.0).unwrap();
     assert!((time - 2_371.7).abs() < 0.1, "{time}");
 }
@@ -247,7 +252,8 @@ fn j58_the_holding_torque_contains_the_load_or_the_integral() {
         // Before the controller has learned the load, the integral counts as the load.
         assert_eq!(Bench::new().mass(1.0).integral(0, integral).standing(), torque, "{integral}");
     }
-    // Known load of zero. If gravity plus the load and gravity plus the integral have the same size, the load counts.
+    // The known load is zero. If gravity plus the load and gravity plus the integral have the same magnitude, the
+    // load counts.
     for (integral, torque) in [(0.0, 10.0), (5.0, 15.0), (-5.0, 10.0), (-20.0, 10.0), (-21.0, -11.0)] {
         let mut bench = Bench::new().mass(1.0).integral(0, integral);
         bench.motion.law.find_loads_for_test();
@@ -255,7 +261,8 @@ fn j58_the_holding_torque_contains_the_load_or_the_integral() {
     }
 }
 
-/// While the integral releases the torque of a configured payload, this torque is also a part of gravity and must not count twice.
+/// While the integral releases the torque of a configured payload, the model already contains this torque. It must
+/// not count twice, so the holding torque is gravity alone.
 #[test]
 fn j60_gravity_alone_holds_the_arm_while_the_integral_releases_torque() {
     for (ms, torque) in [(0, 15.0), (1, 10.0), (3_000, 10.0)] {

@@ -10,23 +10,23 @@ use crate::interpolation::smooth;
 use crate::motion::load::Load;
 use crate::motion::soft_end::SOFT_END;
 
-/// Speeds of a joint in the direction of its load torque (rad/s) at which the acting share begins to fall and at which it is zero. `DRIVES`
-/// applies to a joint with little damping, which is fast before its speed is measured. `DAMPED` is added to `DRIVES` if the damping of the
-/// joint balances the load.
+/// Speeds of a joint in the direction of its load torque, rad/s. At the first speed, the acting share of the load
+/// begins to fall. At the second speed, it is zero. `DRIVES` applies to a joint with little damping, which
+/// accelerates quickly before the controller measures its speed. If the damping balances the load, `DAMPED` is added.
 const DRIVES: (f64, f64) = (0.03, 0.15);
 const DAMPED: (f64, f64) = (0.17, 0.35);
-/// Time constants of the acting share, s. The acting share falls with the first time constant and returns with the second. If the joint
-/// moves against its load torque, the acting share returns with the third time constant.
+/// Time constants of the acting share of the load, s. The share falls with `FALLS_S` and returns with `RETURNS_S`. If
+/// the joint moves against its load torque, the share returns with `CATCHES_S`.
 const FALLS_S: f64 = 0.006;
 const RETURNS_S: f64 = 0.3;
 const CATCHES_S: f64 = 0.05;
 /// Lowest speed at which the load may drive a joint, rad/s.
 const MOVES: f64 = 0.1;
-/// Range of the torque of damping and friction against a motion, as a share of the acting load torque. Within this range, the acting load
+/// Range of the torque of damping and friction, as a share of the acting load torque. Within this range, the load
 /// torque alone explains the motion.
 const EXPLAINED: (f64, f64) = (0.8, 1.3);
-/// Removed torque above which the controller considers this torque missing if the joint sinks, as a share of the highest load torque of the
-/// joint.
+/// Least torque of a removed mass, as a share of the highest load torque of the joint, at which a sinking joint shows
+/// that this mass is missing.
 const MISSED: f64 = 0.1;
 
 /// State of the load of a joint in Teaching.
@@ -34,12 +34,12 @@ const MISSED: f64 = 0.1;
 pub(super) struct Carried {
     /// Torque that is not explained by a mass at the flange, N·m.
     pub rest: f32,
-    /// Highest load torque that may act in Teaching, N·m. The limit of the load torque is the learned torque or the highest torque that the
-    /// controller may learn, whichever is higher.
+    /// Highest load torque that may act in Teaching, N·m: the learned torque, or the highest torque that the
+    /// controller may learn if this is higher.
     most: f32,
-    /// Share of the load that does not act because the joint is fast.
+    /// Share of the load that does not act because the joint moves too fast in the direction of the load.
     left_out: f32,
-    /// Share of the load that does not act because the load pushes the joint outwards in its soft end.
+    /// Share of the load that does not act because the joint is in its soft end and the load pushes it outwards.
     inside: f32,
 }
 
@@ -69,8 +69,8 @@ impl Carried {
         self.whole(by_mass) * (1.0 - f64::from(self.left_out)) * (1.0 - f64::from(self.inside))
     }
 
-    /// Runs one tick. `balanced` is the share of the load that the damping of the joint balances. `depth` is the compression of the joint's
-    /// soft end in rad, like [`depth`](crate::motion::soft_end::depth).
+    /// Executes one tick. `balanced` is the share of the load that the damping of the joint balances. `depth` is the
+    /// compression of the soft end in rad, with the sign of [`depth`](crate::motion::soft_end::depth).
     pub(super) fn step(&mut self, by_mass: f64, velocity: f64, balanced: f64, depth: f64) -> f64 {
         let whole = self.whole(by_mass);
         let along = if whole < 0.0 { -velocity } else { velocity };
@@ -96,7 +96,8 @@ impl Carried {
         mostly_mass && along && explains(acts, against)
     }
 
-    /// Returns `true` if the joint sinks because a torque is missing. `gone` is the torque of the removed mass on the joint, N·m.
+    /// Returns `true` if the joint sinks because the torque `gone` (N·m) of the removed mass is missing. `against` is
+    /// the torque of damping and friction against the motion, N·m.
     pub(super) fn sinks(&self, gone: f64, velocity: f64, against: f64) -> bool {
         let missed = gone.abs() > MISSED * f64::from(self.most);
         missed && velocity * gone < -MOVES * gone.abs() && explains(gone, against)

@@ -16,9 +16,9 @@ pub(super) const DAMPING_RATE: f64 = 90.0;
 const SINKS: f64 = 0.5;
 /// Highest damping of a fast joint, divided by the torque limit, s/rad.
 const GROWN: f64 = 1.0;
-/// Speeds between which a braking torque is added to the damping, rad/s. The second constant is the deceleration by this torque, rad/s².
-/// The braking torque is too weak to reverse a joint before the controller measures the reversal. Without this braking torque, over-speed
-/// would release the arm.
+/// Speeds between which a braking torque is added to the damping, rad/s. `BRAKE` is the deceleration by this torque,
+/// rad/s². It is so low that a joint cannot reverse before the controller measures the reversal. Without the braking
+/// torque, a fast joint would reach the over-speed threshold, and the arm would be released.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
 /// Speed above which Teaching ends and the controller brings the joint to rest, in rad/s and as a share of the over-speed threshold (J-35).
@@ -26,11 +26,11 @@ const BRAKE: f64 = 60.0;
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
 /// Time constant of the speed that is computed from positions, s. The speed that drives report is a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
-/// Share of a rotor inertia on which the controller relies, because the configured value may be an unmeasured proposal. If no rotor inertia
-/// is configured, the proposal is the torque limit divided by `PROPOSED`, rad/s².
+/// Share of the rotor inertia on which the controller relies, because the configured value may be an unmeasured
+/// proposal. If no rotor inertia is configured, the torque limit divided by `PROPOSED` (rad/s²) is used instead.
 const ROTOR: f64 = 0.2;
 const PROPOSED: f64 = 200.0;
-/// Share of its modelled friction that every joint has at least, by assumption.
+/// Share of the modelled friction that every joint is assumed to have at least.
 const CERTAIN_FRICTION: f64 = 0.7;
 /// Highest share of the damping that the friction compensation may cancel, because the joint may have less friction than its model.
 const USED_UP: f64 = 0.5;
@@ -46,14 +46,14 @@ const STRETCH: f64 = 0.005;
 const SIGN_WIDTH: f64 = 0.1;
 /// Speeds between which the friction compensation fades to zero, rad/s.
 const COMPENSATED: (f64, f64) = (0.3, 0.6);
-/// Number of missing answers after which the springs of a joint fade, followed by damping and friction compensation, each within
-/// [`LETS_GO`] ticks.
+/// Number of missing answers after which a joint loses its Teaching torques. The springs fade first, within
+/// [`LETS_GO`] ticks. Damping and friction compensation then fade within the same number of ticks.
 const MISSING: u8 = 2;
 const LETS_GO: u8 = 5;
 
-/// Returns the speed of a joint above which Teaching ends, rad/s. Teaching compares this limit with the speed that is computed from
-/// positions. At the limit speed, the position controller can stop the joint before over-speed releases the arm, even if damping cannot
-/// stop the joint.
+/// Returns the speed of a joint above which Teaching ends, rad/s. Teaching compares this limit with the speed that is
+/// computed from positions. If damping cannot stop the joint, the position controller can still stop it from this
+/// speed before over-speed releases the arm.
 pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
     TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
 }
@@ -67,11 +67,11 @@ pub(super) fn rotor(limits: &JointConfig) -> f64 {
 /// State of a joint in Teaching. The values have single precision, because the flight recorder stores them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtJoint {
-    /// Anchor of the spring of the dry friction, rad. The next field is the share of the spring that acts.
+    /// Anchor of the spring of the dry friction, rad. `grip` is the acting share of this spring.
     anchor: f32,
     pub(super) grip: f32,
-    /// Depth of the joint inside a soft end at the beginning of Teaching, rad. The spring of the soft end acts only beyond this depth,
-    /// because this spring must not move the joint without a hand.
+    /// Depth of the joint inside a soft end at the beginning of Teaching, rad. The spring of the soft end acts only
+    /// beyond this depth, so that it does not move the joint by itself.
     begun: f32,
     /// Friction of the joint according to its parameters, N·m. `coulomb` is the Coulomb friction, and `rubs` is the whole friction at a
     /// recent speed.
@@ -81,10 +81,10 @@ pub(crate) struct TaughtJoint {
     inertia: f32,
     /// Torque of damping and friction against the motion in the last tick, N·m.
     against: f32,
-    /// Filtered position of the joint, rad. The filtered position lags the joint, and the lag increases with the speed of the joint.
+    /// Filtered position of the joint, rad. It lags behind the joint by a distance that is proportional to the speed.
     behind: f32,
-    /// Number of consecutive missing answers. The next field is the progress of the fading of springs and damping. At a progress of 2 ·
-    /// [`LETS_GO`], springs and damping are zero.
+    /// Number of consecutive missing answers. `lost` counts the steps by which springs and damping have faded because
+    /// of missing answers. At 2 · [`LETS_GO`], both are zero.
     missing: u8,
     lost: u8,
 }
@@ -118,7 +118,7 @@ pub(crate) struct TaughtTorque {
 pub(crate) struct Bears {
     /// Share of the load that the damping balances at [`SINKS`].
     pub balanced: f64,
-    /// Depth of the joint inside a soft end beyond the depth at the beginning of Teaching, rad. The depth has the sign of
+    /// Compression of the soft end beyond its compression at the beginning of Teaching, rad. The sign is that of
     /// [`soft_end::depth`].
     pub compressed: f64,
 }
@@ -138,9 +138,10 @@ impl TaughtJoint {
         }
     }
 
-    /// Evaluates the answer of the joint in each tick of Teaching. `late` is the delay of this tick in ms. `fresh` is `true` if the joint
-    /// has answered with this `position`, rad. Without an answer, the known speed of the joint is old, and the springs pull to an old
-    /// position. Returns the speed computed from the joint positions, rad/s.
+    /// Evaluates the answer of the joint in each tick of Teaching. `fresh` is `true` if the joint has answered with
+    /// this `position`, rad. `late` is the delay of this tick in ms. Returns the speed computed from the joint
+    /// positions, rad/s, or 0 without an answer. Without answers, the known speed and the anchors of the springs
+    /// become too old.
     #[inline(always)]
     pub(super) fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
         // A late tick has the same effect as a missing answer.
@@ -165,7 +166,8 @@ impl TaughtJoint {
         way / time
     }
 
-    /// Returns the acting share of the springs, and the acting share of damping and friction compensation.
+    /// Returns the acting share of the springs, and the acting share of damping and friction compensation. Both are 1
+    /// if nothing has faded.
     fn heard(&self) -> (f64, f64) {
         if self.lost == 0 {
             return (1.0, 1.0);
@@ -189,7 +191,7 @@ impl TaughtJoint {
         self.against = torque as f32;
     }
 
-    /// Returns the damping at low speed and the highest damping, N·m·s/rad.
+    /// Returns the damping of a slow joint and the highest damping, N·m·s/rad.
     fn dampings(&self, load: f64, limits: &JointConfig) -> (f64, f64) {
         let most = DAMPING_RATE * f64::from(self.inertia);
         let damping = limits.teach_damping.max(load.abs() / SINKS).min(most);
@@ -234,15 +236,17 @@ impl TaughtJoint {
         (torque, Bears { balanced, compressed })
     }
 
-    /// Returns the highest torque of the dry friction, N·m. The more friction the joint itself has, the lower is this torque.
+    /// Returns the highest torque of the dry friction, N·m. A joint with more friction of its own needs less dry
+    /// friction.
     fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Returns the dry friction torque of a slow joint. The dry friction fades out between the speed at which damping balances the dry
-    /// friction and four times that speed. The joint therefore stops against any lower torque. If the speed at which damping balances the
-    /// dry friction is at most [`SLOW`], the dry friction decreases at most half as fast as the damping torque increases. The torque against
-    /// the motion then never decreases with the speed, even with the friction compensation.
+    /// Returns the dry friction torque of a slow joint. The first speed is the speed at which the damping torque
+    /// equals the dry friction. From this speed to four times this speed, the dry friction fades to zero, so a joint
+    /// stops if a lower torque moves it. If the first speed is at most [`SLOW`], the dry friction falls at most half
+    /// as fast as the damping torque rises. The total torque against the motion then never falls with the speed, even
+    /// with the friction compensation.
     fn dry_friction(
         &mut self,
         position: f64,
@@ -261,7 +265,8 @@ impl TaughtJoint {
             if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (3.0 * slow)) } else { 1.0 };
         let grip = f64::from(self.grip);
         self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
-        // The spring slips when it is extended by its full torque. If the joint is fast, the anchor of the spring moves with the joint.
+        // At its highest torque, the spring slips, so its anchor follows the joint. For a fast joint, the anchor
+        // moves with the joint.
         let stretch = if gripped > 0.0 { self.stretch(breakaway) } else { 0.0 };
         self.anchor = f64::from(self.anchor).max(position - stretch).min(position + stretch) as f32;
         self.dry_spring(position, limits, config)

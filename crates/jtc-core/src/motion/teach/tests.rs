@@ -33,7 +33,8 @@ fn j25_a_mass_at_the_flange_is_found_and_carried_to_other_poses() {
     }
 }
 
-/// The load torque has no step when Teaching begins. After a motion of 1 rad, the torque that no mass explains has fallen to a thirtieth.
+/// The load torque has no step when Teaching begins. While a hand moves a joint by 1 rad, the torque that no mass
+/// explains falls to a thirtieth.
 #[test]
 fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
     let missing = [7.0, 10.0, -3.0, 1.0, 0.0, 2.0];
@@ -63,7 +64,7 @@ fn j25_friction_never_becomes_a_great_mass() {
 }
 
 proptest! {
-    /// The estimated mass changes only towards zero, and never beyond zero.
+    /// The estimated mass becomes smaller by the given mass, at most to zero. It never changes its sign.
     #[test]
     fn j60_a_mass_that_is_given_goes_from_the_one_that_was_found(found in -3.0..3.0f32, given in prop::collection::vec(-4.0..4.0f64, 1..8)) {
         let mut taught = Taught { found, mass: found, ..Taught::default() };
@@ -94,8 +95,8 @@ proptest! {
         }
     }
 
-    /// The acting share of a load falls with the speed of the joint in the direction of the load torque. At rest, the whole load acts, so
-    /// the load is not lost.
+    /// The acting share of a load falls with the speed of the joint in the direction of the load torque. At rest the
+    /// whole load acts again.
     #[test]
     fn j25_a_load_acts_the_less_the_faster_it_drives(load in 1.0..54.0f64, balanced in 0.0..1.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)]) {
         let limits = Config::avena().joints[1];
@@ -144,8 +145,8 @@ impl Driven {
     }
 }
 
-/// A mass that alone explains the motion is removed within seconds, without a torque step. If a hand moves the arm faster or more slowly
-/// than the mass would, the mass stays.
+/// A mass that alone explains the motion is removed within seconds, without a torque step. If the arm moves faster or
+/// more slowly than the mass would drive it, a hand moves the arm, and the mass stays.
 #[test]
 fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     let left = |against, velocity, ms| Driven::new().moves(against, velocity, ms);
@@ -164,7 +165,7 @@ fn j25_a_mass_that_is_missed_comes_back() {
     let mut driven = Driven::new();
     let gone = driven.moves(1.0, 0.3, 4_000);
     assert!(gone < 0.2, "{gone}");
-    // The missing torque now drives the joint, as the acting torque drove the joint before. The missing torque is `sinking` times the
+    // The joint now sinks because the removed torque is missing. `sinking` is the removed torque divided by the
     // remaining load torque.
     let sinking = f64::from((1.0 - gone) / gone);
     for (against, velocity, ms) in
@@ -178,7 +179,7 @@ fn j25_a_mass_that_is_missed_comes_back() {
         back = driven.moves(sinking, -0.2, 12);
     }
     assert!((0.8..1.0).contains(&back), "{back}");
-    // A mass that the model has contained since the removal is not added again.
+    // If the model has contained the mass since it was removed, the mass is not added again.
     driven.taught.give_way(1.5);
     assert!(driven.taught.mass > 0.0 && driven.taught.found <= 0.51, "{} kg", driven.taught.found);
 }
@@ -200,9 +201,9 @@ fn j25_each_round_computes_all_that_changes_slowly() {
     assert_eq!([0, 1, 2].map(Turn::of), [Turn::Begin, Turn::Mass, Turn::Ramp]);
 }
 
-/// The mass explains a part of the load that depends on the torque of 1 kg on all joints together. The part is zero up to 2 N·m and complete
-/// from 6 N·m on. In between, the part increases smoothly with the square of the torque, here from 4 to 36: 5/32 at a quarter of this range,
-/// 1/2 at the half, and 27/32 at three quarters.
+/// The fitted mass explains a part of the load. The part depends on the torque of 1 kg on all joints together: it is
+/// zero up to 2 N·m and 1 from 6 N·m on. In between, it rises smoothly with the square of this torque, from 4 to 36:
+/// 5/32 at a quarter of this range, 1/2 at the half, and 27/32 at three quarters.
 #[test]
 fn j25_a_mass_that_hardly_loads_the_arm_explains_a_part_of_the_load() {
     let unit = dynamics().flange_torque(&Q).map(|u| u * u).iter().sum::<f64>().sqrt();
@@ -215,7 +216,7 @@ fn j25_a_mass_that_hardly_loads_the_arm_explains_a_part_of_the_load() {
         (36.0, 1.0),
         (49.0, 1.0),
     ] {
-        // The torque of 1 kg is proportional to gravity.
+        // The torque of 1 kg is proportional to gravity, so the test sets this torque through gravity.
         let gravity = Config::avena().gravity.map(|g| g * f64::sqrt(square) / unit);
         let dynamics = Dynamics::new(&Parameters::avena().model, gravity);
         let loads = dynamics.flange_torque(&Q).map(|u| 2.0 * u);
@@ -231,8 +232,8 @@ fn j25_a_mass_that_hardly_loads_the_arm_explains_a_part_of_the_load() {
     assert_eq!(begun([5.0; JOINTS], &[f64::NAN; JOINTS]).mass, 0.0, "an invalid pose gives no mass");
 }
 
-/// The ramp computes the inertia of the whole arm in tick 2, and in the last slow tick of each round. A round has 76 ticks and begins at
-/// tick 9, so this tick is 9 + 76 - 4 = 81.
+/// The ramp computes the inertia of the whole arm in tick 2, and in the last slow tick of each round. A round has 76
+/// ticks and begins at tick 9, and every fourth tick is slow. This slow tick is therefore 9 + 76 - 4 = 81.
 #[test]
 fn j25_one_tick_before_the_first_round_and_one_tick_of_each_round_belong_to_the_ramp() {
     for turn in 0..FIRST + TURNS {
@@ -241,8 +242,8 @@ fn j25_one_tick_before_the_first_round_and_one_tick_of_each_round_belong_to_the_
     }
 }
 
-/// The excess is the flange speed above the limit, as a share of the limit, on a smooth ramp. With a limit of 0.5 m/s, the ramp begins at
-/// 0.5 m/s and is complete at 1 m/s.
+/// The excess is the flange speed above the limit divided by the limit, on a smooth ramp. With a limit of 0.5 m/s,
+/// the ramp begins at 0.5 m/s and reaches 1 at 1 m/s.
 #[test]
 fn j25_the_excess_of_the_tool_speed_is_a_share_of_its_limit() {
     let (dynamics, direction) = (dynamics(), [0.1, 0.2, -0.3, 0.1, 0.0, 0.2]);
@@ -257,7 +258,7 @@ fn j25_the_excess_of_the_tool_speed_is_a_share_of_its_limit() {
         (1.0, 1.0),
         (2.0, 1.0),
     ] {
-        // The eighth tick of a round compares the load with the motion.
+        // In this tick of a round, Teaching compares the load with the motion.
         let mut taught = Taught { turn: FIRST + 8, ..Taught::default() };
         let computed =
             taught.look(&Q, &direction.map(|v| v * speed / unit), &dynamics, &config, |_, _| (0.0, 0.0));
@@ -291,37 +292,42 @@ fn with_mass(found: f32, mass: f32, against: f64) -> Taught {
     taught
 }
 
-/// Each comparison counts 12 ms. The eighth comparison is at 96 ms, and the ninth is at 108 ms.
+/// Each comparison adds 12 ms to the time of sinking. The mass returns only after 100 ms: the eighth comparison is at
+/// 96 ms, and the ninth is at 108 ms.
 #[test]
 fn j25_a_missed_mass_returns_by_its_missing_part() {
-    // 1.5 kg of 2 kg are missing, which is 15 N·m. The joint sinks at 0.2 rad/s.
+    // The acting mass is 0.5 kg of 2 kg, so 1.5 kg with a torque of 15 N·m are missing. The joint sinks at 0.2 rad/s.
     let mut taught = with_mass(2.0, 0.5, 15.0);
     let sinks = [0.0, -0.2, 0.0, 0.0, 0.0, 0.0];
     (0..8).for_each(|_| taught.judge(&sinks));
     assert_eq!((taught.mass, taught.sinks_ms), (0.5, 96));
-    // In 12 ms, a return with a time constant of 0.5 s adds 0.024 times 1.5 kg, which is 0.036 kg.
+    // The ninth comparison adds a part of the missing mass. With a time constant of 0.5 s, 12 ms add 0.024 · 1.5 kg =
+    // 0.036 kg.
     taught.judge(&sinks);
     assert!((taught.mass - 0.536).abs() < 1e-5 && taught.found == 2.0, "{} kg", taught.mass);
-    // If the joint no longer sinks, the time begins again.
+    // If the joint does not sink, the time of sinking begins again.
     taught.judge(&[0.0; JOINTS]);
     assert!((taught.mass - 0.536).abs() < 1e-5 && taught.sinks_ms == 0, "{} kg", taught.mass);
 }
 
-/// The comparison 83 is at 996 ms, and the comparison 84 is at 1,008 ms.
+/// The mass is removed only after it has driven the arm for 1,000 ms. Comparison 83 is at 996 ms, and comparison 84
+/// is at 1,008 ms.
 #[test]
 fn j25_a_mass_that_drives_the_arm_goes_by_a_part_of_itself() {
-    // A mass of 2 kg causes 20 N·m, which moves the joint at 0.3 rad/s.
+    // The mass of 2 kg causes 20 N·m. Damping and friction oppose the same torque at 0.3 rad/s, so the mass alone
+    // explains the motion.
     let mut taught = with_mass(2.0, 2.0, 20.0);
     let driven = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
     (0..83).for_each(|_| taught.judge(&driven));
     assert_eq!((taught.mass, taught.driven_ms), (2.0, 996));
-    // In 12 ms, a removal with a time constant of 1.5 s removes 0.008 times 2 kg, which is 0.016 kg.
+    // Comparison 84 removes a part of the mass. With a time constant of 1.5 s, 12 ms remove 0.008 · 2 kg = 0.016 kg.
     taught.judge(&driven);
     assert!((taught.mass - 1.984).abs() < 1e-5 && taught.found == 2.0, "{} kg", taught.mass);
 }
 
-/// The integral takes over the torques of the load and of the dry friction. The mass of 0.5 kg causes 5 N·m of the load torque. The other
-/// part is 12 N·m. The dry friction is at most 3 % of 200 N·m, which is 6 N·m, at an extension of 5 mrad.
+/// After Teaching, the integral must produce the torques of the load and of the dry friction. The load torque is 5
+/// N·m from the mass of 0.5 kg, and 12 N·m that no mass explains. The dry friction is at most 3 % of 200 N·m, which
+/// is 6 N·m, at an extension of 5 mrad.
 #[test]
 fn j25_the_holding_torque_is_the_sum_of_load_and_dry_friction() {
     let mut config = Config::avena();

@@ -2,27 +2,28 @@
 //! speeds are delayed.
 use crate::bit_codec::bit_codec;
 
-/// Longest duration of half a swing, ms. The second constant is the lowest peak speed of half a swing, rad/s.
+/// Longest duration of half a swing, ms. `HALF_SPEED` is the lowest peak speed of half a swing, rad/s.
 const HALF_MS: u8 = 80;
 const HALF_SPEED: f32 = 0.15;
-/// Lowest speed of the second half of a swing, as a share of the speed of the first half. The two halves of a swing have opposite
-/// directions. A shove and the return of the spring also look like two halves, but the second half is slow.
+/// Lowest speed of the second half of a swing, as a share of the speed of the first half. When a spring moves a joint
+/// back after a sudden push, the second half is slower and does not count as a swing.
 const LASTS: f32 = 0.5;
-/// Factor by which each swing multiplies `soft`. The second constant is the lowest value to which several swings reduce `soft`.
+/// Factor by which each swing reduces `soft`. `SOFTEST` is the lowest value of `soft`.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
-/// Time without a swing after which `soft` increases by one step, and time between further steps, ms.
+/// Time without a swing after which `soft` increases by its first step, ms, and time between two further steps, ms.
 const HARDENS_MS: (u16, u16) = (300, 100);
 
 /// State of the swing of a joint, and the factor that makes its spring, damper and brake softer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
-    /// Highest speed in the present direction, with its sign, rad/s. The next field is the time in this direction, ms.
+    /// Highest speed in the present direction, with its sign, rad/s. `half_ms` is the time in this direction, ms.
     peak: f32,
     half_ms: u8,
-    /// Highest speed of the previous half of a swing, rad/s. The speed is 0 if the previous motion was not half a swing.
+    /// Highest speed of the previous half swing, rad/s. It is 0 if the previous motion was not half a swing.
     before: f32,
-    /// Factor that makes spring, damper and brake softer. The next field is the time since the last change of this factor, ms.
+    /// Factor that makes spring, damper and brake softer. `soft_ms` is the time since the last change of this factor,
+    /// ms.
     soft: f32,
     soft_ms: u16,
 }
@@ -61,8 +62,8 @@ impl Swing {
 mod tests {
     use super::*;
 
-    /// A joint that swings back fast several times becomes softer each time. The joint becomes stiffer again when the swing ends. A joint
-    /// that a push has moved and that the spring moves back does not become softer.
+    /// A joint that swings several times becomes softer with each swing, and becomes stiffer again when the swing has
+    /// ended. A joint that returns slowly after a push does not become softer.
     #[test]
     fn j68_what_swings_becomes_softer_for_a_while() {
         let swing = |half_ms: usize, speeds: [f64; 2]| {
@@ -98,8 +99,8 @@ mod tests {
         swing.soft
     }
 
-    /// The motion before the first reversal may have begun long before the yield, so this motion is not half a swing. The joint therefore
-    /// becomes softer at the third reversal, for each direction of the first motion.
+    /// The motion before the first reversal does not count as half a swing, because it may have begun long before the
+    /// yield. Two halves are complete at the third reversal, so the joint then becomes softer.
     #[test]
     fn j68_a_joint_becomes_softer_at_the_third_reversal() {
         for v in [0.3, -0.3] {
@@ -136,7 +137,7 @@ mod tests {
         }
     }
 
-    /// The speed of a half swing is its highest speed. Before and after this speed, the joint is slow.
+    /// Only the highest speed within a half swing counts. The joint may be slow before and after it.
     #[test]
     fn j68_the_highest_speed_of_a_half_swing_counts() {
         let mut swing = Swing::NONE;

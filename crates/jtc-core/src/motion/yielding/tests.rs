@@ -58,8 +58,9 @@ fn tick(yields: &mut Yield, joint: &Joint<'_>) -> PidTorque {
 }
 
 proptest! {
-    /// The torque of the spring never exceeds the share, for any motion of the joint. The sum of spring and damper exceeds the share only
-    /// if the damper alone exceeds it. The damper only dissipates energy.
+    /// For any motion of the joint, the torque of the spring never exceeds its permitted share of the torque limit.
+    /// The sum of spring and damper exceeds the share only if the damper alone exceeds it. The damper always acts
+    /// against the motion.
     #[test]
     fn j68_a_slow_push_has_the_share_against_it_and_a_shove_the_limit(
         set in -3.0..3.0f64,
@@ -82,7 +83,8 @@ proptest! {
         prop_assert!((torque.p + torque.d).abs() <= most.max(torque.d.abs()) + 1e-9);
         prop_assert!(torque.d * velocity <= 0.0 && (velocity != 0.0 || torque.d == 0.0));
         prop_assert_eq!(torque.i, load);
-        // At half of the velocity limit, the damper torque is the torque limit minus the share, unless the inertia of the joint is too low.
+        // At half of the velocity limit, the damper torque is the torque limit minus the share of the spring. If the
+        // inertia of the joint is too low for this damping, the damping is lower.
         let expected = (limits.torque_max - most) * velocity.abs() / (0.5 * limits.velocity_max);
         let light = DAMPING_RATE * inertia * velocity.abs();
         prop_assert!((torque.d.abs() - expected.min(light).min(limits.torque_max)).abs() < 1e-3);
@@ -112,7 +114,8 @@ proptest! {
     }
 }
 
-/// A hand lifts a joint that lowers its load, and lets go of the joint. The torque that holds the joint still acts afterwards.
+/// A hand lifts a joint that lowers its load, and then lets go. The load torque that held the joint still acts
+/// afterwards.
 #[test]
 fn j70_a_joint_that_is_lifted_keeps_what_carries_it() {
     let limits = limits();
@@ -190,7 +193,7 @@ fn j68_a_joint_that_is_calm_for_200_ms_is_held_again() {
     assert!(stays.is_calm() && !stays.is_over(), "the host decides");
     stays.clear();
     assert!(stays.is_over());
-    // A motion restarts the time for which the joint must be calm.
+    // Another motion begins the time of calm again, so the joint is not calm.
     tick(&mut stays, &at(&limits, 0.0, 0.2, 0.0));
     assert!(!stays.is_calm());
 }
@@ -205,9 +208,9 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
             yields.lowers()
         })
     };
-    // A torque of 20 N·m holds the joint up, so gravity pulls the joint down.
+    // The model torque of 20 N·m holds the joint up, so a motion in the negative direction is a motion down.
     assert_eq!(lowers_after(-0.3, 20.0), Some(1_667), "0.5 rad");
-    // If a hand moves a joint down and up again, the joint has not sunk.
+    // A joint that a hand moves down and up again and again has not sunk.
     let mut led = Yield::begin(false, false, 0.0, INERTIA, 0.0);
     for k in 0..10_000 {
         let velocity = if k % 1_000 < 500 { -0.3 } else { 0.3 };
@@ -220,7 +223,7 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     }
 }
 
-/// A lowered load comes to rest if this load is within the torque limit. The controller then holds this load, if a small part of the torque
+/// A lowered load within the torque limit comes to rest. The controller holds it again if a small part of the torque
 /// limit remains for the position controller.
 #[test]
 fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
@@ -232,7 +235,7 @@ fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
             yields.is_over()
         });
         assert_eq!(over, held, "{load} N·m");
-        // The host may nevertheless request that the controller holds the joint, because the joint is at rest.
+        // The joint is at rest, so the host may request that the controller holds it.
         assert!(yields.is_calm());
         yields.clear();
         assert!(yields.is_over());
@@ -263,15 +266,15 @@ fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
     let mut position = yields.set;
     for _ in 0..ms {
         position += velocity * DT;
-        // The torque of the model opposes the load, so the joint does not sink in the direction of gravity.
+        // The model torque opposes the load, so that the motion along the load is not a motion down.
         tick(yields, &at(&limits, position, velocity, -40.0));
     }
     yields.load()
 }
 
-/// Spring and damper act with 40 N·m against a joint without a push. The load drives this joint, so the controller assumes that a person
-/// leaned on the arm while the load was learned. The load fades within a second, and returns if the joint sinks. If a hand moves the joint
-/// faster, or against its load, the load does not change.
+/// The load of 40 N·m drives the joint, and spring and damper oppose it with 40 N·m. The controller assumes that a
+/// person leaned on the arm while the load was learned. The load fades within a second, and returns if the joint
+/// sinks. If a hand moves the joint faster, or against its load, the load does not change.
 #[test]
 fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     let begun = || Yield::begin(false, false, 0.0, INERTIA, 40.0);
@@ -287,8 +290,8 @@ fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     assert!((0.9 * 40.0..=40.0).contains(&back), "{back} N·m");
 }
 
-/// After a yield, the position controller continues the part of the load that the spring has not opposed. The part of the load that
-/// continues is never larger than the load, and never has the opposite sign.
+/// After a yield, the position controller takes over the part of the load that the spring has not opposed. This part
+/// is never larger than the load, and never has the opposite sign.
 #[test]
 fn j68_the_position_controller_takes_over_what_the_spring_leaves() {
     for (load, spring, left) in [

@@ -2,7 +2,8 @@
 use crate::DT;
 use crate::bit_codec::bit_codec;
 
-/// Number of answers over which the rate is computed. The constant `WINDOW_MS` is the shortest time over which the rate is computed, ms.
+/// Number of answers over which the rate is computed. `WINDOW_MS` is the shortest time over which the rate is
+/// computed, ms.
 const WINDOW: usize = 5;
 /// Number of slots in the ring buffer. The number of slots is a power of two, so that an index needs no comparison.
 const SLOTS: usize = 16;
@@ -22,7 +23,7 @@ pub(super) struct Answered {
 impl Answered {
     /// Returns the distance from this answer to the more recent answer `now`, rad. The distance of an answer to itself is zero.
     fn way_to(&self, now: &Self) -> f64 {
-        // The difference of two such close numbers is exact.
+        // The two numbers are so close that their difference has no rounding error.
         f64::from(now.position as f32 - self.position as f32)
     }
 
@@ -37,7 +38,7 @@ impl Answered {
 pub(super) struct Rate {
     /// Rate of the positions, rad/s.
     pub rad_s: f64,
-    /// `true` if every answer from which the rate is computed, except the first, was close to its prediction.
+    /// `true` if all answers of the window, except the first, were close to their predictions.
     pub as_predicted: bool,
 }
 
@@ -56,8 +57,8 @@ pub(super) struct History {
     answers: [Kept; SLOTS],
     /// Number of the slot for the next answer. The number is counted modulo 256.
     next: u8,
-    /// Number of answers before the newest answer that arrived without a gap, one per millisecond. The number of answers without a gap may
-    /// exceed the number of stored answers.
+    /// Number of answers before the newest answer that arrived without a gap, one in each millisecond. This number
+    /// may be higher than the number of stored answers.
     in_turn: u8,
     /// Mask of the answers that were close to their predictions. Bit 0 of this mask stands for the newest answer.
     as_predicted: u8,
@@ -79,7 +80,7 @@ impl History {
     pub(super) fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
-        // An answer arrives in nearly every millisecond. The oldest of five answers is then the only answer that is old enough.
+        // If five answers arrived without a gap, the oldest of them is the newest answer that is old enough.
         let rate = if self.in_turn >= WINDOW as u8 {
             let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
             Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })
@@ -108,8 +109,9 @@ impl History {
         self.as_predicted & younger == younger
     }
 
-    /// Returns the position `ms` milliseconds before the newest answer, rad, if an answer arrived in each millisecond between them. The
-    /// newest answer is at most one millisecond older than `now_ms`, because an answer may be late or missing.
+    /// Returns the position `ms` milliseconds before the newest answer, rad. Returns `None` if an answer is missing
+    /// in this time. The newest answer may be up to one millisecond older than `now_ms`, because an answer may be
+    /// late or missing.
     pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         (since_newest <= 1 && ms <= self.in_turn.min(SLOTS as u8 - 1)).then(|| self.nth(ms.into()).position)
@@ -145,8 +147,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
 
-        /// The rate from the history is equal to the rate from a list of all answers. Each entry of this list contains the milliseconds
-        /// since the previous answer (usually 1), the position, and `true` if the answer was close to its prediction.
+        /// The rate from the history must be equal to the rate that is computed from a list of all answers. Each
+        /// entry of this list contains the time since the previous answer (usually 1 ms), the position, and `true` if
+        /// the answer was close to its prediction.
         #[test]
         fn j63_the_rate_is_from_the_youngest_kept_answer_that_is_old_enough(
             answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),
@@ -196,19 +199,19 @@ mod tests {
             (110, 0, Some(110.0)),
             (110, 1, Some(109.0)),
             (110, 10, Some(100.0)),
-            // The history has no answer of 99 ms.
+            // The history begins at 100 ms, so the position at 99 ms is unknown.
             (110, 11, None),
             (111, 0, Some(110.0)),
             (111, 1, Some(109.0)),
             (111, 10, Some(100.0)),
             (111, 11, None),
-            // Two answers are missing.
+            // The newest answer is 2 ms old, so an answer is missing.
             (112, 2, None),
             (112, 10, None),
         ] {
             assert_eq!(history.before(now_ms, ms), from, "{ms} ms, at {now_ms} ms");
         }
-        // The answer of 111 ms is missing, so only the answers from 112 ms on are in turn.
+        // The answer at 111 ms is missing, so only the positions from 112 ms on are known.
         let mut gap = in_turn(100, 110);
         (112..=115).for_each(|at_ms| _ = gap.take(&Answered { position: f64::from(at_ms), at_ms }, true));
         assert_eq!((gap.before(115, 3), gap.before(115, 4)), (Some(112.0), None));

@@ -25,20 +25,26 @@ fn j58_a_jogged_joint_has_a_fifth_of_its_acceleration_limit_after_a_tenth_of_a_s
 #[test]
 fn j58_a_joint_approaches_its_velocity_with_bounded_acceleration_and_jerk() {
     let cases = [
-        // (velocity, acceleration, highest acceleration, target, expected velocity and acceleration)
-        // The acceleration increases by the jerk of one tick: 0 + 2 rad/s². The velocity increases by 2 · 0.5 rad/s.
+        // Columns: velocity, acceleration, highest acceleration, target velocity, expected velocity and acceleration.
+        // In the first row, the acceleration increases by the jerk of one tick, from 0 to 2 rad/s². The velocity
+        // increases by 2 · 0.5 rad/s.
         (0.0, 0.0, 8.0, 8.0, (1.0, 2.0)),
-        // The acceleration stays at its limit: 3 · 0.5 = 1.5 rad/s.
+        // The acceleration is already at its limit of 3 rad/s² and stays there. In 0.5 s, the joint gains 3 · 0.5 =
+        // 1.5 rad/s.
         (0.0, 3.0, 3.0, 8.0, (1.5, 3.0)),
-        // The steps 6, 4 and 2 rad/s² add (6 + 4 + 2) · 0.5 = 6 rad/s, so the next acceleration is 6 rad/s².
+        // 6 rad/s are missing. The accelerations 6, 4 and 2 rad/s² in three ticks of 0.5 s add exactly (6 + 4 + 2) ·
+        // 0.5 = 6 rad/s, so the next acceleration is 6 rad/s².
         (1.0, 6.0, 8.0, 7.0, (4.0, 6.0)),
         (1.0, 8.0, 8.0, 7.0, (4.0, 6.0)),
-        // The next acceleration would be 5 - 2 = 3 rad/s², which is one and a half steps of 2 rad/s². The velocity still missing is below
-        // 3 · 0.5 = 1.5 rad/s. The joint therefore arrives.
+        // The next acceleration would be 5 - 2 = 3 rad/s², which is at most 1.5 times the largest change of 2 rad/s²
+        // in one tick. The missing velocity of 0.5 rad/s is below 3 · 0.5 = 1.5 rad/s. The joint therefore reaches
+        // its target in this tick.
         (0.0, 5.0, 8.0, 0.5, (0.5, 0.0)),
-        // With 5.25 - 2 = 3.25 rad/s², the joint does not arrive without a jump of the acceleration.
+        // The acceleration could fall only to 5.25 - 2 = 3.25 rad/s², more than 1.5 times 2 rad/s². The joint
+        // therefore does not reach its target in this tick.
         (0.0, 5.25, 8.0, 0.5, (1.625, 3.25)),
-        // 1.5 rad/s is the most that can be missing for an arrival. With 1.75 rad/s, the joint accelerates with 0 + 2 rad/s².
+        // A joint can gain at most 1.5 rad/s in the tick in which it reaches its target. If 1.75 rad/s are missing,
+        // it accelerates with 0 + 2 rad/s² instead.
         (0.0, 0.0, 8.0, 1.5, (1.5, 0.0)),
         (0.0, 0.0, 8.0, 1.75, (1.0, 2.0)),
     ];
@@ -66,7 +72,8 @@ fn j58_a_joint_that_still_accelerates_does_not_exceed_its_velocity_limit() {
     }
 }
 
-/// The jerk of 2 rad/s³ gives 2 · 0.001 rad/s² in one tick. The controller does not compute this acceleration from rounded velocities.
+/// With the jerk of 2 rad/s³, the acceleration is 2 · 0.001 rad/s² after one tick. It is computed without the
+/// difference of two velocities, which would add a rounding error.
 #[test]
 fn j58_the_acceleration_within_the_velocity_limit_has_no_rounding_error_of_the_velocity() {
     for sign in [1.0, -1.0] {
@@ -91,20 +98,22 @@ fn j58_a_tick_without_time_changes_no_joint() {
 #[test]
 fn j58_the_stopping_distance_follows_from_the_jerk_and_the_highest_acceleration() {
     let cases = [
-        // (velocity, acceleration, highest acceleration, stopping distance)
+        // Columns: velocity, acceleration, highest acceleration, expected stopping distance without margins.
         (0.0, 0.0, 2.0, 0.0),
         // T = 0.75 / 2 + 2 / 8 = 0.625 s.
         (0.75, 0.0, 2.0, 0.5 * 0.75 * 0.625),
         // T = 1 / 2 + 2 / 8 = 0.75 s.
         (1.0, 0.0, 2.0, 0.5 * 0.75),
-        // The highest acceleration is just reached: T = 0.5 / 2 + 2 / 8 = 0.5 s, and 2 · √(0.5 / 8) = 0.5 s.
+        // The joint just reaches its highest acceleration, so both formulas give the same time: T = 0.5 / 2 + 2 / 8 =
+        // 0.5 s, and 2 · √(0.5 / 8) = 0.5 s.
         (0.5, 0.0, 2.0, 0.5 * 0.5 * 0.5),
-        // The highest acceleration is not reached: T = 2 · √(0.125 / 8) = 0.25 s.
+        // The joint does not reach its highest acceleration: T = 2 · √(0.125 / 8) = 0.25 s.
         (0.125, 0.0, 2.0, 0.5 * 0.125 * 0.25),
         // The acceleration of 0.5 rad/s² is zero after 1/16 s. The speed is then 0.75 + 0.5 · 0.5 / 16 = 0.765625 rad/s, and the joint has
         // moved 0.75 / 16 + 0.5 · 0.5 / 16² - 8 / (6 · 16³) rad. T = 0.765625 / 2 + 0.25 = 0.6328125 s.
         (0.75, 0.5, 2.0, 0.75 / 16.0 + 0.25 / 256.0 - 8.0 / (6.0 * 4_096.0) + 0.5 * 0.765625 * 0.6328125),
-        // The joint has braked for 1/16 s. It has moved 0.765625 / 16 - 8 / (6 · 16³) rad since its acceleration was zero.
+        // The joint has already braked for 1/16 s. The distance of 0.765625 / 16 - 8 / (6 · 16³) rad that it moved in
+        // this time is subtracted.
         (0.75, -0.5, 2.0, 0.5 * 0.765625 * 0.6328125 - (0.765625 / 16.0 - 8.0 / (6.0 * 4_096.0))),
         // A joint without velocity accelerates with 1 rad/s², above its highest acceleration of 0.5 rad/s². After 1/8 s its speed is
         // 0.5 / 8 = 0.0625 rad/s, and the joint has moved 0.5 / 8² - 8 / (6 · 8³) rad. T = 0.0625 / 0.5 + 0.5 / 8 = 0.1875 s.
@@ -129,7 +138,8 @@ fn step(mut joint: JointJog, mut position: f64, range: (f64, f64), goes: bool) -
 fn j58_a_joint_does_not_approach_its_commanded_velocity_after_the_jog_has_ended() {
     let joint = JointJog { wanted: 1.0, ..moving(0.0, 0.0, 2.0) };
     assert_eq!(step(joint, 0.0, (-2.0, 2.0), false), (0.0, 0.0, 0.0));
-    // The joint accelerates with 2 rad/s²: 2 · 0.125 = 0.25 rad/s, and 0.5 · 0.25 · 0.125 rad.
+    // The joint accelerates with 2 rad/s². After 0.125 s it has 2 · 0.125 = 0.25 rad/s, and it has moved 0.5 · 0.25 ·
+    // 0.125 rad.
     assert_eq!(step(joint, 0.0, (-2.0, 2.0), true), (0.015625, 0.25, 2.0));
 }
 
@@ -140,11 +150,12 @@ fn j58_a_joint_slows_down_as_soon_as_it_could_not_stop_within_its_range() {
     for sign in [1.0, -1.0] {
         let joint = JointJog { wanted: sign, ..moving(sign, 0.0, 2.0) };
         let range = |room: f64| if sign > 0.0 { (-2.0, 1.0 + room) } else { (-1.0 - room, 2.0) };
-        // With 0.45 rad, the joint keeps its velocity.
+        // With 0.45 rad to the end of its range, the joint keeps its velocity.
         assert_eq!(step(joint, sign, range(0.45), true), (sign * 1.125, sign, 0.0));
-        // With 0.4 rad, the joint brakes with 2 rad/s²: 1 - 2 · 0.125 = 0.75 rad/s, and 0.5 · 1.75 · 0.125 = 0.109375 rad.
+        // With 0.4 rad to the end of its range, the joint brakes with 2 rad/s². Its velocity is then 1 - 2 · 0.125 =
+        // 0.75 rad/s, and it has moved 0.5 · 1.75 · 0.125 = 0.109375 rad.
         assert_eq!(step(joint, sign, range(0.4), true), (sign * 1.109375, sign * 0.75, sign * -2.0));
-        // With 0.0625 rad, the braking joint reaches the end of its range, and its motion ends there.
+        // With 0.0625 rad to the end of its range, the braking joint reaches this end in the tick and stops there.
         assert_eq!(step(joint, sign, range(0.0625), true), (sign * 1.0625, 0.0, 0.0));
     }
 }
@@ -153,7 +164,8 @@ fn j58_a_joint_slows_down_as_soon_as_it_could_not_stop_within_its_range() {
 fn j58_a_joint_whose_stopping_distance_ends_exactly_at_the_end_of_its_range_slows_down() {
     for sign in [1.0, -1.0] {
         let joint = JointJog { wanted: sign, ..moving(sign, 0.0, 2.0) };
-        // The next state at a constant velocity is the present state.
+        // At a constant velocity, the state after this tick is the present state, so the stopping distance is
+        // computed from the present state.
         let needed = (0.125 + joint.stopping_way(20.0).abs()) * sign;
         let range = |end: f64| if sign > 0.0 { (-2.0, end) } else { (end, 2.0) };
         assert_eq!(step(joint, 0.0, range(needed), true).1, sign * 0.75);
@@ -161,8 +173,8 @@ fn j58_a_joint_whose_stopping_distance_ends_exactly_at_the_end_of_its_range_slow
     }
 }
 
-/// A joint beyond its range moves back with 0.125 rad/s, and a velocity away from its range is commanded. With 2 rad/s² the joint would
-/// reverse to 0.125 rad/s in one tick. The joint stops instead.
+/// A joint beyond the end of its range moves back towards its range with 0.125 rad/s. The host commands a velocity
+/// away from the range. With 2 rad/s² the joint would reverse to 0.125 rad/s in one tick, but it stops instead.
 #[test]
 fn j58_a_joint_outside_its_range_does_not_reverse_away_from_its_range() {
     for sign in [1.0, -1.0] {
@@ -172,13 +184,15 @@ fn j58_a_joint_outside_its_range_does_not_reverse_away_from_its_range() {
     }
 }
 
-/// A joint reverses from a negative to a positive velocity in one tick. Its motion in this tick and its stopping distance cancel exactly.
-/// The joint may reverse inside its range. At the upper end of its range no margin remains, so the joint comes to rest.
+/// A joint reverses in one tick. Its motion in this tick and its stopping distance afterwards cancel exactly, so it
+/// would stop at its present position. Inside its range, the joint may reverse. At the upper end of its range no
+/// margin remains, so the joint comes to rest.
 #[test]
 fn j58_a_joint_reverses_to_its_present_position_only_inside_its_range() {
     let mut found = 0;
     for wanted in (108..=136).map(|n| f64::from(n) / 1_024.0) {
-        // 0.5 · (velocity + wanted) · 0.125 = -stopping distance. Rounding prevents this equality for some velocities.
+        // The motion in this tick, 0.5 · (velocity + wanted) · 0.125, must be equal to the negative stopping
+        // distance. The test skips velocities for which rounding prevents this equality.
         let stopping = moving(wanted, 0.0, 2.0).stopping_way(20.0);
         let velocity = -(16.0 * stopping + wanted);
         if 0.5 * (velocity + wanted) * 0.125 + stopping != 0.0 {
@@ -186,7 +200,8 @@ fn j58_a_joint_reverses_to_its_present_position_only_inside_its_range() {
         }
         found += 1;
         let joint = JointJog { wanted, ..moving(velocity, 0.0, 2.0) };
-        // At most 1.5 · 2.5 · 0.125 = 0.46875 rad/s are missing, so the joint reaches its target velocity in this tick.
+        // The joint can gain at most 1.5 · 2.5 · 0.125 = 0.46875 rad/s in the tick in which it reaches its target
+        // velocity.
         assert!(wanted - velocity < 0.46875);
         assert_eq!(step(joint, 0.0, (-1.0, 1.0), true).1, wanted);
         assert_eq!(step(joint, 0.0, (-1.0, 0.0), true).1, 0.0);

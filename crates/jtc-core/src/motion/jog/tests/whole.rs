@@ -19,8 +19,8 @@ fn jog_of(joint: JointJog) -> Jog {
     jog
 }
 
-/// Returns the first joint after a command with 0.5 rad/s and this highest acceleration (rad/s²). The joint had `velocity` (rad/s) and at
-/// most 2 rad/s².
+/// Returns the first joint after a command with 0.5 rad/s and the highest acceleration `most` (rad/s²). Before the
+/// command, the joint had the velocity `velocity` (rad/s) and a highest acceleration of 2 rad/s².
 fn commanded(velocity: f64, most: f64, position: f64, range: (f64, f64)) -> JointJog {
     let mut jog = jog_of(JointJog { wanted: velocity, most: 2.0, velocity, acceleration: 0.0 });
     let mut wanted = [0.0; JOINTS];
@@ -36,7 +36,7 @@ fn commanded(velocity: f64, most: f64, position: f64, range: (f64, f64)) -> Join
 #[test]
 fn j58_a_command_lowers_the_acceleration_only_if_the_joint_can_still_stop_within_its_range() {
     let cases = [
-        // (velocity, highest acceleration of the command, position, range, valid highest acceleration)
+        // Columns: velocity, highest acceleration of the command, position, range, expected highest acceleration.
         (1.0, 1.0, 0.0, (-0.5, 0.6), 1.0),
         (1.0, 1.0, 0.0, (-0.5, 0.5), 2.0),
         (-1.0, 1.0, 0.0, (-0.6, 0.5), 1.0),
@@ -96,7 +96,7 @@ fn j58_a_stop_ends_a_jog_in_the_next_tick_and_ends_it_once() {
 fn j58_a_jog_is_at_rest_if_no_joint_moves_or_its_clock_stands_and_no_velocity_is_commanded() {
     let (goes, stands) = (PathClock::start(1.0), PathClock::default());
     let cases = [
-        // (clock, commanded velocity, velocity, acceleration, at rest)
+        // Columns: clock, commanded velocity, velocity, acceleration, expected result.
         (goes, 0.0, 0.0, 0.0, true),
         (goes, 0.0, 0.5, 0.0, false),
         (goes, 0.0, 0.0, 0.5, false),

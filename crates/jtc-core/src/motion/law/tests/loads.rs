@@ -3,7 +3,7 @@ use super::*;
 
 const WIDE: PidGains = PidGains { kp: 8_000.0, ki: 10.0, kd: 80.0, int_min: -100.0, int_max: 100.0 };
 
-/// State of joint 1 in which the control law observes its load.
+/// State of joint 1 in a test of the observation of its load.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     speed: f64,
@@ -38,9 +38,9 @@ fn known_after(seen: Seen) -> bool {
     law.loads[0].is_known()
 }
 
-/// The controller learns no load from the integral of a joint that creeps, that yields, or whose integral releases a torque. Until the
-/// integral has reached the holding torque, the load is not known either. The torque limit of joint 1 is 80 N·m, and 0.04 times 80 N·m are
-/// 3.2 N·m.
+/// The load is known if the joint has settled, does not creep or yield, and its integral does not release a torque.
+/// If the load is not known yet, the other parts of the PID torque must also be small: at most 0.04 · 80 N·m = 3.2
+/// N·m for joint 1.
 #[test]
 fn j66_a_load_is_learned_from_the_integral_of_a_settled_joint() {
     let little = 3.2;
@@ -68,8 +68,8 @@ fn j66_a_load_is_learned_from_the_integral_of_a_settled_joint() {
     }
 }
 
-/// A feedback torque of exactly 0.04 times the torque limit is still small. In a contact, the controller does not wait until the integral
-/// has released a torque.
+/// A feedback torque of exactly 0.04 times the torque limit is still small. During a contact, the release of integral
+/// torque need not have ended.
 #[test]
 fn j25_loads_are_known_up_to_and_with_a_little_feedback_torque() {
     let (mut law, config) = (ControlLaw::default(), Config::avena());
@@ -83,8 +83,9 @@ fn j25_loads_are_known_up_to_and_with_a_little_feedback_torque() {
     assert!(law.knows_loads(&[true; JOINTS], &config, true));
 }
 
-/// In Teaching, the position controller does not act, so its integral does not show a load. In HoldPos, the controller observes one joint per
-/// tick. The integral holds no torque, so a load of 2 N·m loses 0.006 of its torque in each observation, with a time constant of 1 s.
+/// In Teaching, no load changes, because the position controller does not act. In HoldPos, the controller observes
+/// one joint per tick, every joint once in 6 ms. The integral holds no torque, so with a time constant of 1 s a load
+/// of 2 N·m falls by a share of 0.006 in each observation.
 #[test]
 fn j25_teaching_learns_no_load_from_an_integral_that_does_not_act() {
     let mut arm = taught(&[2.0; JOINTS]);
@@ -103,7 +104,8 @@ fn j25_teaching_learns_no_load_from_an_integral_that_does_not_act() {
     }
 }
 
-/// The second tick of Teaching computes no torques, so the torques of Teaching do not change, even if a transfer begins in this tick.
+/// The second tick of Teaching computes no torques, so the load torques of the first tick continue. A change of the
+/// mode in this tick does not alter them.
 #[test]
 fn j25_j44_a_transfer_during_teaching_keeps_the_load() {
     let found = [3.0, -20.0, 12.0, 5.0, -2.0, 1.0];
@@ -114,8 +116,9 @@ fn j25_j44_a_transfer_during_teaching_keeps_the_load() {
     assert_eq!(arm.motion.law.torque.map(|torque| torque.load), found);
 }
 
-/// Load torque and braking torque exist only in Teaching. After Teaching, the controller blends these 24 N·m out. If the model torque
-/// contains the torque that decelerates the arm, the whole torque of 88 N·m continues without a step.
+/// At the end of Teaching, the torque consists of 64 N·m from the model, 16 N·m for the load and 8 N·m for braking.
+/// Usually the model torque steps and the other 24 N·m are blended out. After a change of the whole torque, all 88
+/// N·m continue without a step.
 #[test]
 fn j25_j44_the_torques_of_teaching_are_blended_out() {
     let last = JointTorque { model: 64.0, load: 16.0, brake: 8.0, ..JointTorque::default() };
@@ -137,8 +140,8 @@ fn j25_j44_the_torques_of_teaching_are_blended_out() {
     }
 }
 
-/// After Teaching, the integral holds the load that Teaching held, and the controller must learn the loads again. The tolerance is for the
-/// spring of the dry friction, whose anchor has single precision.
+/// After Teaching, the integral holds the same load torque, and the controller must learn the loads again. The
+/// tolerance covers the spring of the dry friction, whose anchor has single precision.
 #[test]
 fn j25_after_teaching_the_integral_holds_the_load() {
     let found = [3.0, -20.0, 12.0, 5.0, -2.0, 1.0];
@@ -154,7 +157,8 @@ fn j25_after_teaching_the_integral_holds_the_load() {
     }
 }
 
-/// Each joint needs 70 N·m without its braking torque of 20 N·m, and its torque limit is 80 N·m. A joint without torque does not brake.
+/// The torque limit is 80 N·m, and the other parts of the torque need 70 N·m. The braking torque of 20 N·m is
+/// therefore reduced to 10 N·m. A joint that is not enabled does not brake.
 #[test]
 fn j16_j25_the_braking_torque_of_an_enabled_joint_stays_within_its_limit() {
     let (mut law, mut config) = (ControlLaw::default(), Config::avena());
@@ -164,9 +168,9 @@ fn j16_j25_the_braking_torque_of_an_enabled_joint_stays_within_its_limit() {
     assert_eq!(law.torque.map(|torque| torque.brake), [10.0, 10.0, 10.0, 0.0, 10.0, 10.0]);
 }
 
-/// Joint 2 moves against its holding torque, so that its damping of about 30 N·m acts in the direction of the holding torque. Only 2 N·m
-/// remain above gravity. The torque with the damping then reaches the limit and does not exceed it. In a tick that computes a slowly
-/// changing value, the braking torque does not change, even if gravity rises. The next tick bounds the braking torque again.
+/// Joint 2 moves so that its damping of about 30 N·m acts in the direction of its holding torque. The torque limit
+/// leaves only 2 N·m above gravity, so the total torque is equal to the limit. A tick that computes a slowly changing
+/// value keeps the braking torque, even if gravity has increased. The next tick limits the braking torque again.
 #[test]
 fn j25_teaching_brakes_up_to_the_torque_limit_in_the_ticks_that_compute_torques() {
     let mut arm = taught(&[0.0; JOINTS]);
@@ -179,7 +183,8 @@ fn j25_teaching_brakes_up_to_the_torque_limit_in_the_ticks_that_compute_torques(
     arm.config.joints[1].torque_max = limit;
     let velocity = [0.0, -0.35 * gravity.signum(), 0.0, 0.0, 0.0, 0.0];
     let at_limit = |arm: &Arm| (arm.motion.law.torque[1].sum().abs() - limit).abs() < 1e-9;
-    // The first nine ticks and every fourth tick after them compute slowly changing values. Ticks 11 to 13 compute torques.
+    // The first nine ticks and every fourth tick after them compute slowly changing values. Ticks 11 to 13 compute
+    // the torques of Teaching.
     for _ in 0..13 {
         arm.tick_of(ControlMode::Teach, false, &Nodes::enabled_at(POSE, velocity));
     }
@@ -191,7 +196,8 @@ fn j25_teaching_brakes_up_to_the_torque_limit_in_the_ticks_that_compute_torques(
     assert!(at_limit(&arm), "{:?} {limit}", arm.motion.law.torque[1]);
 }
 
-/// The third tick of Teaching computes the inertia of the whole arm, which is the mass matrix at the measured position with the rotors.
+/// The third tick of Teaching computes the inertia of the arm: the mass matrix at the measured position, including
+/// the rotors.
 #[test]
 fn j25_j33_the_third_tick_of_teaching_computes_the_inertia_of_the_arm() {
     let mut arm = taught(&[0.0; JOINTS]);
@@ -209,8 +215,8 @@ fn j25_j33_the_third_tick_of_teaching_computes_the_inertia_of_the_arm() {
     assert_eq!(held.motion.ramp.inertia(), [0.0; JOINTS], "no Teaching");
 }
 
-/// The friction table begins at 0.1 rad/s with 3 N·m. An arm that is held needs no friction torque. On the approach, the controller uses
-/// the friction of the nearest velocity of the table.
+/// The friction table begins at 0.1 rad/s with 3 N·m. An arm that is held gets no friction torque. In the approach, a
+/// speed below 0.1 rad/s gets the friction of 0.1 rad/s.
 #[test]
 fn j42_an_arm_that_is_held_gets_no_friction_torque_from_a_table_without_standstill() {
     for (mode, friction) in [(ControlMode::Hold, 0.0), (ControlMode::Approach, 3.0)] {
@@ -225,8 +231,8 @@ fn j42_an_arm_that_is_held_gets_no_friction_torque_from_a_table_without_standsti
     }
 }
 
-/// Gravity exceeds the torque limit of joint 2. Half of the position error limit of 0.25 rad is 0.125 rad. The position of a yielding joint
-/// does not count.
+/// Joint 2 is at its torque limit, because gravity exceeds this limit. Joint 4 lags if its position error is above
+/// 0.125 rad, half of its limit of 0.25 rad. A yielding joint never lags.
 #[test]
 fn j75_a_joint_presses_at_its_torque_limit_or_lags_by_more_than_half_of_its_position_error_limit() {
     for (error, lags) in [(0.125, false), (-0.125, false), (0.1875, true), (-0.1875, true)] {
@@ -234,7 +240,7 @@ fn j75_a_joint_presses_at_its_torque_limit_or_lags_by_more_than_half_of_its_posi
         arm.config.joints[1].torque_max = 10.0;
         arm.config.joints[3].position_error_max = 0.25;
         arm.tick(ControlMode::Hold, false, 0.0);
-        // The set position and the measured position of joint 4 are exact in binary.
+        // These positions of joint 4 have no rounding error in binary.
         arm.motion.set.point.position[3] = 0.5;
         arm.motion.set.commanded.put(&arm.motion.set.point);
         let mut measured = POSE;

@@ -10,13 +10,13 @@ fn limits() -> JointConfig {
     Config::avena().joints[1]
 }
 
-/// Returns the torque of an integral that does not change, N·m.
+/// Returns the present torque of the integral, N·m.
 fn integral(mut pid: Pid, gains: &PidGains) -> f64 {
     pid.step(gains, 0.0, true, None).i
 }
 
-/// The torque of a yielding joint begins at the commanded torque, which is within the torque limit. The blended part of the torque takes
-/// the difference: 250 N·m exceed the limit by 70 N·m.
+/// The computed torque of 250 N·m exceeds the limit of 180 N·m by 70 N·m. When the joint begins to yield, its blended
+/// torque removes these 70 N·m, so the sum begins at the commanded torque.
 #[test]
 fn j68_a_joint_that_begins_to_yield_starts_from_its_commanded_torque() {
     for (model, blend, commanded, blended) in [
@@ -33,8 +33,9 @@ fn j68_a_joint_that_begins_to_yield_starts_from_its_commanded_torque() {
     }
 }
 
-/// The integral of the joint contains 100 N·m. A lowered load begins with at most 0.3 times 180 N·m, which is 54 N·m. Before the load of a
-/// pushed joint is known, its integral does not count as a load. After hand guiding, the integral counts.
+/// The integral of the joint contains 100 N·m. If the load of a pushed joint is unknown, the yield begins without a
+/// load. After hand guiding, it begins with the torque of the integral. A lowered load begins with at most 0.3 · 180
+/// N·m = 54 N·m of the integral.
 #[test]
 fn j68_j70_a_yield_begins_with_the_load_that_the_controller_knows() {
     for (lowers, led, learned, load) in [
@@ -68,8 +69,9 @@ fn j70_a_joint_that_yields_already_lowers_its_load_only_if_it_is_overloaded() {
     assert!((0..JOINTS).all(|j| law.yields(j) == (j == 1)));
 }
 
-/// Moves a joint with a load of 40 N·m for 1.3 s in the direction of its load, then holds the joint for 0.6 s. The spring opposes the load,
-/// so the controller doubts a part of the load.
+/// Moves a yielding joint with a load of 40 N·m in the direction of its load for 1.3 s, and then holds it for 0.6 s.
+/// The load drives the joint against the spring, so the controller reduces the load, because a part of it may not
+/// exist.
 fn doubted() -> Yield {
     let (limits, mut position) = (limits(), 0.0);
     let mut yields = Yield::begin(false, false, 0.0, 5.0, 40.0);
@@ -92,8 +94,8 @@ fn doubted() -> Yield {
     yields
 }
 
-/// After a yield, the integral continues the part of the load that the spring has not opposed. The learned load is the larger of this part
-/// and the present load, because the doubted part may exist.
+/// After a yield, the integral takes over the part of the load that the spring has not opposed. The controller stores
+/// the larger of this part and the present load as the learned load, because the opposed part may nevertheless exist.
 #[test]
 fn j68_the_load_after_a_yield_is_the_larger_of_what_acts_and_what_is_left() {
     let yields = doubted();
@@ -111,7 +113,7 @@ fn j68_the_load_after_a_yield_is_the_larger_of_what_acts_and_what_is_left() {
     }
 }
 
-/// A joint whose load was not known before the yield has learned no load during a yield without motion.
+/// A joint whose load was unknown before the yield still has no known load after a yield without motion.
 #[test]
 fn j68_a_yield_without_motion_teaches_no_load() {
     let (limits, mut law) = (limits(), ControlLaw::default());
@@ -151,8 +153,9 @@ fn j25_j68_no_joint_yields_in_teaching_or_without_torque() {
     }
 }
 
-/// Joints that lower their loads share the damping rate of 40 1/s. The damping of an inertia of 1 kg·m² is 40 N·m·s/rad for one joint and
-/// 20 N·m·s/rad for each of two joints. In the first tick, a fifth of the damping acts: 0.2 · 40 · 0.25 rad/s are 2 N·m.
+/// Several joints that lower their loads share the damping rate of 40 1/s. With an inertia of 1 kg·m², the damping is
+/// 40 N·m·s/rad for one joint, and 20 N·m·s/rad for each of two joints. In the first tick, a fifth of the damping
+/// acts. For one joint this is 0.2 · 40 N·m·s/rad · 0.25 rad/s = 2 N·m.
 #[test]
 fn j70_joints_that_lower_their_loads_share_the_damping() {
     for (lowers, torque) in [([true, false], -2.0), ([true, true], -1.0)] {
@@ -166,8 +169,9 @@ fn j70_joints_that_lower_their_loads_share_the_damping() {
     }
 }
 
-/// With an integral gain of 10, the integral of each joint holds 12 N·m. With an integral gain of 40, a held joint keeps these 12 N·m. A
-/// yielding joint has no position controller, so its integral keeps its value, which corresponds to four times the torque.
+/// The integral of each joint holds 12 N·m with an integral gain of 10. After a change to a gain of 40, a held joint
+/// keeps 12 N·m. The position controller of a yielding joint does not act, so its integral is not adapted and would
+/// hold four times the torque.
 #[test]
 fn j71_new_gains_keep_the_torque_of_the_integral_of_held_joints() {
     let (mut law, steep) = (ControlLaw::default(), PidGains { ki: 40.0, ..WIDE });
@@ -183,7 +187,8 @@ fn j71_new_gains_keep_the_torque_of_the_integral_of_held_joints() {
     }
 }
 
-/// Without a position gain, no joint can be held. A missing position gain of an absent joint does not matter.
+/// Without a position gain, a joint cannot be held, so the gains are refused. The position gain of an absent joint
+/// does not matter.
 #[test]
 fn j53_j71_the_gains_of_an_absent_joint_need_not_hold() {
     let (law, mut config) = (ControlLaw::default(), Config::avena());
@@ -195,7 +200,8 @@ fn j53_j71_the_gains_of_an_absent_joint_need_not_hold() {
     assert!(law.hold_on(&gains, &config));
 }
 
-/// Joint 4 was just enabled. Its integral, its load and its yield belong to the time before, and no integral must release a torque.
+/// Joint 4 was disabled and is enabled again. Its old integral, load and yield are cleared, and no integral must
+/// release a torque.
 #[test]
 fn j16_a_joint_that_is_enabled_again_begins_without_its_old_torques() {
     let begun = || {

@@ -24,8 +24,8 @@ impl Bench {
     }
 }
 
-/// The velocity is v with 0.5 · left = inertia · v / 0.3 s, so v = 0.15 s · left / inertia. `left` is 92 N·m minus holding torque and
-/// friction.
+/// `left` is 92 N·m minus the holding torque and the friction. Half of it must stop the velocity v within 0.3 s: 0.5
+/// · left = inertia · v / 0.3 s. Therefore v = 0.15 s · left / inertia.
 #[test]
 fn j58_half_of_the_remaining_torque_can_stop_the_jog_within_300_ms() {
     for (inertia, held, friction, wanted, velocity) in [
@@ -39,7 +39,8 @@ fn j58_half_of_the_remaining_torque_can_stop_the_jog_within_300_ms() {
         // 0.15 · (92 − 32) = 9.
         (18.0, 32.0, 0.0, 1.0, 0.5),
         (18.0, -32.0, 0.0, 1.0, 0.5),
-        // 0.15 · (92 − 32 − 12) = 7.2. Friction counts in both directions.
+        // inertia · v = 0.15 · (92 − 32 − 12) = 7.2. The friction of 12 N·m is subtracted for both directions of the
+        // motion.
         (14.4, 32.0, 12.0, 1.0, 0.5),
         (14.4, -32.0, 12.0, 1.0, 0.5),
         (14.4, 32.0, 12.0, -1.0, -0.5),
@@ -48,26 +49,30 @@ fn j58_half_of_the_remaining_torque_can_stop_the_jog_within_300_ms() {
         let found = bench.jog_first(wanted).unwrap();
         assert!(near(found, velocity), "{inertia} {held} {friction} {wanted}: {found}");
     }
-    // The torque of joint 1 is |27.6 · 0.8| + |−11.04 · 0.5| = 27.6 N·m·s for the wanted velocities. Half of the velocities is possible.
+    // At the wanted velocities, the momentum of joint 1 is |27.6 · 0.8| + |−11.04 · 0.5| = 27.6 N·m·s. It can stop
+    // 0.15 · 92 = 13.8 N·m·s, so half of the velocities is allowed.
     let bench = Bench::new().inertia(&[(0, 0, 27.6), (0, 1, -11.04)]);
     let found = bench.jog(&two(0.8, 0.5)).unwrap();
     assert!(all_near(&found, &two(0.4, 0.25)), "{found:?}");
 }
 
-/// The friction of a joint is `viscous` times its speed, and at least the friction at 0.1 rad/s.
+/// The friction is `viscous` times the speed of the joint. A joint below 0.1 rad/s has the friction of 0.1 rad/s.
 #[test]
 fn j58_a_jog_creeps_if_friction_leaves_no_torque_for_a_higher_speed() {
     for (inertia, viscous, wanted, velocity) in [
-        // At 0.5 rad/s, 92 − 100 N·m remain. At 0.02 rad/s, 92 − 20 N·m remain, for up to 0.15 · 72/10 = 1.08 rad/s.
+        // At 0.5 rad/s, the friction of 100 N·m leaves no torque. At the slow speed of 0.02 rad/s, 92 − 20 = 72 N·m
+        // remain. They would allow 0.15 · 72/10 = 1.08 rad/s, so the jog gets 0.02 rad/s.
         (10.0, 200.0, 0.5, 0.02),
         (10.0, 200.0, -0.5, -0.02),
-        // The torque at 0.02 rad/s is sufficient for 0.15 · 72/1080 = 0.01 rad/s.
+        // The torque that remains at 0.02 rad/s allows only 0.15 · 72/1080 = 0.01 rad/s.
         (1_080.0, 200.0, 0.5, 0.01),
-        // At 0.5 rad/s, 92 − 91 = 1 N·m remains, for 0.15/10 = 0.015 rad/s. At 0.02 rad/s, 92 − 18.2 N·m remain.
+        // At 0.5 rad/s, 92 − 91 = 1 N·m remains and allows 0.15/10 = 0.015 rad/s. At the slow speed, 92 − 18.2 N·m
+        // remain, so the jog gets 0.02 rad/s.
         (10.0, 182.0, 0.5, 0.02),
-        // At 0.5 rad/s, 92 − 90 = 2 N·m remain, for 0.15 · 2/10 = 0.03 rad/s, which is above 0.02 rad/s.
+        // At 0.5 rad/s, 92 − 90 = 2 N·m remain and allow 0.15 · 2/10 = 0.03 rad/s. This is faster than the slow speed
+        // of 0.02 rad/s.
         (10.0, 180.0, 0.5, 0.03),
-        // A request at or below 0.02 rad/s is not exceeded.
+        // A jog never gets more than the requested speed, also below 0.02 rad/s.
         (10.0, 200.0, 0.02, 0.02),
         (10.0, 200.0, 0.01, 0.01),
         (10.0, 0.0, 0.01, 0.01),
@@ -78,14 +83,16 @@ fn j58_a_jog_creeps_if_friction_leaves_no_torque_for_a_higher_speed() {
     }
 }
 
-/// The torque allows 0.15 · 92/inertia = 13.8/inertia rad/s. A speed up to 0.001 rad/s counts as zero, but not if the host requested it.
+/// The torque allows 0.15 · 92/inertia = 13.8/inertia rad/s. The jog is refused if the allowed speed is at most 0.001
+/// rad/s, unless the host requested such a slow speed.
 #[test]
 fn j58_a_jog_is_refused_if_the_torque_allows_at_most_a_thousandth_of_a_radian_per_second() {
     for (inertia, wanted, velocity) in [
         (6_900.0, 0.5, Some(0.002)),
         (27_600.0, 0.5, None),
         (27_600.0, -0.5, None),
-        // 0.015625 · 13800/0.3 is 718.75, and 46/718.75 · 0.015625 is exactly 0.001.
+        // The allowed speed is exactly 0.001 rad/s: 0.015625 · 13800/0.3 = 718.75 N·m are needed for the request, and
+        // 46/718.75 · 0.015625 = 0.001.
         (13_800.0, 0.015625, None),
         (13_799.0, 0.015625, Some(13.8 / 13_799.0)),
         (1.0, 0.0005, Some(0.0005)),
@@ -102,17 +109,19 @@ fn j58_a_jog_is_refused_if_the_torque_allows_at_most_a_thousandth_of_a_radian_pe
     assert_eq!(46.0 / 718.75 * 0.015625, 0.001, "the speed of 0.001 rad/s is exact");
 }
 
-/// Joint 1 has a highest acceleration of 2 rad/s², and joint 2 has one of 4 rad/s². Half of the remaining torque is 46 N·m. Joint 1 needs
-/// 46 · 2 = 92 N·m if joint 1 moves, and 11.5 · 4 = 46 N·m if joint 2 moves. Joint 2 needs at most 11.5 · 2 + 4 · 4 = 39 N·m.
+/// The highest acceleration is 2 rad/s² for joint 1 and 4 rad/s² for joint 2. Half of the remaining torque is 46 N·m.
+/// Joint 1 needs 46 · 2 = 92 N·m for its own acceleration, and 11.5 · 4 = 46 N·m for that of joint 2. Joint 2 needs
+/// at most 11.5 · 2 + 4 · 4 = 39 N·m.
 #[test]
 fn j58_half_of_the_remaining_torque_accelerates_the_joints_that_move() {
     for (wanted, set, share) in [
         (two(0.1, 0.0), two(0.0, 0.0), 0.5),
         (two(-0.1, 0.0), two(0.1, 0.0), 0.5),
         (two(0.0, 0.1), two(0.0, 0.0), 1.0),
-        // Both joints need torque: 46/(92 + 46).
+        // Both joints accelerate, so joint 1 needs 92 + 46 N·m. The share is 46/(92 + 46).
         (two(0.1, -0.1), two(0.0, 0.0), 1.0 / 3.0),
-        // The jog brings a joint without a requested velocity to rest.
+        // The second joint has no requested velocity, but it still moves and must come to rest, so both joints need
+        // torque.
         (two(0.1, 0.0), two(0.0, 0.1), 1.0 / 3.0),
         (two(0.0, 0.1), two(-0.1, 0.0), 1.0 / 3.0),
     ] {
@@ -126,8 +135,8 @@ fn j58_half_of_the_remaining_torque_accelerates_the_joints_that_move() {
     }
 }
 
-/// Friction of 91.9 N·m leaves 0.1 N·m. Half of this torque is 1/40 of the torque for the highest acceleration of an inertia of 1 kg·m²,
-/// and 1/80 for 2 kg·m². There, the lower bound of 2 % of 2 rad/s², which needs 0.08 N·m, has priority.
+/// Friction of 91.9 N·m leaves 0.1 N·m of 92 N·m. With 1 kg·m², half of this torque gives 1/40 of the highest
+/// acceleration of 2 rad/s². With 2 kg·m² it would give 1/80, but the lower bound of 2 % applies.
 #[test]
 fn j58_a_jog_has_at_least_two_per_cent_of_its_highest_acceleration() {
     for (inertia, acceleration) in [(1.0, 2.0 / 40.0), (2.0, 0.04)] {
@@ -137,8 +146,9 @@ fn j58_a_jog_has_at_least_two_per_cent_of_its_highest_acceleration() {
     }
 }
 
-/// A mass of 9 kg needs up to 90 N·m. At π/3 before or after the horizontal position the mass needs 45 N·m, so 92 − 45 = 47 N·m remain. The
-/// jog may end 0.2 s + 0.15 s = 0.35 s later. The position with the higher torque counts.
+/// A mass of 9 kg needs 90 N·m at the horizontal position, and 45 N·m at π/3 before or after it. There, 92 − 45 = 47
+/// N·m remain. A jog may continue for 0.2 s + 0.15 s = 0.35 s. The higher holding torque of its start and its end
+/// counts.
 #[test]
 fn j58_the_torque_at_the_end_of_the_jog_also_remains() {
     let jog = |position: f64, range: (f64, f64), velocity: f64| {
@@ -148,11 +158,11 @@ fn j58_the_torque_at_the_end_of_the_jog_also_remains() {
     };
     let free = (-2.5, 2.5);
     for (position, range, velocity) in [
-        // The end of the jog has the higher torque.
+        // The holding torque at the end of the jog is higher.
         (-FRAC_PI_3 - 0.35, free, 1.0),
         (-FRAC_PI_3 - 0.175, free, 0.5),
         (FRAC_PI_3 + 0.35, free, -1.0),
-        // The present position has the higher torque.
+        // The holding torque at the present position is higher.
         (-FRAC_PI_3, free, -1.0),
         (FRAC_PI_3, free, 0.5),
         // The jog ends at the limit of the joint.
@@ -167,7 +177,8 @@ fn j58_the_torque_at_the_end_of_the_jog_also_remains() {
     }
 }
 
-/// The friction of each joint is 10 N·m plus 10 N·m·s/rad. A slow joint counts as if it moved at 0.1 rad/s.
+/// The friction of a moving joint is 10 N·m plus 10 N·m·s/rad times its speed. A joint below 0.1 rad/s counts as if
+/// it moved at 0.1 rad/s.
 #[test]
 fn j58_friction_reduces_the_remaining_torque_of_the_joints_that_move() {
     for (velocity, left) in
@@ -178,19 +189,21 @@ fn j58_friction_reduces_the_remaining_torque_of_the_joints_that_move() {
     }
 }
 
-/// A mass of 9 kg at the horizontal position needs 90 N·m, and less torque everywhere else. So at least 1 N·m counts as remaining, if the
-/// torque limit is sufficient for the motion at all.
+/// A mass of 9 kg needs 90 N·m at the horizontal position, and less torque everywhere else. A jog away from this
+/// position always has at least 1 N·m, unless the mass must be lifted with more than the torque limit.
 #[test]
 fn j58_a_joint_may_move_to_a_position_with_a_lower_holding_torque() {
     for (friction, velocity, left) in [
         // 92 − 90 − 0.5.
         (0.5, 1.0, 1.5),
-        // 92 − 90 − 5 is below 1. The lift needs 90 + 5 N·m of 100 N·m.
+        // 92 − 90 − 5 = −3 N·m remain, so the minimum of 1 N·m applies. To lift the mass, the joint needs 90 + 5 N·m,
+        // which is below the limit of 100 N·m.
         (5.0, 1.0, 1.0),
         (10.0, 1.0, 1.0),
-        // The lift needs 90 + 11 N·m, which is above the limit: 92 − 90 − 11.
+        // To lift the mass, the joint needs 90 + 11 N·m, which is above the limit of 100 N·m. The minimum does not
+        // apply, and 92 − 90 − 11 = −9 N·m remain.
         (11.0, 1.0, -9.0),
-        // In the other direction the joint lowers the mass.
+        // In the other direction the joint lowers the mass, so the minimum of 1 N·m applies.
         (11.0, -1.0, 1.0),
     ] {
         let bench = Bench::new().mass(9.0).inertia(&[(0, 0, 1.0)]).friction(friction, 0.0);
@@ -199,8 +212,9 @@ fn j58_a_joint_may_move_to_a_position_with_a_lower_holding_torque() {
     }
 }
 
-/// A mass of 12 kg at the horizontal position needs 120 N·m of 100 N·m. Joints 1 and 2 move in opposite directions, and both have the same
-/// coupling inertia with joint 1. The jog then needs no torque of joint 1 for the acceleration, so joint 1 does not lift the mass.
+/// A mass of 12 kg needs 120 N·m at the horizontal position, more than the limit of 100 N·m. Joints 1 and 2
+/// accelerate in opposite directions and have the same coupling inertia with joint 1. Joint 1 then needs no torque
+/// for the acceleration, so the jog does not lift the mass.
 #[test]
 fn j58_a_joint_whose_couplings_cancel_out_does_not_lift_its_load() {
     let heavy = |second: f64| {
@@ -209,11 +223,12 @@ fn j58_a_joint_whose_couplings_cancel_out_does_not_lift_its_load() {
     };
     assert!(near(heavy(1.0), 1.0), "{}", heavy(1.0));
     assert!(near(heavy(2.0), 1.0), "{}", heavy(2.0));
-    // The torque of joint 1 lifts the mass: 92 − 120.
+    // Here joint 1 lifts the mass with its own torque, so 92 − 120 = −28 N·m remain.
     assert!(near(heavy(0.5), -28.0), "{}", heavy(0.5));
 }
 
-/// The integral holds 95 N·m at every position, so no position needs less torque, and 92 − 95 N·m remain.
+/// The integral holds 95 N·m at every position, so a motion does not reduce the holding torque. 92 − 95 = −3 N·m
+/// remain, and the jog is refused.
 #[test]
 fn j58_a_jog_to_a_position_with_the_same_holding_torque_is_no_unloading() {
     for velocity in [1.0, -1.0] {

@@ -34,7 +34,8 @@ fn three([first, second, third]: [f64; 3]) -> [f64; JOINTS] {
     [first, second, third, 0.0, 0.0, 0.0]
 }
 
-/// The contributions of the wanted velocities are 2 · 1 + 1 · 1 + 0.5 · 0.5 = 3.25 m/s.
+/// The contributions of the wanted velocities are 2 · 1 + 1 · 1 + 0.5 · 0.5 = 3.25 m/s. If the limit is lower, all
+/// velocities are reduced by the same factor.
 #[test]
 fn j58_a_jog_from_rest_is_scaled_down_to_the_tool_speed_limit() {
     let wanted = [1.0, -1.0, 0.5];
@@ -54,11 +55,12 @@ fn j58_a_tool_speed_limit_of_zero_does_not_limit_a_jog() {
     }
 }
 
-/// The contributions of the wanted velocities are 1, 2 and 1 m/s, so the share is 2/4.
+/// The wanted contributions of joints 1, 2 and 3 are 1, 2 and 1 m/s. The limit is 2 m/s, so the share is 2/4.
 ///
-/// Joint 2 moves at 1.5 rad/s and must slow down to 1 rad/s. Its 1.5 m/s leave 0.5 m/s for the joints 1 and 3, which would use 1 m/s of the
-/// wanted 2 m/s with a share of 0.5. With a share of 0.25, joint 1 would have 0.125 rad/s. Joint 1 is already faster than that, and may keep
-/// its speed of 0.2 rad/s, which contributes 0.4 m/s. So 2 − 1.5 − 0.4 = 0.1 m/s remain for joint 3, which are 0.2 rad/s.
+/// Joint 2 moves at 1.5 rad/s and must slow down to 1 rad/s. Its present contribution of 1.5 m/s leaves 0.5 m/s for
+/// joints 1 and 3. Their wanted contributions are 2 m/s, so their share becomes 0.25. Joint 1 would then get 0.125
+/// rad/s, but it already moves at 0.2 rad/s and may keep this speed. It contributes 0.4 m/s. So 2 − 1.5 − 0.4 = 0.1
+/// m/s remain for joint 3, which is 0.2 rad/s.
 #[test]
 fn j58_joints_that_accelerate_share_the_tool_speed_that_the_other_joints_leave() {
     for sign in [1.0, -1.0] {
@@ -66,28 +68,30 @@ fn j58_joints_that_accelerate_share_the_tool_speed_that_the_other_joints_leave()
         let slowed = bench.slowed([0.5, -2.0, 2.0].map(|v| sign * v));
         assert!(all_near(&slowed, &[0.2, -1.0, 0.2].map(|v| sign * v)), "{slowed:?}");
     }
-    // Joint 1 moves against its wanted direction. Its contribution counts in the same way.
+    // Joint 1 moves against its wanted direction. Only the magnitude of its contribution counts, so the result is the
+    // same.
     let slowed = Bench::with_tool_speed(2.0).moving([-0.2, -1.5, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.2, -1.0, 0.2]), "{slowed:?}");
 }
 
-/// Joint 2 alone exceeds the limit of 2 m/s. At least 0.5 % of the limit, 0.01 m/s, remains for the joints 1 and 3. Each of these joints
-/// would contribute 1 m/s, so each may contribute 0.005 m/s.
+/// Joint 2 alone is faster than the limit of 2 m/s. The other joints always get at least 0.5 % of the limit, 0.01 m/s.
+/// Joints 1 and 3 want the same contribution, so each gets 0.005 m/s.
 #[test]
 fn j58_half_a_per_cent_of_the_tool_speed_limit_always_remains_for_joints_that_accelerate() {
     let slowed = Bench::with_tool_speed(2.0).moving([0.0, -3.0, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.0025, -1.0, 0.01]), "{slowed:?}");
-    // Joint 1 already moves at its share of the limit (0.5 · 0.5 rad/s). Joint 1 is not faster than this share, so joints 1 and 3 divide the
-    // 0.01 m/s, although joint 1 may keep its speed.
+    // Joint 1 moves exactly at its share of the limit (0.5 · 0.5 rad/s), so it is not too fast. Joints 1 and 3 share
+    // the 0.01 m/s. Joint 1 may keep its present speed nevertheless.
     let slowed = Bench::with_tool_speed(2.0).moving([0.25, -3.0, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.25, -1.0, 0.01]), "{slowed:?}");
 }
 
-/// A joint that accelerates at 2 rad/s² with a jerk of 20 rad/s³ needs 0.1 s until its acceleration is zero. In this time its velocity
-/// changes by 0.5 · 2 · 0.1 = 0.1 rad/s.
+/// A joint that accelerates at 2 rad/s² with a jerk limit of 20 rad/s³ needs 0.1 s until its acceleration is zero.
+/// Until then it becomes faster by 0.5 · 2 · 0.1 = 0.1 rad/s.
 ///
-/// The contributions of the wanted velocities are 1 m/s each, so the share is 1/2. Joint 2 moves at 0.8 rad/s, so 0.2 m/s remain for joint
-/// 1. That would be 0.1 rad/s, but joint 1 reaches 0.175 rad/s in any case.
+/// The wanted contributions are 1 m/s each and the limit is 1 m/s, so the share is 1/2. Joint 2 moves at 0.8 rad/s
+/// and leaves 0.2 m/s for joint 1, which would be 0.1 rad/s. Joint 1 reaches 0.175 rad/s in each case and may keep
+/// this speed.
 #[test]
 fn j58_the_tool_speed_contains_the_speed_that_a_joint_reaches_until_its_acceleration_is_zero() {
     for (velocity, acceleration) in [
@@ -95,11 +99,11 @@ fn j58_the_tool_speed_contains_the_speed_that_a_joint_reaches_until_its_accelera
         (-0.075, -2.0),
         // 0.15 + 0.5 · 1 · 1/20.
         (0.15, 1.0),
-        // The speed falls, or the joint is faster before it reverses.
+        // The joint does not become faster later, so its present speed counts.
         (0.175, 0.0),
         (0.175, -2.0),
         (-0.175, 2.0),
-        // The joint reverses to a higher speed: −0.025 + 0.5 · 8/20 = −0.025 + 0.2.
+        // The joint reverses and becomes faster: −0.025 + 0.5 · 8/20 = 0.175 rad/s.
         (-0.025, 2.0 * core::f64::consts::SQRT_2),
     ] {
         let mut bench = Bench::with_tool_speed(1.0).moving([velocity, -0.8, 0.0]);

@@ -11,10 +11,10 @@ fn assert_near(torque: f64, expected: f64, case: impl core::fmt::Display) {
     assert!((torque - expected).abs() < 1e-5, "{torque} N·m, expected {expected} N·m: {case}");
 }
 
-/// The reduction begins at `from` and is complete at `to`. The rule defines both speeds for a joint with little damping, and for a joint
-/// whose damping balances the load. Half-way between these two dampings, each speed is the mean. The smooth ramp has the value 5/32 at a
-/// quarter of the speed range, 1/2 at the half, and 27/32 at three quarters. With a time constant of 6 ms, the first tick executes a sixth
-/// of the reduction.
+/// The load torque begins to fall at the speed `from` and is zero at `to`. The rule defines both speeds for a joint
+/// with little damping (0), and for a joint whose damping balances the load (1). At 0.5, each speed is the mean.
+/// Between both speeds, the reduction is a smooth ramp: 5/32 at a quarter of the range, 1/2 at the half, and 27/32 at
+/// three quarters. With a time constant of 6 ms, a sixth of the reduction takes effect in the first tick.
 #[test]
 fn j25_the_load_torque_falls_with_the_speed_in_its_direction() {
     for (balanced, from, to) in [(0.0, 0.03, 0.15), (0.5, 0.115, 0.325), (1.0, 0.2, 0.5)] {
@@ -32,7 +32,7 @@ fn j25_the_load_torque_falls_with_the_speed_in_its_direction() {
             }
         }
     }
-    // If half of the load torque is already left out, one tick at full speed executes a sixth of the other half.
+    // Half of the load torque is already left out. One tick at full speed removes a sixth of the other half.
     assert_near(carried(32.0, 0.5).step(0.0, 0.5, 0.0, 0.0), 32.0 * (0.5 - 0.5 / 6.0), "half left out");
 }
 
@@ -53,12 +53,13 @@ fn j25_the_load_torque_returns_faster_if_the_joint_moves_against_it() {
             );
         }
     }
-    // At 0.09 rad/s, half of the load torque of a joint without damping is left out. A joint that was faster approaches this value slowly.
+    // At 0.09 rad/s, half of the load torque of a joint without damping acts. If the joint was faster before, the
+    // torque returns to this half with the time constant of 300 ms.
     assert_near(carried(32.0, 1.0).step(0.0, 0.09, 0.0, 0.0), 32.0 * 0.5 / 300.0, "from zero to the half");
 }
 
-/// In the direction of the load torque, the share falls to zero at the position limit, 0.1 rad after the start of the soft end. The time
-/// constant is 50 ms, so the first tick executes a fiftieth of the change.
+/// If the load torque pushes outwards, its acting share falls to zero at the position limit, 0.1 rad after the start
+/// of the soft end. With a time constant of 50 ms, a fiftieth of the change takes effect in the first tick.
 #[test]
 fn j25_a_soft_end_reduces_only_a_load_torque_that_pushes_outwards() {
     for (load, depth, reduction) in [
@@ -81,8 +82,8 @@ fn j25_a_soft_end_reduces_only_a_load_torque_that_pushes_outwards() {
     assert_near(joint.step(0.0, 0.0, 0.0, 0.0), 32.0 * (1.0 - 0.49), "back outside of the soft end");
 }
 
-/// A joint without a load moves in its soft end. A load that appears then acts completely. A load of zero counts as a positive load, so only
-/// a motion in the positive direction reduces the acting share.
+/// A joint without a load moves in its soft end. If a load appears later, the whole load acts. A load of zero counts
+/// as positive, so only a motion in the positive direction reduces the acting share.
 #[test]
 fn j25_without_a_load_a_soft_end_and_a_negative_motion_reduce_no_share() {
     for (velocity, depth, acts) in
@@ -94,8 +95,9 @@ fn j25_without_a_load_a_soft_end_and_a_negative_motion_reduce_no_share() {
     }
 }
 
-/// The mass drives the joint if the mass causes more than half of the load torque, and if the joint is faster than 0.1 rad/s in the
-/// direction of the load torque. Damping and friction must be 0.8 to 1.3 times the load torque.
+/// The mass alone drives the joint under three conditions. The mass causes more than half of the load torque. The
+/// joint moves faster than 0.1 rad/s in the direction of the load torque. Damping and friction are 0.8 to 1.3 times
+/// the load torque.
 #[test]
 fn j25_only_a_load_torque_that_is_mostly_of_the_mass_drives_a_joint() {
     for (by_mass, rest, velocity, against, expected) in [
@@ -103,17 +105,17 @@ fn j25_only_a_load_torque_that_is_mostly_of_the_mass_drives_a_joint() {
         (-16.0, 0.0, -0.25, 16.0, true),
         (24.0, -8.0, 0.25, 16.0, true),
         (16.0, 0.0, 0.101, 16.0, true),
-        // The mass causes half of the load torque, or less.
+        // The mass causes at most half of the load torque, so it does not drive the joint alone.
         (8.0, 8.0, 0.25, 16.0, false),
         (6.0, 10.0, 0.25, 16.0, false),
         (0.0, 16.0, 0.25, 16.0, false),
-        // The load torque acts against the torque of the mass: 8 N·m - 24 N·m = -16 N·m.
+        // The torque of the mass and the load torque have opposite signs: 8 N·m - 24 N·m = -16 N·m.
         (8.0, -24.0, -0.25, 16.0, false),
-        // The joint is not faster than 0.1 rad/s, or moves against the load torque.
+        // The joint is too slow (at most 0.1 rad/s), or moves against the load torque.
         (16.0, 0.0, 0.1, 16.0, false),
         (-16.0, 0.0, -0.1, 16.0, false),
         (16.0, 0.0, -0.25, 16.0, false),
-        // Damping and friction are 0.75 and 1.5 times the load torque.
+        // Damping and friction are outside the range of 0.8 to 1.3: 0.75 and 1.5 times the load torque.
         (16.0, 0.0, 0.25, 12.0, false),
         (16.0, 0.0, 0.25, 24.0, false),
     ] {
@@ -122,8 +124,9 @@ fn j25_only_a_load_torque_that_is_mostly_of_the_mass_drives_a_joint() {
     }
 }
 
-/// A joint sinks if more than a tenth of its highest load torque of 64 N·m was removed, and if the joint is faster than 0.1 rad/s against
-/// the removed torque. Damping and friction must be 0.8 to 1.3 times the removed torque.
+/// A joint sinks under three conditions. More than a tenth of its highest load torque of 64 N·m was removed. The
+/// joint moves faster than 0.1 rad/s against the removed torque. Damping and friction are 0.8 to 1.3 times the
+/// removed torque.
 #[test]
 fn j25_a_joint_sinks_only_if_a_large_removed_torque_explains_its_motion() {
     for (gone, velocity, against, expected) in [
@@ -131,14 +134,14 @@ fn j25_a_joint_sinks_only_if_a_large_removed_torque_explains_its_motion() {
         (-8.0, 0.25, 8.0, true),
         (8.0, -0.125, 8.0, true),
         (6.5, -0.25, 6.5, true),
-        // The removed torque is a tenth of the highest load torque, or less.
+        // At most a tenth of the highest load torque was removed, which is too little.
         (0.1 * 64.0, -0.25, 6.4, false),
         (6.0, -0.25, 6.0, false),
-        // The joint is not faster than 0.1 rad/s, or moves in the direction of the removed torque.
+        // The joint is too slow (at most 0.1 rad/s), or moves in the direction of the removed torque.
         (8.0, -0.1, 8.0, false),
         (-8.0, 0.1, 8.0, false),
         (8.0, 0.25, 8.0, false),
-        // Damping and friction are 0.75 and 1.5 times the removed torque.
+        // Damping and friction are outside the range of 0.8 to 1.3: 0.75 and 1.5 times the removed torque.
         (8.0, -0.25, 6.0, false),
         (8.0, -0.25, 12.0, false),
     ] {

@@ -30,7 +30,7 @@ fn tick(joint: &mut TaughtJoint, position: f64, velocity: f64) -> TaughtTorque {
     tick_of(joint, &limits(), position, velocity)
 }
 
-/// Moves a joint at `velocity` (rad/s) through 0 for a second, and returns its last torque.
+/// Moves a joint at `velocity` (rad/s) through position 0 for a second. Returns its last torque.
 fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
     let mut joint = begun(-velocity, coulomb);
     let mut torque = TaughtTorque::default();
@@ -41,8 +41,8 @@ fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
 }
 
 proptest! {
-    /// Together with the damping, the friction compensation and the dry friction never drive a joint. The total torque against the motion
-    /// never decreases with the speed.
+    /// Damping, friction compensation and dry friction together never drive a joint. Their total torque against the
+    /// motion never falls with the speed.
     #[test]
     fn j25_the_faster_a_joint_is_the_more_torque_it_has_against_it(
         slow in 0.001..1.4f64, more in 0.001..0.3f64, coulomb in 0.0..10.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)],
@@ -75,7 +75,7 @@ fn j25_a_joint_at_rest_is_held_by_dry_friction_up_to_its_breakaway_torque() {
         let mut joint = begun(0.2, coulomb);
         let at_rest = tick(&mut joint, 0.2, 0.0);
         assert!(at_rest.brake.abs() < 1e-3 && at_rest.friction == 0.0, "no step at the begin");
-        // A joint that is pulled slowly slips, and the dry friction then holds it at its new position.
+        // A joint that is pulled slowly slips. The dry friction then holds it at its new position.
         let slips = tick(&mut joint, 0.25, 0.0).brake;
         assert!((slips + breakaway).abs() < 1e-3, "{slips} N·m, not {breakaway}");
         let back = tick(&mut joint, 0.2, 0.0).brake;
@@ -100,8 +100,8 @@ fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
     assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
 }
 
-/// The friction compensation is half of the Coulomb friction, smoothed within 0.1 rad/s, and zero above 0.6 rad/s. The compensation is
-/// lower if the damping does not allow its slope.
+/// The friction compensation is half of the Coulomb friction. Its sign is smoothed within 0.1 rad/s, and it is zero
+/// above 0.6 rad/s. If the damping is too low for the slope of the compensation, the compensation is reduced.
 #[test]
 fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
     for (velocity, share) in
@@ -125,14 +125,15 @@ fn j25_at_a_soft_end_a_joint_is_pushed_back_and_one_that_begins_there_is_not() {
         let torque = tick(&mut joint, position, 0.0).brake;
         assert!((torque + part * share).abs() < 1e-3, "{torque} N·m at {position} rad");
     }
-    // If Teaching begins with a joint inside its soft end, or beyond its position limit, the spring does not move the joint. If a joint
-    // that began in its soft end moves further outwards, the spring acts.
+    // Teaching begins with the joint inside its soft end or beyond its position limit. The spring does not move the
+    // joint inwards. If the joint moves further outwards, the spring acts against this motion.
     for (found, further) in [(1.45, 1.5), (1.7, 1.75), (-1.45, -1.5)] {
         let mut joint = begun(found, 8.0);
         assert!(tick(&mut joint, found, 0.0).brake.abs() < 1e-3, "{found}");
         let torque = tick(&mut joint, further, 0.0).brake;
         assert!((torque + 0.5 * share * f64::signum(found)).abs() < 1e-3, "{torque} N·m at {further} rad");
-        // After a hand has moved this joint inwards and outwards again, the spring acts from the start of the soft end.
+        // After a hand has moved this joint out of the soft end and back into it, the spring acts over the whole soft
+        // end.
         tick(&mut joint, 0.0, 0.0);
         let torque = tick(&mut joint, 1.45, 0.0).brake;
         assert!((torque + 0.5 * share).abs() < 1e-3, "{torque} N·m");
@@ -164,14 +165,14 @@ fn j25_a_joint_is_too_fast_at_three_quarters_of_over_speed_or_at_1_4_rad_s() {
     }
 }
 
-/// A fifth of the rotor inertia counts. If no rotor inertia is configured, a fifth of the torque limit divided by 200 rad/s² counts:
-/// 100 N·m / (200 rad/s²) / 5 = 0.1 kg·m².
+/// A fifth of the rotor inertia is used. If no rotor inertia is configured, a fifth of the torque limit divided by
+/// 200 rad/s² is used: 100 N·m / (200 rad/s²) / 5 = 0.1 kg·m².
 #[test]
 fn j25_a_fifth_of_the_rotor_inertia_counts() {
     for (rotor_inertia, torque_max, expected) in [(1.25, 100.0, 0.25), (0.0, 100.0, 0.1), (0.0, 400.0, 0.4)] {
         let limits = JointConfig { rotor_inertia, torque_max, ..limits() };
         assert!((rotor(&limits) - expected).abs() < 1e-12, "{}", rotor(&limits));
-        // Before the inertia of the arm is computed, and after an invalid inertia, this inertia bounds the damping.
+        // The damping is bounded by this inertia until the inertia of the arm is known, and after an invalid inertia.
         let mut joint = TaughtJoint::begin(0.5, &limits, (-1.5, 1.5));
         for inertia in [f64::INFINITY, f64::NAN] {
             joint.set_inertia(inertia);
@@ -181,8 +182,9 @@ fn j25_a_fifth_of_the_rotor_inertia_counts() {
     }
 }
 
-/// The joint moves at 0.5 rad/s. After each answer, the filtered position lags by the motion of 3 ms: the lag before the answer is 4 ms,
-/// and the filter with its time constant of 4 ms moves by the motion of one tick. Missing answers and late ticks do not change this lag.
+/// The joint moves at 0.5 rad/s. Before each answer, the filtered position lags behind the joint by the motion of 4
+/// ms. The filter, with a time constant of 4 ms, then moves by the motion of 1 ms, so the lag after the answer is 3
+/// ms. Missing answers and late ticks do not change this lag.
 #[test]
 fn j25_missing_answers_and_late_ticks_do_not_change_the_speed_from_positions() {
     let at = |ms: u16| 0.5 * 0.001 * f64::from(ms);
@@ -206,8 +208,8 @@ fn j25_missing_answers_and_late_ticks_do_not_change_the_speed_from_positions() {
     assert_eq!(begun(0.5, 0.0).hear(true, 0.5, 0), 0.0, "a joint at rest has no speed in its first tick");
 }
 
-/// The springs fade from the third missing answer on, by a fifth with each tick. Damping and friction compensation follow. With each
-/// answer, the same shares return in reverse order.
+/// From the third missing answer on, the springs fade by a fifth in each tick. Then damping and friction compensation
+/// fade in the same way. When answers arrive again, the same shares return in reverse order.
 #[test]
 fn j25_a_joint_without_answers_loses_its_springs_and_then_its_damping() {
     let shares =
@@ -232,9 +234,10 @@ fn j25_a_joint_without_answers_loses_its_springs_and_then_its_damping() {
     check(&joint, 1, format_args!("a missing answer in a late tick"));
 }
 
-/// The setting is 90 N·m·s/rad. Loads of 60, 100 and 150 N·m need 120, 200 and 300 N·m·s/rad to be balanced at 0.5 rad/s. The increased
-/// damping is the torque limit per rad/s, which is 180 N·m·s/rad, or the damping that balances the load if this is higher. The inertia bounds
-/// both: 90 1/s times 3 kg·m² are 270 N·m·s/rad.
+/// The configured damping is 90 N·m·s/rad. To balance loads of 60, 100 and 150 N·m at 0.5 rad/s, the damping must be
+/// 120, 200 and 300 N·m·s/rad. The highest damping is 180 N·m·s/rad (the torque limit per rad/s), or the damping that
+/// balances the load if this is higher. The inertia bounds both values. The bound for 3 kg·m² is 90 1/s · 3 kg·m² =
+/// 270 N·m·s/rad.
 #[test]
 fn j25_the_damping_balances_the_load_within_the_bound_of_the_inertia() {
     for (inertia, load, expected) in [
@@ -252,7 +255,8 @@ fn j25_the_damping_balances_the_load_within_the_bound_of_the_inertia() {
     }
 }
 
-/// The damping balances half of a load of 45 N·m at 0.5 rad/s, if the inertia of 0.5 kg·m² bounds the damping to 45 N·m·s/rad.
+/// With an inertia of 0.5 kg·m², the damping is at most 45 N·m·s/rad, which is 22.5 N·m at 0.5 rad/s. This balances
+/// half of a load of 45 N·m. The balanced share is never above 1.
 #[test]
 fn j25_the_balanced_share_of_a_load_is_at_most_the_whole_load() {
     for (teach_damping, inertia, load, expected) in [
@@ -262,7 +266,7 @@ fn j25_the_balanced_share_of_a_load_is_at_most_the_whole_load() {
         (90.0, 0.5, 45.0, 0.5),
         (90.0, 0.5, -45.0, 0.5),
         (90.0, 0.5, 90.0, 0.25),
-        // Without damping and without a load, the damping balances the whole load.
+        // If both the damping and the load are zero, the share is 1.
         (0.0, 3.0, 0.0, 1.0),
     ] {
         let limits = JointConfig { teach_damping, ..limits() };
@@ -273,9 +277,10 @@ fn j25_the_balanced_share_of_a_load_is_at_most_the_whole_load() {
     }
 }
 
-/// The damping increases from 90 to 180 N·m·s/rad between 0.4 and 0.8 rad/s, or with the excess of the flange speed, whichever is higher.
-/// Between 0.9 and 1.7 rad/s, the braking torque increases to 60 rad/s² times 3 kg·m², which is 180 N·m. Both ramps are smooth: 5/32 at a
-/// quarter of the range, 1/2 at the half, and 27/32 at three quarters. The joint has too much friction for dry friction.
+/// The damping rises from 90 to 180 N·m·s/rad between 0.4 and 0.8 rad/s, or with the excess of the flange speed,
+/// whichever is higher. Between 0.9 and 1.7 rad/s, a braking torque rises to 60 rad/s² · 3 kg·m² = 180 N·m. Both
+/// ramps are smooth: 5/32 at a quarter of the range, 1/2 at the half, and 27/32 at three quarters. The joint has so
+/// much friction of its own that it gets no dry friction.
 #[test]
 fn j25_a_fast_joint_has_more_damping_and_a_braking_torque() {
     for (speed, haste, grown, braked) in [
@@ -334,8 +339,9 @@ fn j25_at_both_soft_ends_damping_and_friction_act_against_the_motion() {
     }
 }
 
-/// The dry friction has 5.4 N·m, and the damping has 90 N·m·s/rad. The first speed is 5.4 / 90 rad/s = 0.06 rad/s. The dry friction fades
-/// smoothly from 0.06 to 0.24 rad/s, to 1/2 at 0.15 rad/s. With a time constant of 0.1 s, the first tick executes a hundredth of the change.
+/// The dry friction is 5.4 N·m, and the damping is 90 N·m·s/rad. The first speed is 5.4 / 90 rad/s = 0.06 rad/s. From
+/// 0.06 to 0.24 rad/s, the dry friction fades smoothly, with 1/2 at 0.15 rad/s. With a time constant of 0.1 s, a
+/// hundredth of the change takes effect in the first tick.
 #[test]
 fn j25_the_dry_friction_fades_between_its_first_speed_and_four_times_this_speed() {
     for (speed, left) in [
@@ -377,15 +383,17 @@ fn j25_the_dry_friction_is_softer_for_a_joint_with_low_inertia() {
     }
 }
 
-/// If a joint is too fast for dry friction, the anchor of the spring moves with the joint. The anchor also moves with a joint that has no
-/// dry friction, because this joint has enough friction of its own. If the dry friction begins to act later, the torque does not step.
+/// The anchor of the spring moves with a joint that is too fast for dry friction. It also moves with a joint whose
+/// own friction is so high that it gets no dry friction. If the dry friction begins to act later, the torque
+/// therefore has no step.
 #[test]
 fn j25_the_anchor_of_the_dry_friction_moves_with_a_fast_joint_and_without_dry_friction() {
-    // The joint is 0.02 rad away from its anchor. At 0.3 rad/s, only the damping of 90 N·m·s/rad acts.
+    // The joint is 0.02 rad away from its anchor. At 0.3 rad/s the spring does not act, and the torque is that of the
+    // damping of 90 N·m·s/rad.
     for sign in [1.0, -1.0] {
         let mut fast = begun(0.0, 0.0);
         assert_near(tick(&mut fast, sign * 0.02, sign * 0.3).brake, -sign * 27.0, "only damping");
-        // The Coulomb friction of 8 N·m leaves no dry friction: 5.4 N·m - 0.7 · 8 N·m < 0.
+        // With a Coulomb friction of 8 N·m, the joint gets no dry friction: 5.4 N·m - 0.7 · 8 N·m is below zero.
         let mut rubs = begun(0.0, 8.0);
         assert_near(tick(&mut rubs, sign * 0.0025, 0.0).brake, 0.0, "no dry friction");
         rubs.set_friction(0.0, 0.0);

@@ -6,8 +6,8 @@ fn faded(least: f64, load: f64) -> Yield {
     Yield { load, ..Yield::begin(false, false, 0.0, INERTIA, least) }
 }
 
-/// A load drives its joint if the joint moves in the direction of the load, faster than 0.002 rad/s, and if spring and damper oppose the
-/// load with 0.5 to 1.2 times its torque. The load is 40 N·m, so these torques are 20 N·m and 48 N·m.
+/// Spring and damper must oppose the load of 40 N·m with 0.5 to 1.2 times its torque, which is 20 N·m to 48 N·m. The
+/// joint must also move along the load, faster than 0.002 rad/s. Only then does the load seem to drive its joint.
 #[test]
 fn j68_a_load_drives_its_joint_only_along_the_load_and_against_a_similar_torque() {
     for sign in [1.0, -1.0] {
@@ -33,7 +33,8 @@ fn j68_a_load_drives_its_joint_only_along_the_load_and_against_a_similar_torque(
             assert_eq!(yields.driven_ms, expected, "{velocity} rad/s, {torque} N·m, sign {sign}");
             assert_eq!(yields.load, sign * 40.0);
         }
-        // If 20 N·m of the load remain, the range is 10 N·m to 24 N·m. The sign of the first load is the direction of the load.
+        // 20 N·m of the first 40 N·m remain, so the range is 10 N·m to 24 N·m. The direction of the load is still
+        // that of the first load.
         for (torque, expected) in [(-9.0, 9), (-11.0, 11), (-23.0, 11), (-25.0, 9)] {
             let mut yields = Yield { driven_ms: 10, ..faded(sign * 40.0, sign * 20.0) };
             yields.doubt(sign * 0.01, sign * torque);
@@ -58,8 +59,8 @@ fn j68_a_load_fades_after_it_has_driven_its_joint_for_300_ms() {
     assert!((yields.load - 39.920_04).abs() < 1e-9, "{} N·m", yields.load);
 }
 
-/// A reduced load of 10 N·m returns to 40 N·m while the joint moves against the load. In one tick, the load changes by 1 ms / 0.3 s of the
-/// difference: 30 N·m / 300 = 0.1 N·m.
+/// The load was reduced from 40 N·m to 10 N·m. While the joint moves against the load, it returns with a time
+/// constant of 0.3 s. In one tick of 1 ms it changes by 30 N·m / 300 = 0.1 N·m.
 #[test]
 fn j68_a_reduced_load_returns_only_while_the_joint_moves_against_the_load() {
     for sign in [1.0, -1.0] {
@@ -79,7 +80,8 @@ fn j68_a_reduced_load_returns_only_while_the_joint_moves_against_the_load() {
     }
 }
 
-/// If less than half of the load remains, the load is doubted. Teaching then uses only the part that the spring has not opposed.
+/// If less than half of the load remains, the load may not exist. Teaching then uses only the part that the spring
+/// has not opposed.
 #[test]
 fn j68_j25_teaching_uses_a_doubted_load_less_the_torque_of_the_spring() {
     for sign in [1.0, -1.0] {
@@ -87,12 +89,13 @@ fn j68_j25_teaching_uses_a_doubted_load_less_the_torque_of_the_spring() {
             (40.0, 40.0, -15.0, 40.0),
             (40.0, 21.0, -15.0, 21.0),
             (40.0, 20.0, -15.0, 20.0),
-            // 19 N·m are less than half of 40 N·m: 19 N·m − 4 N·m = 15 N·m.
+            // 19 N·m are less than half of 40 N·m, and the spring opposes 4 N·m of them, so Teaching uses 15 N·m.
             (40.0, 19.0, -4.0, 15.0),
-            // The spring holds a part of the load: 19 N·m + 4 N·m = 23 N·m.
+            // The spring holds a further 4 N·m of the load, so Teaching uses 23 N·m.
             (40.0, 19.0, 4.0, 23.0),
             (40.0, 5.0, -30.0, 0.0),
-            // 0.2 N·m and 0.3 N·m are on either side of half of 0.5 N·m: 0.2 N·m − 0.1 N·m = 0.1 N·m.
+            // 0.2 N·m are less than half of 0.5 N·m, so the 0.1 N·m of the spring are subtracted. 0.3 N·m are more
+            // than half, so nothing is subtracted.
             (0.5, 0.2, -0.1, 0.1),
             (0.5, 0.3, -0.1, 0.3),
             (0.0, 0.0, -30.0, 0.0),

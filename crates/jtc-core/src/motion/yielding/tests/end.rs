@@ -9,7 +9,8 @@ fn calm_after(mut yields: Yield, ticks: u16, joint: &Joint<'_>) -> bool {
     yields.is_calm()
 }
 
-/// The brake is a damper with another slope. At 1.6 rad/s, four fifths of the velocity limit, the brake uses the whole limit of 100 N·m.
+/// A joint is not calm while its brake needs more than the share of the spring. At 1.6 rad/s, four fifths of the
+/// velocity limit, the brake uses the whole limit of 100 N·m.
 #[test]
 fn j68_a_joint_is_not_calm_while_its_brake_has_more_than_the_share() {
     let limits = round_limits();
@@ -18,12 +19,13 @@ fn j68_a_joint_is_not_calm_while_its_brake_has_more_than_the_share() {
         calm_after(begun(), 300, &Joint { young_velocity, ..at(&limits, 0.0, 0.0, 0.0) })
     };
     assert!(calm(0.0) && !calm(1.6) && !calm(-1.6));
-    // The brake has 83.3 N·m·s/rad · (0.7 − 0.4) rad/s = 25 N·m, which is less than the share of 30 N·m.
+    // At 0.7 rad/s, the brake has 83.3 N·m·s/rad · (0.7 − 0.4) rad/s = 25 N·m. This is less than the share of 30 N·m,
+    // so the joint is calm.
     assert!(calm(0.7));
 }
 
-/// With an inertia of 1 kg·m², the damping is 100 N·m·s/rad. At 1/32 rad/s, the torque of the damper is 3.125 N·m, exactly 1/32 of the
-/// limit of 100 N·m.
+/// With an inertia of 1 kg·m², the damping is 100 N·m·s/rad, so the damper has 3.125 N·m at 1/32 rad/s. The share is
+/// 1/32 of the limit of 100 N·m, which is the same torque. The joint is calm.
 #[test]
 fn j68_a_damper_torque_that_equals_the_share_is_within_the_share() {
     let limits = JointConfig { velocity_max: 1.0, ..round_limits() };
@@ -35,8 +37,9 @@ fn j68_a_damper_torque_that_equals_the_share_is_within_the_share() {
     assert!(!calm(0.03), "the share is 3 N·m");
 }
 
-/// The spring is extended by 0.02 rad and has the share of 30 N·m. This torque is 0.75 times the load of 40 N·m, so the load drives the
-/// joint. The torque of the model balances the load, so the joint does not sink.
+/// The extended spring has its highest torque of 30 N·m, which is 0.75 times the load of 40 N·m. The load therefore
+/// seems to drive the joint. After 50 ms the joint is not calm. The model torque balances the load, so the joint does
+/// not sink.
 #[test]
 fn j68_a_joint_is_not_calm_once_its_load_has_driven_it_for_50_ms() {
     let limits = round_limits();
@@ -49,7 +52,7 @@ fn j68_a_joint_is_not_calm_once_its_load_has_driven_it_for_50_ms() {
     assert!(!yields.is_calm());
 }
 
-/// Gravity pulls with more than 5 % of the limit of 100 N·m, or the joint does not sink.
+/// A downward motion counts as sinking only if gravity pulls with more than 5 % of the limit of 100 N·m.
 #[test]
 fn j68_a_joint_sinks_only_under_more_than_five_percent_of_its_limit() {
     let limits = round_limits();
@@ -64,7 +67,8 @@ fn j68_a_joint_sinks_only_under_more_than_five_percent_of_its_limit() {
     }
 }
 
-/// A slow motion of 2.9 s under 4 N·m, followed by 0.2 s under 20 N·m, is not a motion of 3 s under gravity. The joint moves by 0.093 rad.
+/// The joint moves for 2.9 s under 4 N·m, and then for 0.2 s under 20 N·m. Only the last 0.2 s count as sinking,
+/// because 4 N·m are less than 5 % of the limit. The joint moves by 0.093 rad in total.
 #[test]
 fn j68_the_time_of_sinking_begins_when_gravity_pulls_the_joint() {
     let limits = round_limits();
@@ -88,8 +92,8 @@ fn j68_a_joint_that_has_sunk_by_half_a_radian_is_not_overloaded_yet() {
     }
 }
 
-/// The yield began with a load of 40 N·m. The controller has reduced this load to zero, so gravity does not pull the joint. At 0.03 rad/s,
-/// the load does not return.
+/// The load of 40 N·m was reduced to zero, so gravity does not pull the joint and the joint does not sink. At 0.03
+/// rad/s, the joint is too slow for the load to return.
 #[test]
 fn j68_a_load_that_has_faded_does_not_make_the_joint_sink() {
     let limits = round_limits();

@@ -6,8 +6,8 @@ fn lowering(load: f64) -> Yield {
     Yield { damping: 80.0, ..Yield::begin(true, false, 0.0, 2.0, load) }
 }
 
-/// At 0.5 rad/s, the torque of the damper is 40 N·m. With the time constant of 0.5 s, the load changes by 40 N·m · 1 ms / 0.5 s = 0.08 N·m
-/// in each tick, and by 8 N·m in 100 ticks.
+/// At 0.5 rad/s, the torque of the damper is 40 N·m. It becomes load torque with a time constant of 0.5 s: 40 N·m · 1
+/// ms / 0.5 s = 0.08 N·m in each tick, and 8 N·m in 100 ticks.
 #[test]
 fn j70_the_torque_of_the_damper_becomes_load_torque_within_half_a_second() {
     let limits = round_limits();
@@ -46,8 +46,8 @@ fn j70_a_joint_that_has_sunk_far_and_is_lifted_has_the_load_of_the_beginning() {
     assert_eq!(yields.load(), 0.0);
 }
 
-/// In this pose, gravity pulls the joint with 2 N·m, less than 5 % of the limit. A hand that moves the joint does not change the load
-/// torque of 10 N·m that the joint has learned in another pose.
+/// In this pose, gravity pulls the joint with only 2 N·m, less than 5 % of the limit. The joint has learned a load
+/// torque of 10 N·m in another pose. A motion by a hand does not change it.
 #[test]
 fn j70_without_gravity_the_load_torque_does_not_follow_a_hand() {
     let limits = round_limits();
@@ -56,12 +56,13 @@ fn j70_without_gravity_the_load_torque_does_not_follow_a_hand() {
         tick(&mut yields, &at(&limits, 0.0, velocity, 2.0));
         assert_eq!(yields.load(), 10.0, "{velocity} rad/s");
         tick(&mut yields, &at(&limits, 0.0, velocity, 20.0));
-        // With 20 N·m, the load changes by 40 N·m · 1 ms / 0.5 s = 0.08 N·m, as in the first test.
+        // If gravity pulls with 20 N·m, the load changes by 40 N·m · 1 ms / 0.5 s = 0.08 N·m in one tick.
         assert!((yields.load() - (10.0 - velocity.signum() * 0.08)).abs() < 1e-9, "{} N·m", yields.load());
     }
 }
 
-/// Two joints with an inertia of 2 kg·m² share the damping of 80 N·m·s/rad. At 0.1 rad/s, each of these joints has 4 N·m.
+/// Two joints with an inertia of 2 kg·m² share the damping rate, so each has half of 80 N·m·s/rad. At 0.1 rad/s, each
+/// damper has 4 N·m.
 #[test]
 fn j70_joints_that_lower_loads_share_the_damping() {
     let limits = round_limits();
@@ -75,7 +76,8 @@ fn j70_joints_that_lower_loads_share_the_damping() {
     }
 }
 
-/// When a yielding joint begins to lower its load, the torque of the spring becomes load torque. The sum is the lowest load torque.
+/// When a yielding joint begins to lower its load, the torque of the spring is added to the load torque. A later
+/// lifting does not reduce the load torque below this sum.
 #[test]
 fn j70_the_torque_of_the_spring_becomes_load_torque() {
     for (load, spring, sum) in [(10.0, 4.0, 14.0), (10.0, -4.0, 6.0), (-10.0, 30.0, 20.0), (0.0, 3.0, 3.0)] {
@@ -101,8 +103,9 @@ fn j70_a_load_of_exactly_95_percent_of_the_limit_is_held_again() {
     }
 }
 
-/// The limit is 100 N·m. A hand moves the joint by 0.6 rad in a pose in which gravity pulls with 4 N·m, less than 5 % of the limit. The
-/// joint does not sink. In a pose with 20 N·m, the joint then sinks by 0.4 rad, which is not too far, and by another 0.2 rad, which is.
+/// Gravity pulls with 4 N·m, less than 5 % of the limit of 100 N·m. A hand moves the joint by 0.6 rad, and this does
+/// not count as sinking. Then gravity pulls with 20 N·m. The joint may sink by 0.4 rad, but after another 0.2 rad it
+/// is overloaded.
 #[test]
 fn j68_only_a_joint_that_gravity_pulls_sinks() {
     let limits = round_limits();

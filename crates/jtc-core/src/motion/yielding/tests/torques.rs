@@ -21,7 +21,7 @@ fn j68_j70_the_torque_of_the_brake_rises_from_zero_to_the_whole_limit() {
             (0.1, BRAKES, 0.9, 12.5),
             (0.1, BRAKES, 1.4, 25.0),
             (0.1, BRAKES, 2.4, 50.0),
-            // The bound with an inertia of 0.02 kg·m² is 5 N·m·s/rad.
+            // An inertia of 0.02 kg·m² bounds the slope to 5 N·m·s/rad.
             (0.02, BRAKES, 1.4, 5.0),
         ] {
             let joint = Joint { young_velocity: sign * young_velocity, ..at(&limits, 0.0, 0.0, 0.0) };
@@ -34,7 +34,8 @@ fn j68_j70_the_torque_of_the_brake_rises_from_zero_to_the_whole_limit() {
     }
 }
 
-/// At 0.7 rad/s, 35 % of the velocity limit, the brake of a yielding joint acts with 25 N·m, but the brake of a lowered load does not act.
+/// At 0.7 rad/s, which is 35 % of the velocity limit, the brake of a yielding joint has 25 N·m. The brake of a
+/// lowered load begins only at 40 %.
 #[test]
 fn j70_the_brake_of_a_lowered_load_begins_at_a_higher_speed() {
     let limits = round_limits();
@@ -46,7 +47,7 @@ fn j70_the_brake_of_a_lowered_load_begins_at_a_higher_speed() {
     }
 }
 
-/// The torque of the brake is 50 N·m. If more than two answers are missing, this torque falls by a fifth in each tick.
+/// The torque of the brake is 50 N·m. After more than two missing answers, it falls by a fifth in each tick.
 #[test]
 fn j68_without_answers_the_brake_fades() {
     let limits = round_limits();
@@ -58,15 +59,15 @@ fn j68_without_answers_the_brake_fades() {
     (0..60).for_each(|_| {
         torque(true);
     });
-    // The third missing answer reduces the torque from the next tick on.
+    // The third missing answer reduces the torque in the tick after it.
     for expected in [50.0, 50.0, 50.0, 40.0, 32.0, 25.6] {
         let found = torque(false);
         assert!((found - expected).abs() < 1e-9, "{found} N·m instead of {expected} N·m");
     }
 }
 
-/// The late measured velocity and the velocity of the last 5 ms have opposite signs. Brake and damper both reach the limit of 100 N·m. The
-/// brake replaces the damper only if the brake has more torque.
+/// The measured velocity and the velocity of the last 5 ms have opposite signs. Brake and damper both reach the limit
+/// of 100 N·m. The brake replaces the damper only if its torque is higher, so the damper acts.
 #[test]
 fn j68_a_brake_with_the_torque_of_the_damper_does_not_replace_the_damper() {
     let limits = round_limits();

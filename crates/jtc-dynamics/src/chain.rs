@@ -36,10 +36,11 @@ pub(crate) enum Axes {
     Any,
 }
 
-/// Directions of the joint axes of an arm. The recursion is compiled separately for the shapes of most arms, without multiplications by 0
-/// and 1, and for a general shape.
+/// Directions of the joint axes of an arm. For the shapes of most arms, the recursion is compiled separately, without
+/// multiplications by 0 and 1. All other arms use the general shape.
 pub(crate) trait Shape {
-    /// Directions of the axes. The first direction is not used, because gravity is already expressed after the Rx(α) of the first joint.
+    /// Directions of the axes. The first direction is not used, because the base acceleration already contains the
+    /// rotation Rx(α) of the first joint.
     const AXES: [Axes; JOINTS];
 }
 
@@ -111,8 +112,9 @@ pub(crate) struct JointTransform {
     pub axes: Axes,
     /// Angle added to the joint's position, rad.
     pub offset: f64,
-    /// Origin of frame k in frame k−1, m. The z coordinate is 0 because of the choice of the origin of frame k−1. If the axes are parallel,
-    /// the y coordinate is also 0, because of the choice of the x axis of frame k−1.
+    /// Origin of frame k in frame k−1, m. The z coordinate is 0, because the origin of frame k−1 is chosen
+    /// accordingly. If the axes are parallel, the y coordinate is also 0, because the x axis of frame k−1 is chosen
+    /// accordingly.
     pub p: [f64; 2],
 }
 
@@ -123,8 +125,8 @@ pub(crate) struct BaseInertialParameters {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
-    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike a moment of inertia, a second moment contributes
-    /// to the torque only with the acceleration of its own axis.
+    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike a moment of inertia, a
+    /// second moment of an axis contributes to the torque only through the acceleration along this axis.
     pub xx: f64,
     pub yy: f64,
     pub xy: f64,
@@ -211,7 +213,8 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 pub(crate) struct Chain {
     pub transforms: [JointTransform; JOINTS],
     pub base_parameters: [BaseInertialParameters; JOINTS],
-    /// Negative gravity after the Rx(α) of the first joint, m/s². Gravity acts like an upward acceleration of the base.
+    /// Negative gravity in the frame after the Rx(α) of the first joint, m/s². Gravity has the same effect as an
+    /// upward acceleration of the base.
     pub base_acceleration: [f64; 3],
     pub placements: [Placement; 7],
     /// First moments (`hx`, `hy`) of a massless arm that carries 1 kg at the flange, kg·m.
@@ -230,15 +233,15 @@ impl Chain {
         let placements = model.joints.map(|o| Placement { rotation: joint_rotation(&o.rpy), xyz: o.xyz });
         let none = JointTransform { sin: 0.0, cos: 1.0, axes: Axes::Any, offset: 0.0, p: [0.0; 2] };
         let mut transforms = [none; JOINTS];
-        // Frame k relative to the model's frame k: sine and cosine of the rotation about z, and the shift along z.
+        // Rotation about z (sine and cosine) and shift along z from the model's frame k to frame k of the chain.
         let mut z_rotations = [(0.0, 1.0); JOINTS];
         let mut z_shifts = [0.0; JOINTS];
         let mut base_acceleration = gravity.map(|g| -g);
         let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
-            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). If the axes are parallel, any a is valid. The code
-            // uses the direction from one axis to the other.
+            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α), which gives a. If the axes are
+            // parallel, any a is valid, and the code uses the direction from one axis to the other.
             let parallel = c[0][2].abs().max(c[1][2].abs()) < ALIGNED;
             let [x, y, _] = placements[k].xyz;
             let (cos_a, sin_a) = if parallel { unit(x, y) } else { unit(-c[1][2], c[0][2]) };

@@ -1,8 +1,8 @@
 //! Mass matrix, computed by the composite-rigid-body algorithm, and forward dynamics, computed from the LDLᵀ factors of the mass matrix
 //! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 6). The bias torques are computed by recursive Newton-Euler.
 
-// Matrix elements are named by their indices, as in the formulas. Unrolled loops over a triangle of a matrix also run for index pairs
-// outside the triangle, but compute nothing for them.
+// Matrix elements are named by their indices, as in the formulas. An unrolled loop over a triangle of a matrix also
+// has iterations outside the triangle, which compute nothing.
 #![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
 use crate::chain::{AnyShape, BaseInertialParameters, Chain, JointTransform};
@@ -26,8 +26,8 @@ struct Composite {
     yz: f64,
 }
 
-/// Rotates the 2×2 plane part of a symmetric matrix by the angle with sine `s` and cosine `c`. Returns the two diagonal entries and the
-/// off-diagonal entry of the rotated part.
+/// Rotates the 2×2 part (`a`, `b`, `ab`) of a symmetric matrix by the angle with sine `s` and cosine `c`. Returns the
+/// two diagonal entries and the off-diagonal entry.
 #[inline(always)]
 fn rotate_plane(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
     let w = s * (a - b) + (c + c) * ab;
@@ -41,7 +41,7 @@ impl Composite {
         Self { h: [b.hx, b.hy, 0.0], xx: b.xx, yy: b.yy, zz: 0.0, xy: b.xy, xz: b.xz, yz: b.yz }
     }
 
-    /// Returns the composite of frame k, expressed in frame k−1.
+    /// Returns this composite body of frame k, expressed in frame k−1.
     #[inline(always)]
     fn inwards(&self, t: &JointTransform, (s, c): (f64, f64)) -> Self {
         let (xx, yy, xy) = rotate_plane(s, c, self.xx, self.yy, self.xy);
@@ -112,7 +112,7 @@ pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
     m
 }
 
-/// Smallest ratio of a pivot to its diagonal entry that is not treated as a rounding error.
+/// Smallest ratio of a pivot to its diagonal entry. A pivot below it is treated as a rounding error.
 const PIVOT_MIN: f64 = 1.0e-14;
 
 /// Solves M·x = b for a symmetric positive definite M, given by its lower triangle. The solution x is 0 for a joint whose pivot is zero or
@@ -138,7 +138,7 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
             }
         });
         let reciprocal = 1.0 / m[K][K];
-        // A bit mask replaces a branch.
+        // The mask avoids a branch: it is all ones if the pivot is valid, and zero otherwise.
         let mask = u64::from(m[K][K] > floor).wrapping_neg();
         inverse[K] = f64::from_bits(reciprocal.to_bits() & mask);
     });
@@ -153,7 +153,8 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     x
 }
 
-/// Returns the inertia that each joint feels, kg·m²: the reciprocal of the diagonal of the inverse mass matrix with rotors.
+/// Returns the effective inertia of each joint while the other joints are free, kg·m²: the reciprocal of the diagonal
+/// of the inverse mass matrix with rotors.
 pub(crate) fn felt_inertia(chain: &Chain, q: &JointVec, rotor: &JointVec) -> JointVec {
     let m = with_rotors(chain, q, rotor);
     core::array::from_fn(|k| felt(m, k))

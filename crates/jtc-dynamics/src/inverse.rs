@@ -224,7 +224,8 @@ fn wrenches<S: Shape>(
     let acc = rz_back(trig.sin[0], trig.cos[0], chain.base_acceleration);
     let first = &chain.base_parameters[0];
     out[0][2][1] = qdd[0] * (first.xx + first.yy) + (acc[1] * first.hx - acc[0] * first.hy);
-    // The first link only rotates about its axis. Most elements of U and of the motion of the second link are therefore zero.
+    // The first link only rotates about its axis, so most elements of U for this link and of the motion of the second
+    // link are zero.
     let t = &chain.transform::<S>(1);
     let (s, c) = (trig.sin[1], trig.cos[1]);
     let square = qd[0] * qd[0];

@@ -86,7 +86,7 @@ impl Dynamics {
         forward::felt_inertia(&self.chain, q, rotor)
     }
 
-    /// Like [`Dynamics::felt_inertia`], but returns the inertia of one joint only; `joint` counts from 0.
+    /// Like [`Dynamics::felt_inertia`], but returns the inertia of one joint only. `joint` is an index from 0.
     #[inline(never)]
     pub fn felt_inertia_of(&self, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
         forward::felt_inertia_of(&self.chain, q, rotor, joint)

@@ -87,7 +87,7 @@ pub const SIN_COS_MAX: f64 = 1.0e9;
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * PER_RAD + ROUND;
     let [sin, cos] = TABLE[rounded.to_bits() as usize % DIRECTIONS];
-    // `k` is NaN for an infinite `x`, and if the range reduction leaves no valid digits.
+    // `k` is NaN if `x` is infinite or so large that the range reduction leaves no valid digits.
     let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
     let r = (x - k * STEP[0]) - k * STEP[1];
     let z = r * r;
@@ -122,7 +122,7 @@ pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     } else {
         FRAC_PI_2.copysign(sin)
     };
-    // Each step reduces the error e, which is below π/4 at first, to e − sin e.
+    // Each step reduces the error e to e − sin e. The error is below π/4 at first.
     for _ in 0..6 {
         let (s, c) = sin_cos(angle);
         angle += sin * c - cos * s;

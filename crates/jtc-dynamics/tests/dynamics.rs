@@ -98,7 +98,7 @@ fn by_energy(model: &ArmModel, gravity: [f64; 3], q: &JointVec) -> ([JointVec; J
     (mass, torque)
 }
 
-/// Checks by a Cholesky factorisation whether the matrix is positive definite.
+/// Returns `true` if a Cholesky factorisation shows that the matrix is positive definite.
 fn positive_definite(m: &[JointVec; JOINTS]) -> bool {
     let mut l = [NONE; JOINTS];
     for i in 0..JOINTS {
@@ -232,8 +232,8 @@ proptest! {
     }
 }
 
-/// Compares the gravity torque with values for the arm of the existing device, computed by another program. In that program gravity has
-/// the opposite direction, as for a hanging arm, and joint 3 is 10 mm higher.
+/// Compares the gravity torque of the existing device with values from another program. In that program the arm
+/// hangs, so gravity has the opposite direction, and joint 3 is 10 mm higher.
 #[test]
 fn j40_gravity_torque_of_the_default_arm_hanging() {
     let mut model = arms::avena();
@@ -269,8 +269,8 @@ fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     }
 }
 
-/// Compares the felt inertia with the mass matrix of all joints. Compares the flange speed with the distance between two positions at
-/// close times.
+/// The felt inertia must match the mass matrix of all joints. The flange speed must match the distance between two
+/// positions within a short time.
 #[test]
 fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     let mut random = random_from(11);
@@ -320,8 +320,8 @@ fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     assert!(close(pose.rotation.as_flattened(), wanted.as_flattened(), 1.0, 1e-15));
 }
 
-/// The crate treats π/2 and π with six digits or rounded to f32 as the exact angles. The crate does not change an angle with a larger
-/// difference.
+/// Angles of π/2 and π with six digits, or rounded to f32, must be treated as the exact angles. An angle with a
+/// larger difference must not change.
 #[test]
 fn j06_j40_angles_next_to_a_right_angle_are_right_angles() {
     let poses = |rpy: [f64; 3]| {
@@ -400,8 +400,8 @@ fn j40_a_joint_without_inertia_stays_finite() {
 }
 
 proptest! {
-    /// The felt inertia must be the largest inertia that can be subtracted from the joint. After a larger subtraction, the arm would have
-    /// a motion without positive kinetic energy.
+    /// The felt inertia is the largest inertia that can be subtracted from the joint. If more is subtracted, the arm
+    /// has a motion without positive kinetic energy.
     #[test]
     fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
         model in arms::model(),

@@ -142,8 +142,8 @@ fn j06_an_angle_at_the_limit_is_accepted() {
     }
 }
 
-/// A body at the limit is still valid after its numbers have been rounded to f32, as in the ArmModel frame. A body with a deviation 100
-/// times as large as this rounding error is not valid. The test checks light and heavy bodies.
+/// A body at the limit is still valid after its numbers have been rounded to f32, as in the ArmModel frame. A body
+/// that violates the limit by 100 times this rounding error is not valid. The test uses light and heavy bodies.
 #[test]
 fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
     let off = f64::from(f32::EPSILON);
@@ -197,8 +197,8 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The check accepts the inertia of point masses in every orientation. The check rejects the inertia if the test subtracts more from a
-    /// moment than the point masses contribute to it.
+    /// The inertia of point masses is valid in every orientation. If more is subtracted from one moment than the
+    /// point masses contribute, the inertia is not valid.
     #[test]
     fn j06_what_points_of_mass_make_is_accepted(
         points in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 1..6)

@@ -1,5 +1,5 @@
-//! The results of the crate are equal bit for bit on every processor and at every optimisation level (J-40), so that a PC can replay a
-//! board's recording.
+//! The results of the crate are equal bit for bit on every processor and at every optimisation level (J-40). A PC can
+//! therefore replay the recording of a board.
 use crate::arms;
 
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
@@ -25,9 +25,9 @@ impl Sum {
     }
 }
 
-/// Compares a hash of the bits of all results for 1 000 arm states. Fused multiply-add, another order of operations or another polynomial
-/// changes the hash. After such a change, a developer must update the expected hash in this test, and old recordings can no longer be
-/// replayed.
+/// Compares a hash of the bits of all results for 1 000 arm states. Fused multiply-add, another order of operations
+/// or another polynomial changes the hash. A developer who makes such a change must update the expected hash, and old
+/// recordings can then no longer be replayed.
 #[test]
 fn j40_results_are_the_same_bits_everywhere() {
     let d = Dynamics::new(&arms::avena(), [0.0, 0.0, -9.81]);

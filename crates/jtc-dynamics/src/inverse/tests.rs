@@ -1,4 +1,4 @@
-//! Tests that the operations omitted for arms of known shape do not change the result.
+//! Tests that the simplified recursions for arms of known shape give the same result as the general recursion.
 extern crate std;
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -32,7 +32,7 @@ fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     })
 }
 
-/// Checks that the recursion for a shape gives the same values as the general recursion. The recursion for a shape omits only
+/// Checks that the recursion for a shape gives the same values as the general recursion. It may omit only
 /// multiplications by known zeros and ones.
 fn same<S: Shape>(model: &ArmModel, shape: KnownShape, q: &JointVec, qd: &JointVec, qdd: &JointVec) {
     let chain = Chain::new(model, [0.3, -0.2, -9.81], &Payload::default());
@@ -59,7 +59,7 @@ proptest! {
     }
 }
 
-/// Tests axes that are nearly parallel, nearly at a right angle, or in another direction.
+/// Axes that are nearly parallel or nearly at a right angle, or that have another direction, give the general shape.
 #[test]
 fn j40_an_arm_of_another_shape_is_any() {
     for bend in [0.3, 2.1e-6, FRAC_PI_2 + 2.1e-6] {

@@ -113,7 +113,7 @@ fn j24_leaving_error_or_moving_without_a_command_is_found() {
         Some(Broken::ExecutionAlone { to: TrajectoryState::Execute })
     );
 
-    // A command that was sent before the error must not permit an action after the error.
+    // An Execute that was sent before the error must not start a motion after the error.
     let mut script = Script::new();
     script.exec(ExecCommand::Execute);
     assert_eq!(script.tick(ControllerState::HoldPos, TrajectoryState::Stop), None);
@@ -212,8 +212,8 @@ fn stopped_at(speed: f64) -> Script {
 
 #[test]
 fn j33_a_stop_that_takes_too_long_is_found() {
-    // The test covers set values that do not come to rest, and an arm that does not follow the set
-    // values.
+    // First the set values do not come to rest, then the arm does not follow its set values. The checker must find
+    // both.
     for (state, trajectory) in [
         (ControllerState::Operate, TrajectoryState::Execute),
         (ControllerState::HoldPos, TrajectoryState::Stop),
@@ -222,8 +222,8 @@ fn j33_a_stop_that_takes_too_long_is_found() {
         let found = (0..600).find_map(|ms| script.tick(state, trajectory).map(|broken| (ms, broken)));
         assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{trajectory:?}");
     }
-    // If a stop was commanded before the controller could execute it, the time of the stop begins
-    // when the arm brakes.
+    // Here the checker has not seen the command, but the controller brakes. The time of the stop then begins with the
+    // braking.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     script.telemetry.braking = true;
@@ -293,7 +293,7 @@ fn j35_a_joint_that_races_is_found() {
     assert!((0..4).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = true;
     assert!(script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_some());
-    // If the joint has no torque or is slower, the motion is not a violation.
+    // A fast motion is not a violation if the joint has no torque, or if its speed is below the limit.
     let mut script = fast();
     assert!((0..10).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
     let mut script = fast();
@@ -304,7 +304,7 @@ fn j35_a_joint_that_races_is_found() {
 #[test]
 fn j43_torque_that_stays_at_its_limit_is_found() {
     let limit = Config::avena().joints[0].torque_max;
-    // The torque is at the limit in every ninth tick or in every tenth tick.
+    // If the torque is at its limit in every ninth tick, this is a violation. Every tenth tick is permitted.
     for (period, allowed) in [(9, false), (10, true)] {
         let mut script = Script::new();
         let mut good = true;
@@ -326,8 +326,8 @@ fn j43_torque_that_stays_at_its_limit_is_found() {
         script.tick(ControllerState::HoldPos, TrajectoryState::Null).map(|broken| (ms, broken))
     });
     assert_eq!(found, Some((11, Broken::Saturated { joint: Joint::ALL[0], ticks: 11 })));
-    // A joint that was just enabled has one second to catch its load. In Teaching it has no such
-    // time.
+    // A joint that was just enabled may have its torque at the limit for one second, to catch its load. In Teaching
+    // it has no such time.
     for (state, last) in [(ControllerState::HoldPos, 1_000), (ControllerState::Teaching, 0)] {
         let mut script = Script::new();
         script.telemetry.joints[0].torque = limit;

@@ -43,7 +43,7 @@ pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     low
 }
 
-/// Lowering of the arm through the shoulder angle `shoulder`, at which the host sends the command.
+/// Motion that lowers the arm through the shoulder angle `shoulder`. The host sends its command at this angle.
 #[derive(Clone, Debug)]
 pub struct Lowering {
     /// Model of the simulated arm.
@@ -90,8 +90,8 @@ pub struct Outcome {
 }
 
 impl Lowering {
-    /// Creates a lowering of the default arm. The torque limit of the shoulder is set so that the holding torque at the
-    /// command is `share` of the limit.
+    /// Creates a lowering of the default arm. The torque limit of the shoulder is set so that the holding torque at
+    /// the time of the command is `share` of the limit.
     pub fn at_share(share: f64, speed: f64) -> Self {
         let model = Parameters::avena().model;
         let shoulder = -0.9;
@@ -112,8 +112,8 @@ impl Lowering {
         }
     }
 
-    /// Returns the operator of a simulation that was just switched on. The arm rests on its stand or brakes, above the pose in which it
-    /// is stopped.
+    /// Returns the operator of a simulation that was just switched on. The arm rests on its stand or brakes in the
+    /// pose `from`, above the pose in which it will be stopped.
     fn operator(&self, from: JointVec) -> Operator {
         let mut controller = Config::avena();
         controller.joints[LOADED].torque_max = self.torque_max;

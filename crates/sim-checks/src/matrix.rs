@@ -149,8 +149,8 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// Cell of the matrix: the reaction, and how the arm recovers after ClearCurrentErrors. If the controller has lost the parameters,
-/// the host sends them again.
+/// Cell of the matrix: the reaction to the fault, and how the arm returns to position hold after ClearCurrentErrors.
+/// If the controller has lost the parameters, the host sends them again.
 struct Cell {
     reaction: Reaction,
     back: Back,
@@ -241,7 +241,7 @@ fn config_for(support: Support, host_timeout_ms: u16) -> SimConfig {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     config.controller.host_timeout_ms = host_timeout_ms;
     for drive in &mut config.drives {
-        // With the normal duration, the motor alignment would take seconds in which nothing else occurs.
+        // With its normal duration, the motor alignment would add seconds in which nothing happens.
         drive.first_enable_ms = 60;
     }
     config
@@ -257,7 +257,7 @@ fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, Opera
     }
     operator.bring_up()?;
     operator.run(200);
-    // If host supervision is enabled, the host sends frames until the fault.
+    // If host supervision is enabled, the host must send frames until the fault begins.
     let run = |operator: &mut Operator, ms: u64| {
         for _ in 0..ms / 50 {
             operator.run(50);
@@ -335,7 +335,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -
     Ok(Back::Never)
 }
 
-/// Values of the last tick, for the comparison with the next tick.
+/// Observer of the controller, with its values in the last tick.
 struct Watch {
     invariants: Invariants,
     state: ControllerState,
@@ -343,7 +343,7 @@ struct Watch {
     resets: u32,
 }
 
-/// Change that the watch has detected.
+/// Change of the controller in one tick.
 #[derive(Clone, Copy)]
 struct Seen {
     state: ControllerState,

@@ -1,4 +1,5 @@
-//! Soak run: hours of simulated time with random commands and faults; every millisecond is checked.
+//! Soak run: hours of simulated time with random commands and faults. The invariants are checked in every
+//! millisecond.
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, JOINTS, JointConfig, JointTelemetry, TrajectoryState};
 use jtc_dynamics::JointVec;
@@ -87,7 +88,7 @@ pub struct Soak {
     report: SoakReport,
     state: ControllerState,
     trajectory: TrajectoryState,
-    /// Time of the next command, ms. `next_fault` is the time of the next fault.
+    /// Time of the next command, ms. `next_fault` is the time of the next fault, ms.
     next_command: u64,
     next_fault: u64,
     now: u64,
@@ -247,7 +248,7 @@ impl Soak {
             7 => host::frame(FrameType::FrictionTableUseDefault, &[]),
             8 => host::frame(FrameType::FrictionPolynomialUseDefault, &[]),
             _ => {
-                // The frame is valid except for one flipped bit.
+                // The frame is an Execute with one flipped bit.
                 let mut bytes = host::exec(ExecCommand::Execute);
                 let at = rng.usize(0..bytes.len());
                 bytes[at] ^= 1 << rng.u8(0..8);

@@ -6,7 +6,8 @@ use jtc_wire::ExecCommand;
 use super::broken::Broken;
 use jtc_sim::{Moment, Worked};
 
-/// Time in addition to the time of J-33, ms. The arm comes to rest in this time after the end of the commanded motion.
+/// Additional time after the longest time of J-33, ms. In this time the arm comes to rest after the end of the
+/// commanded motion.
 const REST_MS: u32 = 20;
 /// Speed below which a joint counts as being at rest, rad/s.
 const STANDS: f64 = 0.02;
@@ -18,7 +19,7 @@ const WINDOW: u32 = 100;
 pub(super) struct MotionWatch {
     /// Number of ticks since a Pause or Stop was commanded on the path. `None` if no stop is in progress.
     stopping: Option<u32>,
-    /// `true` if a push has increased a torque to its limit since the Pause or Stop.
+    /// `true` if a push has driven a torque to its limit since the Pause or Stop.
     overpowered: bool,
     /// Number of consecutive measurements above the speed limit, for each joint.
     fast: [u16; JOINTS],
@@ -36,8 +37,9 @@ impl MotionWatch {
         self.torque(moment)
     }
 
-    /// Checks J-33: the arm comes to rest in time, unless an error removes the torque. If a push leaves too little of the torque
-    /// limit for braking, the time limit is `braking_ms_max` instead of `stop_ms`.
+    /// Checks J-33: after a Pause or Stop, the arm comes to rest in time, unless an error removes the torque. If a
+    /// push needs so much torque that too little remains for braking, the time limit is `braking_ms_max` instead of
+    /// `stop_ms`.
     fn stop(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {
@@ -53,7 +55,8 @@ impl MotionWatch {
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
-            // After `braking_ms_max`, only the other invariants apply to an arm that is held and pushed.
+            // After `braking_ms_max`, the controller holds the arm against a push. The arm may then move, and only
+            // the other invariants apply.
             Some(ticks)
                 if self.overpowered && t.trajectory != TrajectoryState::Execute && ticks >= braking =>
             {

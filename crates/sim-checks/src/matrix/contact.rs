@@ -7,9 +7,9 @@ use super::standstill::state_then;
 use super::{MatrixError, bring_to, config_for};
 use jtc_sim::{Fault, FaultKind, ModelError, Operator, Side, Support, Trigger, host};
 
-/// Observed time, ms. The remaining motion takes less time.
+/// Observed time, ms. It is longer than the remaining motion.
 const WATCH_MS: u64 = 5_000;
-/// Duration of a push, ms. `PUSH_SHARE` is the push as a share of the largest push that a joint can hold.
+/// Duration of a push, ms. `PUSH_SHARE` is its torque as a share of the largest push that a joint can hold.
 const PUSH_MS: u64 = 500;
 const PUSH_SHARE: f64 = 0.8;
 /// Wall on the path of a joint: stiffness (N·m/rad), damping (N·m·s/rad) and distance (rad).
@@ -60,7 +60,8 @@ impl Meets {
         }
     }
 
-    /// Returns the model errors that the influence needs. The model errors are present from the start.
+    /// Returns the deviation from the arm model that the influence needs. This deviation is present from the start of
+    /// the simulation.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -106,7 +107,8 @@ fn load(mass: f64) -> FaultKind {
     FaultKind::Payload { mass, com: [0.0, 0.0, 0.05] }
 }
 
-/// Returns the torque of a push in the direction of gravity, N·m: 0.8 · (95 % of the joint's limit − 1.1 times its load).
+/// Returns the torque of a push in the direction of gravity, N·m. It is 0.8 times the largest push that the joint can
+/// hold: 95 % of its torque limit minus 1.1 times its load.
 fn push(operator: &Operator, joint: usize) -> f64 {
     let config = operator.world.config();
     let q = operator.world.truth().q;

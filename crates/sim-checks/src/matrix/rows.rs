@@ -73,7 +73,7 @@ const NOISE: u8 = jtc_wire::HEADER;
 pub(super) struct Row {
     pub name: &'static str,
     pub act: Act,
-    /// Silence of the host after which the controller reacts, in ms (J-59); 0 disables the reaction.
+    /// Time of silence of the host after which the controller reacts, ms (J-59). 0 disables the reaction.
     pub host_timeout_ms: u16,
     /// Reason why the controller does not react while it holds or moves the arm.
     held: Option<&'static str>,
@@ -98,7 +98,8 @@ const fn seen(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: None }
 }
 
-/// Returns a row for a fault that is already latched in the Error state, if the safety input caused that state.
+/// Returns a row for a fault that causes no new reaction in Error, because the safety input has already caused this
+/// state.
 const fn latched(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("latched") }
 }
@@ -108,7 +109,7 @@ const fn powered(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("no torque") }
 }
 
-/// Returns a row for a fault that the controller tolerates in every state, with the reason.
+/// Returns a row for a fault that the controller tolerates in every state. `why` is the reason.
 const fn borne(name: &'static str, act: Act, why: &'static str) -> Row {
     Row { name, act, host_timeout_ms: 0, held: Some(why), parked: Some(why) }
 }
@@ -117,7 +118,7 @@ const fn fault(kind: FaultKind) -> Act {
     Act::Fault(kind, LASTING_MS)
 }
 
-/// Joint of the faults that affect a single joint.
+/// Joint that is affected by the faults of a single joint.
 const MEANT: Joint = Joint::ALL[1];
 const SILENT: FaultKind = FaultKind::NodeSilent { node: MEANT.index() as u8 };
 const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };

@@ -9,10 +9,10 @@ use jtc_sim::Support;
 const STANDS: f64 = 2e-3;
 /// Time below this speed after which a joint counts as being at rest, ms.
 const STANDS_MS: u64 = 50;
-/// Time after the fault at which the motion is checked, ms. If the arm still executes the motion at that time, the
-/// fault did not stop it. Without a fault, the motion takes longer than this time.
+/// Time after the fault at which the motion is checked, ms. Without a fault, the motion takes longer. If the arm
+/// still executes the motion at this time, the fault did not stop it.
 const WATCH_MS: u64 = 700;
-/// Maximum observed time, ms.
+/// Longest time of the observation, ms.
 const LONGEST_MS: u64 = 10_000;
 
 /// Motion of the arm after the fault.
@@ -60,7 +60,7 @@ pub(super) fn stop_lines() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Checks J-33. The check allows 20 ms more, in which the arm comes to rest after the commanded motion.
+/// Checks J-33. The arm has an additional 20 ms to come to rest after the commanded motion.
 pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
     match *motion {
         Motion::Stands { ms, .. } if ms <= 520 => Ok(()),

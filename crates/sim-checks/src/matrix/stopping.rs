@@ -6,7 +6,7 @@ use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
 use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
 use jtc_sim::Support;
 
-/// Holding torque of the shoulder as a share of its torque limit, and speed (rad/s). The third value is `true` if the torque
+/// Loads of the shoulder: holding torque as a share of the torque limit, speed (rad/s), and `true` if the torque
 /// suffices to stop in time.
 const LOADS: [(f64, f64, bool); 6] = [
     (0.90, 0.2, true),

@@ -80,12 +80,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
         let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
-        // Masks of the joints that fail with their gains, and of the failed joints with unstable control loops (J-71).
+        // Masks for a trial of gains (J-71): the joints that their gains do not hold, and among these the joints with
+        // an unstable control loop.
         let (mut failed, mut unstable) = (0u8, 0u8);
         // With a loop over the index, the compiler can see that the index is in range.
         for j in 0..JOINTS {
             let again = self.parameters.trial.again(j);
-            // The torque of a joint that yields is bounded by construction.
+            // The torque of a joint that yields is limited. An unstable control loop of this joint therefore counts
+            // only if it was already unstable shortly before.
             let found =
                 Found { unstable: found[j].unstable && (again || !self.motion.law.yields(j)), ..found[j] };
             let Some((reaction, kind, cause)) = reaction(&found, mode, self.config.torque_release, again)
@@ -118,8 +120,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.hold_stop(&causes, kind);
         }
         if yields != lowers {
-            // If a stop has just begun, the inertia of the arm is already computed. A tick has time for the computation of a single mass
-            // matrix.
+            // If a stop has begun in this tick, the inertia of the arm is already computed. One tick has no time to
+            // compute a second mass matrix.
             if self.braking_ms == before {
                 self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
             }
@@ -128,8 +130,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         release
     }
 
-    /// Replaces the gains by gains that the controller has chosen. The controller chooses the gains before a failed trial, or softer gains
-    /// (J-66, J-71).
+    /// Replaces the gains by gains that the controller has chosen (J-66, J-71). These are the gains before a failed
+    /// trial, or softer gains.
     fn use_other_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.parameters.pid = *gains;
         self.motion.change_gains(gains);
@@ -204,8 +206,9 @@ mod tests {
         before
     }
 
-    /// A failed trial of gains is the cause of a joint that yields, or that lowers its load before it has settled. The gains before the
-    /// trial return. A settled joint with too much load has another cause.
+    /// If a joint yields during a trial of gains, or lowers its load before it has settled, the gains on trial are
+    /// the cause. The controller restores the gains before the trial. If a settled joint is overloaded, the cause is
+    /// another one.
     #[test]
     fn j66_j71_a_joint_that_yields_during_a_trial_of_gains_gets_the_gains_before_the_trial() {
         let overloaded = Found { overloaded: true, ..HELD };
@@ -227,7 +230,8 @@ mod tests {
         }
     }
 
-    /// The torque of a joint that yields is limited, so its instability counts only shortly after another one.
+    /// A joint that yields has limited torque, so an unstable control loop alone is not an error. If the loop was
+    /// already unstable shortly before, the controller switches the torque off.
     #[test]
     fn j66_a_joint_that_yields_is_unstable_only_again() {
         for (again, released) in [(false, 0), (true, joint_error::TORQUE)] {
@@ -260,7 +264,8 @@ mod tests {
         );
     }
 
-    /// The gains of a trial that ends early do not hold the arm. The gains before the trial return, and the host sees the cause.
+    /// If a trial of gains ends early, the controller restores the gains before the trial, and the host sees the
+    /// cause.
     #[test]
     fn j71_a_trial_of_gains_that_ends_early_restores_the_gains_before_it() {
         let mut controller = holding();
@@ -273,7 +278,7 @@ mod tests {
         assert!(!controller.parameters.trial.is_on());
     }
 
-    /// The cause of a held stop stays while a joint yields, or while the arm still comes to rest.
+    /// The host cannot clear the cause of a held stop while a joint yields, or while the arm still comes to rest.
     #[test]
     fn j69_a_held_stop_is_not_cleared_during_its_reaction() {
         let all = [false, true];
@@ -305,7 +310,8 @@ mod tests {
         }
     }
 
-    /// An arm that comes to rest after hand guiding still moves, so the cause of its held stop stays.
+    /// While the arm comes to rest after hand guiding, it still moves. The host therefore cannot clear the cause of
+    /// the held stop yet.
     #[test]
     fn j69_a_held_stop_is_not_cleared_while_the_arm_comes_to_rest_after_teaching() {
         for (velocity, reacts) in [(0.0, false), (0.25, true)] {
@@ -319,7 +325,8 @@ mod tests {
         }
     }
 
-    /// A set value outside a limit of the path does not come from the gains, even before the joint has settled.
+    /// If a set value exceeds a limit of the path, the gains are not the cause, even before the joint has settled.
+    /// The trial of the gains continues.
     #[test]
     fn j71_a_violated_limit_of_the_path_does_not_end_a_trial_of_gains() {
         for settled in [true, false] {
@@ -334,7 +341,8 @@ mod tests {
         }
     }
 
-    /// A joint yields with the inertia of the arm at this moment. A stop without a yield does not need this inertia.
+    /// For a joint that yields, the controller computes the inertia of the arm at this moment. For a stop without a
+    /// joint that yields, it does not need this inertia.
     #[test]
     fn j68_the_inertia_is_computed_for_a_joint_that_yields() {
         for (found, computed) in [
@@ -387,8 +395,8 @@ mod tests {
             let taught = reaction(&found, ControlMode::Teach, false, false);
             assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
-            // With the reaction in the manual, every overload releases the arm. Before a joint is overloaded, its feedback torque does not
-            // count as a push.
+            // If the setting `torque_reaction` is 1, every overload releases the arm. A push that does not overload
+            // the joint then has no reaction.
             let released = reaction(&found, mode, true, false);
             if found.overloaded {
                 assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");

@@ -48,8 +48,8 @@ pub const SNAPSHOT_MS: u16 = 500;
 pub const AFTER_ERROR_MS: u16 = 300;
 /// Number of ticks from one snapshot to the next, if a replay cannot repeat an input between the two snapshots.
 const EARLY_SNAPSHOT_MS: u16 = 250;
-/// Number of ticks for which recording pauses after a host has requested a page, so that the recorder does not overwrite the block that is
-/// being read.
+/// Number of ticks for which recording pauses after a host has requested a page. The pause prevents the recorder from
+/// overwriting the block that is being read.
 const HELD_MS: u16 = 2_000;
 
 /// Flight recorder of a controller. `P` is a piece of the recorder's memory: blocks that keep their contents during a reset and are not

@@ -27,7 +27,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns the index of the present point of the trajectory, in a grid of 1 ms.
+    /// Returns the index of the present point of the trajectory, counted as if the points were 1 ms apart.
     fn point(&self) -> u32 {
         self.clock.time as u32
     }

@@ -12,7 +12,8 @@ struct ResponseQueue {
     ring: [Response; RECORDS_MAX],
     first: usize,
     len: usize,
-    /// Index of the single response record for noise, counted from the oldest record.
+    /// Index of the response record for noise (bytes that are not a frame), counted from the oldest record. A queue
+    /// contains at most one such record.
     noise: Option<usize>,
 }
 
@@ -25,9 +26,9 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Appends a response record to the queue. Returns `false` if the queue was full, so that a record is lost. If the queue contains a
-    /// record for noise, the queue drops this record. Otherwise, the queue drops a new record for noise, and drops the oldest record for
-    /// any other new record.
+    /// Appends a response record to the queue. Returns `false` if the queue was full, so that a record is lost. The
+    /// lost record is the waiting record for noise, if the queue contains one. Otherwise, a new record for noise is
+    /// lost, or the oldest record if the new record is not for noise.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
             // The record for noise that already waits also represents the new noise.
@@ -192,7 +193,8 @@ mod tests {
         }
     }
 
-    /// The other response records move forward in order, for any position of the record for noise.
+    /// When the queue drops the record for noise, the other response records keep their order, for any position of
+    /// the dropped record.
     #[test]
     fn j04_what_goes_for_another_leaves_the_others_in_order() {
         for place in [0, 1, 30, 62, 63] {

@@ -9,9 +9,9 @@ use crate::{ControllerState, JOINTS, TrajectoryState};
 const OVER: u16 = u16::MAX;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Executes a tick in which the safety input is 0, or has been 0 before. If `safety_input_ramp_ms` is set, a commanded motion comes to
-    /// rest first (stop category 1 of IEC 60204-1), even if the input returns to 1 before the arm is at rest. The controller raises the
-    /// error in every case, even if the torque is already off.
+    /// Executes a tick in which the safety input is 0, or has been 0 before. If `safety_input_ramp_ms` is set, a
+    /// commanded motion comes to rest first (stop category 1 of IEC 60204-1). This stop continues even if the input
+    /// returns to 1. The controller raises the error in every case, even if the torque is already off.
     #[cold]
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
@@ -48,8 +48,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// Returns `true` if a command or a hand moves the arm, and every joint has torque. If a drive is not enabled yet, a joint yields, or
-    /// the arm moves for another reason, a stop would only delay switching the torque off.
+    /// Returns `true` if a command or a hand moves the arm, and every joint has torque. In all other cases, for
+    /// example if a joint yields, a stop would only delay switching the torque off.
     fn has_to_stop(&self) -> bool {
         let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
         let moves = match self.state {

@@ -43,17 +43,17 @@ pub enum Live {
 /// Kind of a setting, which determines the storage of its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A number for each joint that belongs to the joint limits.
+    /// One number for each joint, stored in the joint limits.
     Joint,
-    /// A number for each joint that does not belong to the joint limits.
+    /// One number for each joint, stored outside the joint limits.
     Each,
-    /// A switch for each joint, with the value 0 or 1.
+    /// One switch for each joint, with the value 0 or 1.
     EachSwitch,
-    /// A number for the arm.
+    /// One number for the whole arm.
     Number,
-    /// A whole number for the arm.
+    /// One whole number for the whole arm.
     Whole,
-    /// A switch for the arm, with the value 0 or 1.
+    /// One switch for the whole arm, with the value 0 or 1.
     Switch,
 }
 
@@ -246,8 +246,8 @@ pub fn with_values(
         apply(&mut next, value)?;
     }
     next.check().map_err(SettingError::Config)?;
-    // The payload is checked only if it changes. The principal moments of a payload take too long to compute for a change of the speed
-    // during a motion.
+    // The payload is checked only if it changes. The principal moments of a payload take too long to compute if only
+    // the speed override changes during a motion.
     if next.payload != config.payload {
         next.payload.check().map_err(SettingError::Payload)?;
     }

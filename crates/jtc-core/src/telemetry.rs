@@ -61,7 +61,7 @@ pub struct Telemetry {
     pub state: ControllerState,
     /// Execution state of the trajectory.
     pub trajectory: TrajectoryState,
-    /// Index of the present point of the trajectory, in a grid of 1 ms.
+    /// Index of the present point of the trajectory, counted as if the points were 1 ms apart.
     pub point: u32,
     /// `true` if a pause or stop brakes with all available torque (J-33).
     pub braking: bool,

@@ -274,7 +274,8 @@ mod tests {
         }
     }
 
-    /// When the arm has come to rest, the control mode changes. A torque of friction (8 N·m) of the jog is then blended out.
+    /// When the arm has come to rest after a jog, the control mode changes. The friction torque of the jog (8 N·m) is
+    /// then blended out.
     #[test]
     fn j44_a_jog_ends_without_a_torque_step() {
         for (jogs, blended) in [(false, 0.0), (true, 8.0)] {
@@ -310,7 +311,8 @@ mod tests {
         }
     }
 
-    /// The check has accepted a path inside its range, with an allowance of 1e-9 rad for the rounding of the interpolation.
+    /// In motion, a position is tolerated if it is inside the range of the path that the check has accepted. An
+    /// allowance of 1e-9 rad covers the rounding of the interpolation.
     #[test]
     fn j43_only_positions_that_the_check_has_accepted_are_tolerated() {
         let (low, high) = PathRange::of(&Config::avena(), 1, 10).of_path(0.0);

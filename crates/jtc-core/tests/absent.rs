@@ -51,8 +51,8 @@ fn is_absent(rig: &Rig, j: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
-    /// For any combination of absent joints, the controller brings up the present joints and holds them with the torque that the model of
-    /// the whole arm requires.
+    /// For any combination of absent joints, the controller brings up the present joints. It holds them with the
+    /// torque that the model of the whole arm requires.
     #[test]
     fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
         let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();
@@ -178,7 +178,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
     }
 }
 
-/// The controller disables an enabled drive of an absent joint, for any cause of its enabling.
+/// If the drive of an absent joint is enabled for any reason, the controller disables this drive.
 #[test]
 fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     let mut rig = bench(&[(2, 0.0)]);
@@ -189,7 +189,7 @@ fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     assert_eq!(rig.state(), ControllerState::Error);
 }
 
-/// The controller supervises the other nodes on the bus as usual.
+/// Absent joints do not hide errors of other nodes. The controller supervises the other nodes as usual.
 #[test]
 fn j53_absent_joints_hide_no_error_of_the_others() {
     for j in ALL {
@@ -201,7 +201,7 @@ fn j53_absent_joints_hide_no_error_of_the_others() {
     }
 }
 
-/// While the only present node is starting, no node acknowledges a frame.
+/// While the only present node is starting, no node acknowledges a frame. This must not cause an error.
 #[test]
 fn j53_absent_joints_acknowledge_nothing() {
     let five: Vec<_> = (1..6).map(|j| (j, 0.0)).collect();

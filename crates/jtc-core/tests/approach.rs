@@ -63,7 +63,8 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
     }
 }
 
-/// An operator who has stopped an arm may also press Pause.
+/// If the host sends a Pause while a Stop slows the arm down, the controller refuses the Pause, and the Stop
+/// continues.
 #[test]
 fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     for ms in [1, 20, 100, 180] {
@@ -93,7 +94,7 @@ fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     );
 }
 
-/// The approach to the first point is faster than the path, and faster than the friction table allows.
+/// The approach to the first point may be faster than the path, and faster than the friction table allows.
 #[test]
 fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     let mut rig = Rig::new(Config::avena());
@@ -144,7 +145,7 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
             });
             let rest = set(&rig).0;
             assert!(ticks <= 230, "{start} after {after_ms} ms: {ticks} ms");
-            // While the ramp of path time begins, the arm may still accelerate, as on a path.
+            // At the beginning of the ramp of path time, the arm may still accelerate, as on a path.
             assert!(fastest < speed.abs() + 0.4, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
             assert!(0.0 < rest && rest <= at, "{start} after {after_ms} ms: {at} {rest} rad");
             assert!(at - rest < 0.13 * fastest + 1e-3, "{start} after {after_ms} ms: {at} {rest} rad");

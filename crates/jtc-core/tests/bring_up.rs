@@ -24,7 +24,8 @@ fn joint_answer(position: f64, state: NodeState) -> Frame {
     Answer::Joint { node: JOINT as u8, report }.emit(SCALE)
 }
 
-/// A drive reports position 0 until it is configured, even in the tick in which it accepts its configuration.
+/// A drive reports position 0 until it is configured, even in the tick in which it accepts its configuration. The
+/// controller must not use this position.
 #[test]
 fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     for move_first in [false, true] {
@@ -73,7 +74,8 @@ fn j20_late_answers_after_a_reset_do_not_count() {
     assert!(rig.nodes[JOINT].configured);
 }
 
-/// Some drives accept their configuration only in Init.
+/// Some drives accept their configuration only in Init. If a node in ReadyToOperate refuses its configuration, the
+/// controller therefore requests Init.
 #[test]
 fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     let mut rig = Rig::new(Config::avena());
@@ -106,7 +108,7 @@ fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
-/// A node in state 10 (the transition from Start to Init) has not reached Init yet.
+/// A node in state 10 (the transition from Start to Init) has not reached Init yet, so the clear is not complete.
 #[test]
 fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     let mut rig = Rig::holding();

@@ -98,7 +98,8 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
     assert!(most > 0.93 && fought >= 6, "no load was near the limit: {most}, {fought}");
 }
 
-/// When joint 2 of an arm without brakes is enabled, it moves nearly as fast as allowed.
+/// When joint 2 of an arm without brakes is enabled, it moves nearly as fast as allowed. The controller must catch
+/// the load in motion.
 #[test]
 fn j43_an_unknown_payload_is_caught_in_motion() {
     for velocity in [-0.2, 0.2] {
@@ -141,8 +142,8 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
     assert!(cases > 20, "{cases}");
 }
 
-/// The time for a catch ends one second after a joint was enabled. An overload by a load that is added later is again an error according to
-/// J-43. A setting determines this time.
+/// While the controller catches the load of a joint that was just enabled, it tolerates an overload for a time that a
+/// setting determines. A load that is added after this time and overloads the joint is an error again (J-43).
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {

@@ -271,7 +271,8 @@ fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
     }
 }
 
-/// The check accepts or refuses existing trajectories as before (19 columns of int16, 10 ms apart).
+/// The result of the check must not change for trajectories that are already in use (19 columns of int16, 10 ms
+/// apart).
 #[test]
 fn j36_the_existing_trajectories_keep_their_verdicts() {
     for (name, passes) in [("TrajectoryInt.csv", true), ("TrajectoryInt_Long.csv", false)] {
@@ -354,8 +355,9 @@ fn executed(rig: &mut Rig, points: &[RawPoint]) -> (f64, f64) {
     ends
 }
 
-/// The wire format cannot represent these position limits exactly. The nearest positions in the wire format are 1.150041 and -0.550044 rad,
-/// which are outside the limits.
+/// The wire format cannot represent these position limits exactly. The nearest positions in the wire format are
+/// 1.150041 and -0.550044 rad, which are outside the limits. The controller must still execute a path that ends on a
+/// limit.
 #[test]
 fn j36_j43_a_path_that_ends_on_a_limit_is_executed() {
     for limit in [1.15, -0.55] {
@@ -375,7 +377,8 @@ fn j36_j43_a_path_that_ends_on_a_limit_is_executed() {
     }
 }
 
-/// An arm without brakes falls to its end stop, and the host moves the arm away from the end stop.
+/// An arm without brakes falls to its end stop, and the host moves the arm away from the end stop. The controller
+/// must execute this path although it begins outside the limits.
 #[test]
 fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
     for plain in [true, false] {

@@ -136,7 +136,8 @@ fn j42_polynomial_order_and_lengths() {
     for j in &rig.controller.telemetry().joints {
         assert!((j.torque_friction - 5.0).abs() < 1e-9, "Coulomb friction only: {}", j.torque_friction);
     }
-    // The frame contains six coefficients, c5..c0. c5 is 25 °C, so the factor is 1.
+    // The frame contains six coefficients, c5..c0. c5 is the reference temperature. It is equal to the joint
+    // temperature of 25 °C, so the temperature factor is 1.
     let mut rig = Rig::holding();
     let six = floats((0..6).flat_map(|_| [25.0, -0.02, 0.0, 0.0, 10.0, 2.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &six), DataStatus::NoError);
@@ -151,7 +152,8 @@ fn j42_polynomial_order_and_lengths() {
 fn j44_no_torque_step_at_any_switch() {
     let mut rig = Rig::holding();
     rig.follow = false;
-    // The rig has a permanent position error, so that the PID controller has a torque that must be continued.
+    // The rig has a permanent position error, so the PID controller has a torque. This torque must not have a step
+    // when the mode changes.
     for j in 0..6 {
         rig.nodes[j].report.position = 0.0003;
     }
@@ -161,7 +163,7 @@ fn j44_no_torque_step_at_any_switch() {
     let points: Vec<_> = (0..60).map(|_| rest(0)).collect();
     rig.upload(&points, 10);
     rig.send(FrameType::TrajSetExecStatus, &[3]);
-    // The slack covers the integral and the blend of 100 ms.
+    // The permitted 1.5 N·m per tick cover the change of the integral and the blend over 100 ms.
     run_without_steps(&mut rig, 1200, 1.5);
     assert_eq!(rig.trajectory(), TrajectoryState::Finish);
     rig.send(FrameType::TeachingModeEnable, &[]);
@@ -182,7 +184,8 @@ fn j25_teaching_compensates_gravity_and_damps_what_moves() {
     rig.run(150);
     rig.run(100);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
-    // The joint itself has more friction than Teaching would add. Teaching compensates half of the Coulomb friction.
+    // The joint has more friction than Teaching requires, so Teaching adds only damping. It also compensates half of
+    // the Coulomb friction.
     rig.nodes[2].report.velocity = 0.2;
     rig.run(3);
     let t = rig.controller.telemetry().joints[2];
@@ -214,7 +217,8 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
 
 #[test]
 fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
-    // In the rig, a joint moves without torque, so the torque must not reach its limit.
+    // The rig moves the joint independently of the torque. A high torque limit prevents an overload, which is not a
+    // subject of this test.
     let mut config = Config::avena();
     config.joints[1].torque_max = 360.0;
     let limits = config.joints[1];

@@ -16,7 +16,8 @@ const DT: f64 = 1e-3;
 const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
-    // The deviation that a wrong delay causes in an exact motion must not count as a push.
+    // A wrong delay setting causes a position error even if the arm follows its set values exactly. This error must
+    // not count as a push.
     let mut config = Config { delay_ticks: ticks, torque_release: true, ..Config::avena() };
     if ticks > 3 {
         // With the longest delays, the gains require joints with more inertia (J-71).
@@ -279,7 +280,8 @@ fn steady() -> Vec<RawPoint> {
     pieces(0, &[(5.0, 20), (0.0, 50), (-5.0, 20)])
 }
 
-/// At 1 rad/s, a joint moves by 1 mrad per tick.
+/// At 1 rad/s, a joint moves by 1 mrad per tick. The position error exceeds its limit of 1.5 mrad only if the delay
+/// setting is wrong by more than one tick.
 #[test]
 fn j43_j62_the_position_error_is_that_of_the_same_time() {
     for late in 2..=DELAY_MAX {
@@ -380,7 +382,8 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
             }
             assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
         }
-        // The prediction uses the rate of the last 5 ms. The window of 5 ms contains a corner of the velocity until 4 ms after the corner.
+        // The prediction uses the rate of the last 5 ms. This rate still contains a corner of the velocity up to 4 ms
+        // after the corner, which causes an error of the prediction.
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }

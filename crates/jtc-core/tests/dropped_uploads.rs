@@ -77,7 +77,8 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
     }
 }
 
-/// A Stop arrives in any tick while segments wait or are being processed.
+/// A Stop arrives in any tick while segments wait or are being processed. It drops these segments together with their
+/// upload.
 #[test]
 fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     for begun in 0..3 {
@@ -107,7 +108,8 @@ fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     }
 }
 
-/// The controller received segment 0 of an upload before the Stop, but has not processed it yet. The earlier trajectory stays in memory.
+/// The controller received segment 0 of an upload before the Stop, but has not processed it yet. The Stop drops this
+/// upload, and the earlier trajectory stays in memory.
 #[test]
 fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     let mut rig = Rig::holding();

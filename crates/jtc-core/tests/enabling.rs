@@ -138,8 +138,8 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
     }
 }
 
-/// After a stop, the motor control of a drive pauses. If the controller requested enabling earlier, the drive would enable the joint at the
-/// end of this pause, during any motion of the arm.
+/// After a stop, the motor control of a drive pauses. The controller must not request enabling during this pause.
+/// Otherwise the drive would enable the joint at the end of the pause, even if the arm moves by then.
 #[test]
 fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     let mut rig = Rig::holding();

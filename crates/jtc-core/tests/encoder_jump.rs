@@ -87,8 +87,8 @@ fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     }
 }
 
-/// After a jump, tests which commands the controller accepts until the drive is configured again. The controller knows the correct
-/// positions, but the drive reports wrong positions.
+/// Tests which commands the controller accepts after a jump, until the drive is configured again. The controller
+/// knows the correct positions, but the drive reports wrong positions.
 #[test]
 fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);
@@ -198,8 +198,9 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump is rarely a single step. The jump may pass through a value in between, consist of two parts, coincide with lost answers or a jump
-/// of another joint, and go back.
+/// A jump is rarely a single step. A jump may pass through a value in between, or consist of two parts. It may
+/// coincide with lost answers or with a jump of another joint, and it may go back. In all these cases, the arm does
+/// not move.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     // Each course contains offsets of joints 2 and 4 from the true position (rad), each with its start time (ms). The second element of a
@@ -236,8 +237,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer with a wrong position and a wrong speed is not a jump. The controller does not use such an answer, just as it does not use a
-/// wrong position without a speed for comparison.
+/// An answer with a wrong position and a wrong speed does not count as a jump, and the controller does not use this
+/// answer.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {
@@ -285,7 +286,8 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
                 *last = now;
             }
         }
-        // The position controller gets much noise in this test, which may look like a push and end the jog.
+        // The positions in this test contain much noise. The noise may look like a push and end the jog, which is
+        // permitted in this test.
         let kind = cause(&mut rig).map(|cause| cause.kind);
         let alarm = matches!(kind, Some(StopKind::EncoderJump | StopKind::SpeedScale));
         assert!(!alarm && rig.state() == ControllerState::HoldPos, "seed {}: {kind:?}", seed + 1);

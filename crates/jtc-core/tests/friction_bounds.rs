@@ -141,7 +141,8 @@ fn j06_the_bounds_of_friction_are_settings() {
     assert_eq!(rig.ask(FrameType::FrictionPolynomialUseDefault, &[]), DataStatus::IncorrectValue);
 }
 
-/// The cubic polynomial of this test exceeds the bounds between the checked speeds, at slow speeds at which arms often move.
+/// The cubic polynomial of this test exceeds the bounds between the checked speeds, at slow speeds at which arms
+/// often move. The controller must refuse it.
 #[test]
 fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     let limits = Config::avena().joints.map(|joint| joint.torque_max);

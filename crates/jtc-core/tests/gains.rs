@@ -1,5 +1,5 @@
-//! Tests of a simulated arm whose gains change while the arm is held (J-71). The controller refuses gains that would drop the arm. The
-//! controller replaces gains that make the arm unstable by the earlier gains.
+//! Tests of a simulated arm whose gains change while the arm is held (J-71). The controller refuses gains that would
+//! drop the arm. If gains make the arm unstable, the controller restores the earlier gains.
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
 use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
@@ -63,7 +63,8 @@ fn farthest(arm: &mut Plant, rig: &mut Rig, from: &[f64; 6], ms: usize) -> f64 {
     farthest
 }
 
-/// Earlier versions accepted all of these gains. The arm then fell by one radian, or moved by 42 mrad.
+/// Earlier versions accepted all of these gains, and the arm then fell by one radian, or moved by 42 mrad. The
+/// controller must refuse these gains.
 #[test]
 fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     for (factor, expected) in [
@@ -84,8 +85,8 @@ fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     }
 }
 
-/// Without an integral, the position error must hold the load that the integral has held. The controller accepts gains without an integral
-/// if this error is small.
+/// If the host switches the integral off, the proportional part must hold the load, which requires a position error.
+/// The controller accepts gains without an integral if this error is small.
 #[test]
 fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     for (kp, expected) in [(1.0, DataStatus::NoError), (0.08, DataStatus::IncorrectValue)] {
@@ -100,7 +101,8 @@ fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     }
 }
 
-/// Tests gains that are used on these arms, and the same gains on an arm for which they are not suitable.
+/// The controller accepts gains that are in use on arms like this one. It refuses gains that are in use on a heavier
+/// arm, because they are not suitable for this arm.
 #[test]
 fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
     let stronger = of([
@@ -258,7 +260,8 @@ fn j71_gains_come_in_without_a_step_of_the_torque() {
         println!(
             "{worst:.2} N·m a tick, {quiet:.2} without new gains; integral {integral:.1}, then {kept:.1} N·m"
         );
-        // With gains that are one and a half times as high, a step of the encoder causes the same change of torque.
+        // This is the change of torque that one encoder step causes with gains that are 1.5 times as high as the
+        // delivered gains.
         let encoder = 1.5 * (8000.0 + 80.0 / 0.005) * plant::ENCODER_STEP;
         assert!(worst <= encoder + 0.1, "{worst} N·m, a step of the encoder makes {encoder}");
         assert!((kept - integral).abs() < 1.0, "{integral}, then {kept} N·m");
@@ -365,8 +368,8 @@ fn j71_teaching_does_not_end_a_trial() {
     assert_eq!(found(&rig), StopKind::Gains);
 }
 
-/// After Disable, gains, model and settings possibly do not match. The controller does not store an arm whose joints have too little
-/// inertia for its gains with the present settings.
+/// After Disable, the host may set gains, model and settings that do not match. The controller does not store such an
+/// arm. Here the joints have too little inertia for the gains.
 #[test]
 fn j71_an_arm_that_would_be_refused_is_not_stored() {
     use FrameType::{Disable, SetSettings, StoreArm};
@@ -431,8 +434,8 @@ fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     }
 }
 
-/// Two joints swing with new gains. The controller restores the earlier gains. The controller does not reduce these gains because of the
-/// earlier swing of the second joint.
+/// Two joints swing with new gains, so the controller restores the earlier gains. The swing of the second joint began
+/// before this change, so the controller must not soften the restored gains because of this swing.
 #[test]
 fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
     let mut config = Config::avena();

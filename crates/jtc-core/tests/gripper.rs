@@ -144,7 +144,7 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         pump(&mut rig, true);
         assert!(rig.pump);
     }
-    // The pump does not start either after a joint has caused the controller to return to Init.
+    // A joint causes the controller to return to Init. After this, the pump must not start without a command either.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.state = NodeState::INIT;

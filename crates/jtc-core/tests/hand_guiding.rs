@@ -169,7 +169,8 @@ fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     None
 }
 
-/// The controller does not learn a push of 2 s as a load, but learns a push of 12 s.
+/// The controller does not learn a push of 2 s as a load, but learns a push of 12 s. When the push ends, no joint
+/// becomes faster than 0.6 rad/s.
 #[test]
 fn j25_a_lean_that_ends_drives_no_joint_fast() {
     let (ur5, z1, avena) = (ArmFile::ur5(), ArmFile::z1(), ArmFile::avena());
@@ -194,7 +195,8 @@ fn j25_a_lean_that_ends_drives_no_joint_fast() {
     }
 }
 
-/// All joints are pushed at once, up to the highest torque that the controller learns as a load.
+/// All joints are pushed at once, up to the highest torque that the controller learns as a load. When the person lets
+/// go, no joint becomes faster than 0.6 rad/s.
 #[test]
 fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     println!("seed 3");
@@ -240,8 +242,9 @@ fn j25_a_push_dies_out() {
     }
 }
 
-/// The push is a quarter of the torque limit, and the highest torque against this push is three tenths of the limit. In wrist joints, the
-/// push is an eighth of the limit. The rotors of wrist joints have so little inertia that a stronger push would cause over-speed.
+/// The push is a quarter of the torque limit. Against the push, the controller uses at most three tenths of the
+/// torque limit. In wrist joints, the push is an eighth of the limit. The rotors of wrist joints have so little
+/// inertia that a stronger push would cause over-speed.
 #[test]
 fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     for arm in arms() {
@@ -321,8 +324,9 @@ fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6
     rate
 }
 
-/// The damping rate stays far below 200 1/s. The damping rate is low for any load of a joint, and for a true rotor inertia of at least a
-/// fifth of the proposed value. At 200 1/s, the arm would be unstable, because measured speeds are 8 ms old.
+/// The highest rate at which the damping reduces a speed stays below 200 1/s. This is tested in random poses, and
+/// with true rotor inertias down to a fifth of the proposed values. At 200 1/s, the arm would be unstable, because
+/// measured speeds are 8 ms old.
 #[test]
 fn j25_no_damping_is_too_much_for_a_joint() {
     println!("seed 5");

@@ -29,8 +29,9 @@ fn pushed(plant: &mut Plant, rig: &mut Rig, joint: usize, torque: f64, ms: usize
     Pushed { state: rig.state(), fastest: most, ended_at }
 }
 
-/// A hand pushes any joint with a quarter of the torque limit for a second. A joint with little inertia would reach its over-speed before a
-/// damper with delayed speeds could stop it. Therefore Teaching ends earlier, and the position controller stops the joint.
+/// A hand pushes any joint with up to a quarter of the torque limit for a second. The damping uses delayed speeds, so
+/// it cannot stop a joint with little inertia before this joint reaches its over-speed. Therefore Teaching ends
+/// earlier, and the position controller stops the joint.
 #[test]
 fn j25_a_joint_that_is_led_too_fast_is_held_and_not_released() {
     let (mut ended, mut most) = (0, 0.0_f64);
@@ -206,8 +207,8 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     }
 }
 
-/// The arm hits a person while the arm comes to rest after Teaching. After the impact, the joint presses against the person with at most
-/// its share of the torque limit.
+/// The arm hits a person while it comes to rest after Teaching. After the impact, the joint presses against the
+/// person with at most the configured share of its torque limit.
 #[test]
 fn j25_an_arm_that_comes_to_rest_does_not_clamp_whom_it_meets() {
     for (arm, joint, way, payload) in [

@@ -70,7 +70,8 @@ fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// A hand moves the arm over most of its range. The payload causes another torque in each pose.
+/// A hand moves the arm over most of its range. The unknown payload causes another torque in each pose, but it must
+/// not drive the arm.
 #[test]
 fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     for (mass, from, way, speed) in [
@@ -96,7 +97,8 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// A joint has lowered a load of any cause (J-70), and the controller has learned the torque of the damper. Then the load is removed.
+/// A joint has lowered a load of any cause (J-70), and the controller has learned the torque of the damper. When the
+/// load is then removed, no joint may leave its position range.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -144,7 +146,8 @@ fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_
     assert!(taught >= 10 && lowered >= 3, "{taught}, {lowered}");
 }
 
-/// Arms whose rotors have less inertia than proposed do not swing, even at the soft ends and above the tool speed limit.
+/// Arms whose rotors have less inertia than proposed do not swing. This also applies to the springs near the position
+/// limits (soft ends), and above the tool speed limit.
 #[test]
 fn j25_an_arm_with_light_rotors_does_not_swing() {
     let mut ended = 0;
@@ -172,8 +175,9 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
             let about = format!("{} rotors {rotors} joint {}", arm.name, joint + 1);
             assert!(back < 0.4 && most < 1.8, "{about}: {back} rad/s against the hand, {most} rad/s");
             if rig.state() == ControllerState::HoldPos {
-                // The joint was too fast for the damping, so Teaching has ended. The gains that now hold the joint are for five times its
-                // rotor inertia, and this test does not cover the hold.
+                // The joint was too fast for the damping, so Teaching has ended, and the position controller holds
+                // the joint. Its gains are made for five times this rotor inertia, so this test does not evaluate the
+                // hold.
                 assert!(rotors < 0.5, "{about} is held");
                 ended += 1;
                 continue;
@@ -193,7 +197,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
     assert!(ended <= 4, "{ended} of 144 ended Teaching");
 }
 
-/// A hand lifts a payload that is not configured, and knocks against the arm.
+/// A hand lifts a payload that is not configured, and knocks against the arm. Teaching still holds the payload after
+/// this.
 #[test]
 fn j25_a_payload_that_is_lifted_is_still_carried() {
     for (arm, mass, joint, way) in [
@@ -234,7 +239,7 @@ fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     assert!(way < 0.01 && speed < 0.05, "{way} rad, {speed} rad/s");
 }
 
-/// The arm file specifies friction, but the simulated arm has no friction.
+/// The arm file specifies friction, but the simulated arm has no friction. Teaching still damps the arm.
 #[test]
 fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     for arm in [ArmFile::avena(), ArmFile::z1(), ArmFile::rough_ur5()] {
@@ -282,7 +287,8 @@ fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     assert_eq!(rig.ask(FrameType::PidParamUseDefault, &[]), DataStatus::NoError);
 }
 
-/// A hand moves an arm from any pose to any other pose, with any payload up to 3 kg that is not configured.
+/// A hand moves an arm from any pose to any other pose, with any payload up to 3 kg that is not configured. When the
+/// hand lets go, the arm stays or creeps.
 #[test]
 fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     println!("seed 11");
@@ -323,8 +329,8 @@ fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     assert!(most < 0.6 && worst < 0.2, "{most} rad/s, then {worst} rad/s");
 }
 
-/// A person leans on an arm whose rotors have a fifth of the proposed inertia, and then lets go of the arm. The contact lasted for a long
-/// time, so the controller learned the contact as a load.
+/// A person leans on an arm whose rotors have a fifth of the proposed inertia. The contact lasts so long that the
+/// controller learns it as a load. When the person lets go, no joint reaches its over-speed.
 #[test]
 fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     println!("seed 13");
@@ -355,7 +361,8 @@ fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     assert!((0.3..1.5).contains(&most), "{most} rad/s");
 }
 
-/// Teaching does not hold a load that the controller has not learned.
+/// Teaching does not hold a load that the controller has not learned. A payload that is hung on the arm in Teaching
+/// therefore sinks slowly.
 #[test]
 fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     let arm = ArmFile::avena();

@@ -300,7 +300,7 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
             "instead of {:?} in tick {tick}",
             healthy[tick]
         );
-        // The controller has only postponed the frame.
+        // The controller has only postponed the frame, and sends it after the clear.
         rig.safety_input = true;
         rig.clear(true, 0x7F);
         rig.run(300);
@@ -363,12 +363,13 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
 }
 
-/// A torque that alternates between its two limits never stays long at one of them.
+/// A torque that alternates between its two limits never stays long at one of them. It is an error nevertheless.
 #[test]
 fn j43_torque_that_swings_between_its_limits_is_an_error() {
     for held_ms in [0, 1_000] {
         let swung = swings_until_error(held_ms);
-        // While the controller may still catch a load, the first half swing counts as a load.
+        // Directly after enabling, the controller takes the first half swing for a load that it must catch. The error
+        // may then come up to 10 ticks later.
         assert!((10..=40 + 10 * usize::from(held_ms == 0)).contains(&swung), "{swung}");
     }
 }

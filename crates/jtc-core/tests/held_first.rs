@@ -24,8 +24,8 @@ fn way(arm: &Plant) -> f64 {
     (0..6).map(|j| (arm.q[j] - POSE[j]).abs()).fold(0.0, f64::max)
 }
 
-/// In the first tick of HoldPos, or while the load swings, the controller does not know the load of the arm yet, so Teaching must not
-/// begin.
+/// In the first tick of HoldPos, and while the load swings, the controller does not know the load of the arm.
+/// Teaching must not begin yet.
 #[test]
 fn j25_teaching_waits_until_the_load_is_held() {
     for factor in [0.3, 1.0] {
@@ -78,8 +78,8 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
-/// A drive enables its joint seconds later than the other drives. The load of this joint swings, and moves the loads of the other joints
-/// again.
+/// A drive enables its joint seconds later than the other drives. The load of this joint swings and disturbs the
+/// other joints, so the controller must catch the loads of the other joints again.
 #[test]
 fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     for late in [1, 2] {
@@ -98,8 +98,8 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// The gains of this test make a control loop unstable although no unmodelled load swings. The controller must not tolerate this swing as
-/// part of a catch.
+/// The gains of this test make a control loop unstable although no unmodelled load swings. The controller tolerates a
+/// swing while it catches a load, but must not tolerate this swing.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {
@@ -127,7 +127,8 @@ fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     }
 }
 
-/// A hand moves the stretched arm downwards, and Teaching ends. For some time, stopping the arm needs more torque than the torque limit.
+/// A hand moves the stretched arm downwards, and Teaching ends. For some time, stopping the arm needs more torque
+/// than the torque limit. This is not an error.
 #[test]
 fn j25_leaving_teaching_in_motion_is_no_error_where_the_torque_is_at_its_limit() {
     for speed in [0.4, 0.6, 0.8] {

@@ -54,8 +54,8 @@ fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Resu
     Ok(())
 }
 
-/// In an earlier version, a jog of joint 1 of the default arm at 1.5 rad/s released the arm. The arm was released if the jog ended between
-/// 599 and 695 ms. Other joints and arms also had this fault.
+/// In an earlier version, a jog of joint 1 of the default arm at 1.5 rad/s could release the arm. This happened if
+/// the jog ended between 599 and 695 ms. Other joints and arms also had this fault. A jog must never release the arm.
 #[test]
 fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_arm() {
     let fast = |velocity_max: f64, acceleration_max: f64| {
@@ -93,7 +93,8 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
     }
 }
 
-/// A Stop, a Pause, a released key or missing Jogs end a jog within 520 ms, even at the velocity limit, like a Stop on a path.
+/// A Stop, a Pause, a released key or missing Jog frames end a jog within 520 ms, even at the velocity limit. The
+/// same time limit applies to a Stop on a path.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {
@@ -308,8 +309,8 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     }
 }
 
-/// An operator holds a key down, which moves joint 2 of an arm with 3.5 or 4 kg outwards, until the controller stops the joint. No error
-/// occurs, and enough torque remains for the motion back.
+/// An arm carries 3.5 or 4 kg. An operator holds a key down that moves joint 2 outwards, until the controller stops
+/// the joint. No error occurs, and enough torque remains for the motion back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     for (mass, seconds) in [(3.5, 20), (4.0, 20)] {
@@ -360,7 +361,8 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     }
 }
 
-/// A joint that is declared absent holds no load, for any model.
+/// A joint that is declared absent holds no load, for any model. An absent joint therefore does not prevent a jog of
+/// another joint.
 #[test]
 fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];

@@ -200,7 +200,8 @@ fn j63_silence_and_implausible_answers_count_together() {
     }
 }
 
-/// A drive that does not know its exact position yet may later correct its position by a sector.
+/// A drive that does not know its exact position yet may later correct its position by a sector. This change of the
+/// position must not be an error.
 #[test]
 fn j35_a_position_that_becomes_accurate_may_jump() {
     let mut rig = Rig::new(Config::avena());

@@ -74,7 +74,8 @@ fn j06_gains_in_use_are_taken() {
         [8000.0, 14000.0, 80.0, -120.0, 120.0],
         [4000.0, 24000.0, 60.0, -40.0, 40.0],
         [420.0, 160.0, 20.0, -10.0, 10.0],
-        // The first of these integrals is switched off, and the second has a fixed value.
+        // The first of these integrals is switched off, because both bounds are 0. The second has a fixed value,
+        // because both bounds are 0.5.
         [8000.0, 14000.0, 80.0, 0.0, 0.0],
         [8000.0, 10.0, 80.0, 0.5, 0.5],
     ] {

@@ -92,7 +92,8 @@ proptest! {
     }
 }
 
-/// The model takes the torque of the load over from the integral, without moving the arm.
+/// When the host sets the payload that the arm carries, the model takes over the torque of the load from the
+/// integral. The arm does not move.
 #[test]
 fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     for pose in POSES {
@@ -295,8 +296,8 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(arm(rig.controller.config()), arm(&of_the_bench));
 }
 
-/// The controller refuses a model if the torque limits cannot hold the arm with its present payload, as it refuses such a model without a
-/// payload.
+/// The controller refuses a model if the torque limits cannot hold the arm with its present payload. Without a
+/// payload, it also refuses a model that is too heavy.
 #[test]
 fn j06_j60_a_model_is_held_with_its_payload() {
     let mut rig = holding_at(&POSES[1]);

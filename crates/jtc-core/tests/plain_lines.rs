@@ -238,8 +238,8 @@ fn of_three(segment: u16) -> Vec<u8> {
     segment_body(9, segment, 3, 10, &[rest(5_000); 20])
 }
 
-/// Segment 0 decides which data statuses are used for the whole upload, even if the line changes between plain and not plain before later
-/// frames.
+/// The state of the line when segment 0 arrives (plain or not plain) determines the data statuses of the whole upload
+/// and of its Execute. A later change of the line has no effect on them.
 #[test]
 fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed, StartPositionMismatch};
@@ -277,7 +277,8 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     }
 }
 
-/// If an upload is dropped, the line of segment 0 decides which data status the client gets.
+/// If an upload is dropped, the data status for the client depends on the line when segment 0 arrived. This is also
+/// true if the client was silent for 2 s after that.
 #[test]
 fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     let mut rig = Rig::holding();
@@ -288,8 +289,9 @@ fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
 }
 
-/// After one client has executed a trajectory, another client may execute the same trajectory again. The controller does not know whether
-/// this other client can handle data statuses above 6.
+/// After one client has executed a trajectory, another client may execute the same trajectory again. The controller
+/// does not know whether this other client can handle data statuses above 6. The data status of its Execute therefore
+/// also depends on its own line.
 #[test]
 fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     for plain in [true, false] {
@@ -333,7 +335,8 @@ fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStat
         .collect()
 }
 
-/// Existing hosts wait for ever if the controller refuses a segment for any reason.
+/// Existing hosts wait for ever if the controller refuses a segment for any reason. On a plain line, the controller
+/// therefore accepts the segments of a refused trajectory, but does not execute it.
 #[test]
 fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     for (name, points, error) in broken() {
@@ -379,8 +382,9 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     }
 }
 
-/// The line of segment 0 decides for the whole upload whether a refused trajectory is accepted. The result of the check applies to every
-/// client that executes the trajectory.
+/// The line of segment 0 determines for the whole upload how the controller treats a trajectory that violates J-36.
+/// On a plain line, the controller accepts the segments, and refuses only the Execute. The result of the check
+/// applies to every client that executes the trajectory.
 #[test]
 fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     let (_, points, error) = broken().remove(0);

@@ -62,8 +62,9 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     }
 }
 
-/// Series of random pushes on an arm whose masses are wrong by 10 % and whose friction is wrong by 20 %. Each push lasts 50 ms to 1 s, and
-/// its torque is a `share` of 60 to 100 % of the remaining torque of the joint.
+/// Series of random pushes on an arm. Its masses are wrong by up to 10 %, and its friction is wrong by up to 20 %.
+/// Each push lasts 50 ms to 1 s. Its torque is 60 to 100 % of the remaining torque of the joint, multiplied by
+/// `share`.
 #[derive(Clone, Copy)]
 struct Pushes {
     seed: u64,
@@ -245,8 +246,8 @@ fn j66_j68_arms_with_elastic_gears_are_pushed() {
     }
 }
 
-/// A person who pushes repeatedly, or back and forth, still feels the full torque against the push. The controller must not take these
-/// pushes for the swing of a joint with less inertia than in the arm file.
+/// If a person pushes repeatedly, or back and forth, the joint still resists with its full torque. The controller
+/// must not take these pushes for the swing of a joint with less inertia than in the arm file.
 #[test]
 fn j68_a_joint_that_is_shaken_stays_held() {
     for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
@@ -280,8 +281,9 @@ fn j68_a_joint_that_is_shaken_stays_held() {
     }
 }
 
-/// A joint hits a wall with a stiffness of 3,000 or 20,000 N·m/rad. From 200 ms after the detection, the drive presses the joint against
-/// the wall with at most its share of the torque limit. The result is a held stop.
+/// A joint hits a wall with a stiffness of 3,000 or 20,000 N·m/rad. From 200 ms after the detection, the drive
+/// presses the joint against the wall with at most the configured share of its torque limit. The result is a held
+/// stop.
 #[test]
 fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     let model = Parameters::avena().model;
@@ -303,7 +305,8 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 arm.tick(&mut rig);
                 noticed = noticed.or((rig.errors() != 0).then_some(k));
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
-                // If a joint bounces off the wall, the controller brakes the joint. The test does not evaluate the ticks with this braking.
+                // If a joint bounces off the wall, the controller brakes the joint. The test ignores the ticks in
+                // which the controller brakes.
                 if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
                     most = most.max((rig.torque[joint] - standing(&model, &arm.q)[joint]) * sign);
                 }
@@ -317,15 +320,16 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 "{about}"
             );
             assert_ne!(t.joints[joint].internal, 0, "{about}");
-            // The limit is the share of the torque limit, plus the friction that the integral has learned.
+            // The joint may use the configured share (0.3) of its torque limit, plus the friction that the integral
+            // has learned.
             assert!(most < 0.3 * LIMITS(joint) + 12.0, "{about}: {most} N·m");
             assert!(fastest(&arm) < 0.02, "{about}: {} rad/s", fastest(&arm));
         }
     }
 }
 
-/// A hand moves joint 2 up by 1 rad in 5 s, through a stiff spring. The joint resists with at most its share of the torque limit. When the
-/// hand lets go, the arm stays in its pose.
+/// A hand moves joint 2 up by 1 rad in 5 s, through a stiff spring. The joint resists with at most the configured
+/// share of its torque limit. When the hand lets go, the arm stays in its pose.
 #[test]
 fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     let model = Parameters::avena().model;
@@ -347,8 +351,8 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     assert!((arm.q[1] - there).abs() < 0.06 && fastest(&arm) < 0.01, "{} rad", arm.q[1] - there);
 }
 
-/// Joints lower loads of 90 to 110 % of a torque limit slowly, until the arm is in balance. If needed, the whole torque limit acts against
-/// the motion. The joint is never released.
+/// Joints lower loads of 90 to 110 % of a torque limit slowly, until the arm is in balance. If needed, the whole
+/// torque limit acts against the motion. The controller never switches the torque off.
 #[test]
 fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     let model = |mass: f64| loaded(Parameters::avena().model, mass);
@@ -390,7 +394,8 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     }
 }
 
-/// An arm with 2 kg that are not configured is held with gains that are too weak, or that make a control loop unstable.
+/// The gains that hold an arm with 2 kg that are not configured are too weak, or make a control loop unstable. The
+/// controller must not drop the arm.
 #[test]
 fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     for times in [

@@ -20,8 +20,8 @@ fn path() -> Vec<RawPoint> {
         .collect()
 }
 
-/// Returns a rig whose arm is held, or moves along the path. The torque limit of joint 4 leaves a margin for the torque of a position
-/// error.
+/// Returns a rig whose arm is held, or moves along the path. The torque limit of joint 4 is so high that the torque
+/// of a position error does not reach it.
 fn bench(moving: bool) -> Rig {
     bench_with(Config::avena(), moving)
 }
@@ -118,7 +118,8 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
         last = t.torque;
         assert_eq!(rig.state(), ControllerState::HoldPos);
     }
-    // The spring has the highest stiffness that is stable with the inertia of the joint.
+    // The spring of a yielding joint is as stiff as is stable with the inertia of the joint, so the joint still
+    // resists the push.
     assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
@@ -186,7 +187,8 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     let cause = pulled.controller.reactions().stop.expect("a held stop").0;
     assert_eq!((cause.kind, cause.joint), (StopKind::PositionError, 4));
     assert_eq!(cause.limit, config.joints[3].position_error_max as f32);
-    // In each millisecond, the joint has moved by 2 mrad.
+    // The joint moves by 2 mrad in each millisecond, so the value exceeds the limit only slightly when the error is
+    // detected.
     assert!((cause.limit..cause.limit + 0.01).contains(&-cause.value), "{cause:?}");
 
     let mut pushed = bench(false);
@@ -198,7 +200,8 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     assert!((cause.limit..10.0 * cause.limit).contains(&-cause.value), "{cause:?}");
 }
 
-/// A client clears a held stop, but does not know that a jog key of another client is still pressed.
+/// A client clears a held stop, but does not know that a jog key of another client is still pressed. This key must
+/// not move the arm.
 #[test]
 fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_cleared() {
     let mut rig = bench(false);

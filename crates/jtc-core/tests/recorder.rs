@@ -289,7 +289,7 @@ fn j56_a_log_is_read_in_pages_while_recording_rests() {
     // Recording continued until the host requested the first page.
     let (before, read) = (contents(&before).0, contents(&read).0);
     assert!(read.starts_with(&before) && read.len() < before.len() + 10);
-    // Recording continues without a command, and begins with a snapshot.
+    // Recording continues without a command when the pause is over, and begins with a snapshot.
     let rested = rig.controller.telemetry().tick;
     rig.run(2_500);
     let ticks = replayed(&rig);
@@ -402,7 +402,8 @@ fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     assert!(replayed(&rig).contains(&error));
 }
 
-/// A replay processes read requests in their order when a tick has further requests, although the controller of the replay has no recorder.
+/// A tick may contain a read request together with other requests. The replay processes these requests in their
+/// order, although its controller has no recorder.
 #[test]
 fn j56_requests_beside_others_are_replayed_in_their_turns() {
     let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
@@ -440,7 +441,7 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
     rig.controller.set_store_state(StoreState::Empty, 0);
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // The recorder has discarded the log from before the torque.
+    // When the torque came on, the recorder discarded the earlier log.
     rig.run(600);
     let stored = state == ControllerState::Init;
     if stored {

@@ -26,8 +26,8 @@ fn run_slowly(rig: &mut Rig, ticks: usize) {
     rig.status_free = true;
 }
 
-/// Executes ticks, at most this number, until the trajectory execution state changes from Execute to another state, because path time slows
-/// down.
+/// Executes at most `ticks` ticks, until the trajectory leaves the state Execute because path time slows down.
+/// Returns the new state.
 fn stopped_within(rig: &mut Rig, ticks: usize) -> TrajectoryState {
     rig.until(ticks, |r| r.trajectory() != TrajectoryState::Execute);
     rig.trajectory()
@@ -235,7 +235,7 @@ proptest! {
                 found[line].push(rig.statuses.last().unwrap().response.frame_type);
             }
         }
-        // The response records of frames that were sent slowly have already arrived.
+        // Some frames were sent slowly. Their response records arrived before the loop above.
         let early = rig.records().len() - found[0].len() - found[1].len();
         prop_assert_eq!(early + found[0].len() + found[1].len(), expected[0].len() + expected[1].len());
         for line in 0..2 {

@@ -31,7 +31,8 @@ fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// The joint is at rest slightly off its commanded position, because of friction.
+/// Because of friction, the joint is at rest slightly off its commanded position. After Execute, the path continues
+/// at once from the commanded position.
 #[test]
 fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     let mut rig = Rig::holding();

@@ -105,7 +105,8 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     }
 }
 
-/// While drives are being enabled, the arm has no commanded motion that the controller could stop.
+/// While drives are being enabled, the arm has no commanded motion that the controller could stop. The controller
+/// therefore switches the torque off at once.
 #[test]
 fn j22_a_ramp_enables_no_drive() {
     let mut arm = Plant::new(&Parameters::avena().model, LuGre::of_avena_times(1.0), POSES[0]);

@@ -228,7 +228,8 @@ fn j54_two_damaged_slots_are_no_image() {
     assert_eq!(flash.slots().current(), Some((0, 1)));
 }
 
-/// The CRC alone would detect an incomplete slot. In a slot without a header, the board does not need to compute the CRC.
+/// The header is programmed last. The CRC alone would also detect an incomplete slot, but the board does not need to
+/// compute the CRC of a slot without a header.
 #[test]
 fn the_header_is_programmed_last() {
     let image = image(100, 1);

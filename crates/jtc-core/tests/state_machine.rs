@@ -140,8 +140,8 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!(rig.state(), ControllerState::Error, "{name}");
             rig.plain = plain;
             let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
-            // The first clear is for the controller's errors alone, and the second clear also names a joint without an error. The third
-            // clear is for the occurred errors, which are all current.
+            // The first clear selects only the controller's errors. The second clear also selects a joint without an
+            // error. The third clear selects the occurred errors, which are all still current.
             assert_eq!(rig.clear(true, 0), refused, "{name}");
             assert_eq!(rig.clear(true, 0x01), refused, "{name}");
             assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
@@ -161,7 +161,8 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
         }
     }
-    // The controller accepts a clear that also names the joint with the fault, or that arrives while this joint is being cleared.
+    // The controller accepts a clear that also selects the joint with the fault, or that arrives while this joint is
+    // being cleared.
     for joint_first in [false, true] {
         let mut rig = Rig::holding();
         rig.nodes[4].report.state = NodeState::FAULT;
@@ -347,7 +348,8 @@ fn j16_faults_show_even_without_error_bytes() {
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
 }
 
-/// Real drives report their safety line as active until they are configured.
+/// Real drives report their safety line as active until they are configured. The controller ignores the safety line
+/// of a joint until the joint is configured.
 #[test]
 fn j16_the_safety_line_counts_once_a_joint_is_configured() {
     let mut rig = Rig::new(Config::avena());
@@ -424,7 +426,8 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // The error of the device latches. The bit of this error belongs to internal errors that do not come from a joint or from the bus.
+    // The device error is latched. It sets the bit for internal errors that come neither from a joint nor from the
+    // bus.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

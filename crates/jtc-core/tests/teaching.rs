@@ -7,7 +7,8 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns the distances that a hand moves the joints from a pose, rad. After the motion by a hand, no joint is in its soft end.
+/// Returns the distances by which a hand moves the joints from a pose, rad. After this motion, no joint is in the
+/// soft end near a position limit.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]
@@ -82,8 +83,8 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
     }
 }
 
-/// A mass at the flange cannot explain masses that are wrong in every link. Friction holds the difference between the true masses and a
-/// mass at the flange.
+/// A mass at the flange cannot explain masses that are wrong in every link. Friction holds the difference between the
+/// true masses and a mass at the flange, so the arm does not drift.
 #[test]
 fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
     for mass in [0.9, 1.1] {
@@ -166,7 +167,8 @@ fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
             reached = reached.max(fastest.unwrap_or(0.0));
         }
     }
-    // For example, joint 1 yields to 30 N·m.
+    // In the other cases, Teaching waits until the contact has ended. For example, joint 1 yields if it is pushed
+    // with 30 N·m.
     assert!(taught >= 24, "{taught} of 36");
     assert!(reached > 0.3, "{reached} rad/s: nothing was learned");
 }

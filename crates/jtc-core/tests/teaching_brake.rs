@@ -24,12 +24,13 @@ fn scaled(mass: f64, length: f64) -> ArmModel {
     model
 }
 
-/// Effect of the brake in the last 0.4 s of a push. A hand turns `joint` with `push` N·m for 0.6 s against viscous friction only, and holds
-/// the other joints.
+/// Result of a test in which a hand turns `joint` with `push` N·m for 0.6 s, against viscous friction only, and
+/// brakes the other joints.
 struct Braked {
     /// Highest speed of the joint, rad/s.
     fastest: f64,
-    /// Number of times that the braking torque changes between growing and shrinking, by more than 0.2 N·m in a tick.
+    /// Number of changes of the braking torque from growing to shrinking or back, in the last 0.4 s. Only changes of
+    /// more than 0.2 N·m in a tick are counted.
     turns: u32,
 }
 
@@ -97,10 +98,11 @@ fn j25_damping_does_not_drive_light_joints_to_and_fro() {
     for joint in 3..6 {
         for (push, damping) in [-1.5, 1.5].into_iter().flat_map(|p| [(p, None), (p, Some(1000.0))]) {
             let it = braked_with(&light, 0.05, 0.05, damping, joint, push);
-            // With the highest damping that the inertia of a joint tolerates, a pushed joint swings only until it has reached its speed.
+            // The damping setting of 1000 N·m·s/rad is limited to the highest damping that the inertia of the joint
+            // tolerates. With this damping, a pushed joint swings only until it has reached its speed.
             let most = if damping.is_some() { 6 } else { 0 };
             assert!(it.turns <= most, "joint {} at {push} N·m, {damping:?}: {}", joint + 1, it.turns);
-            // The damping is at least 90 1/s times a fifth of 0.05 kg·m², plus the braking torque.
+            // The damping is at least 90 1/s · 0.2 · 0.05 kg·m² = 0.9 N·m·s/rad. The braking torque acts in addition.
             assert!(it.fastest < 1.5, "joint {}: {} rad/s", joint + 1, it.fastest);
         }
     }
@@ -112,12 +114,14 @@ fn j25_the_wrists_of_the_default_arm_are_damped() {
         let push = 0.3 * Config::avena().joints[joint].torque_max;
         let it = braked(&Parameters::avena().model, 0.7, joint, push);
         assert_eq!(it.turns, 0, "joint {}", joint + 1);
-        // With a fifth of the rotor inertia, no more damping is possible against three tenths of the torque limit.
+        // The controller relies on only a fifth of the rotor inertia. With the damping that this inertia permits, a
+        // push of three tenths of the torque limit causes this speed.
         assert!((0.4..1.2).contains(&it.fastest), "joint {}: {} rad/s", joint + 1, it.fastest);
     }
 }
 
-/// A drive has a rotor even if the arm file does not contain its inertia.
+/// A drive has a rotor even if the arm file does not contain its inertia. Teaching must damp the joint in this case
+/// as well.
 #[test]
 fn j25_a_joint_is_damped_where_no_rotor_inertia_is_given() {
     for joint in 3..6 {

@@ -215,7 +215,8 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
 }
 
-/// The controller accepts a pause or stop even in the last milliseconds, when its ramp would reach beyond the last point.
+/// The controller accepts a pause or stop even in the last milliseconds, when its ramp would reach beyond the last
+/// point. The motion then ends in the state Pause or Stop.
 #[test]
 fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     let points = motion(101, 10);

@@ -51,7 +51,7 @@ pub(crate) struct Node {
     pub(super) fresh: bool,
     /// `true` if the joint is marked as absent (J-53).
     pub(super) absent: bool,
-    /// State that the node reported while its answers were ignored.
+    /// State that the node reported although the controller ignores its answers.
     pub(super) unasked: Option<NodeState>,
     /// Number of answers since the last tick. All answers except the last one were late.
     pub(super) answers: u8,
@@ -209,7 +209,8 @@ impl Node {
 mod tests {
     use super::*;
 
-    /// The short check and the long check of an enabled node have the same result.
+    /// If the short check returns `true` for an enabled node, the complete checks also request nothing from this
+    /// node.
     #[test]
     fn j12_j16_an_enabled_node_wants_nothing() {
         for bits in 0..16u8 {
@@ -228,7 +229,8 @@ mod tests {
         }
     }
 
-    /// A drive that was enabled before the controller started is still enabled, but its configuration is not known.
+    /// A node counts as enabled only if it reports OperationEnable and its configuration is known. A drive that was
+    /// enabled before the controller started does not count, because its configuration is not known.
     #[test]
     fn j16_a_node_is_enabled_when_it_says_so_and_its_configuration_is_known() {
         for (valid, state, enabled) in [

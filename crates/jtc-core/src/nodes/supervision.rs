@@ -49,8 +49,9 @@ impl Nodes {
                 // again, its state shows whether it has lost its configuration. If the gripper is still enabled, it has kept its workpiece.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: the answers of the joint contain impossible positions, or too few Moves were acknowledged to decide whether the
-                // joint answers. After `missed_moves_max` ticks, the controller must not predict the motion of the joint any longer (J-63).
+                // J-35: the answers of the joint contain impossible positions, or too few Moves were acknowledged to
+                // know if the joint answers. After `missed_moves_max` ticks, the controller must not predict the
+                // motion of the joint any longer (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();

@@ -57,7 +57,7 @@ fn j16_joints_may_be_enabled_when_they_were_slow_and_rested_for_long_enough() {
     }
 }
 
-/// The time for which the arm is slow is counted only after the positions of all joints are known.
+/// The time during which the arm is almost at rest is counted only after the positions of all joints are known.
 #[test]
 fn j16_an_arm_that_is_not_known_is_not_still() {
     let mut nodes = ready();
@@ -184,7 +184,7 @@ fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
     assert!(!nodes.node(2).configured && !nodes.node(2).seen);
 }
 
-/// A pump stays on from its command until the gripper leaves OperationEnable or loses its configuration.
+/// A pump command ends when the gripper leaves OperationEnable or loses its configuration.
 #[test]
 fn j23_a_gripper_is_lost_when_it_leaves_what_it_was_in() {
     for (configured, before, now, lost) in [

@@ -56,8 +56,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Ends Teaching if a hand moves a joint too fast, before the over-speed of the joint would make the controller switch the torque off
-    /// (J-25). The arm then comes to rest, and the controller holds it. `late` is the delay of this tick in ms.
+    /// Ends Teaching if a hand moves a joint too fast (J-25). Teaching ends before the joint reaches its over-speed,
+    /// at which the controller would switch the torque off. The arm then comes to rest, and the controller holds it.
+    /// `late` is the delay of this tick in ms.
     pub(crate) fn end_fast_teaching(&mut self, late: u16) {
         let speeds = self.motion.law.hear_led_joints(&self.nodes, late);
         for j in 0..JOINTS {

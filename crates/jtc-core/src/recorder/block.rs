@@ -7,8 +7,8 @@ use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
 
-/// "JTCF" and the version of the layout. Increase this version with each change of the recorded data, including each change of a list in
-/// `bit_codec!`.
+/// "JF" in ASCII, and the version of the layout. Increase this version with each change of the recorded data,
+/// including each change of a list in `bit_codec!`.
 pub(super) const MAGIC: u32 = 0x4A46_000A;
 /// Number of words in the head of a block.
 pub(super) const HEAD: usize = 5;

@@ -17,7 +17,8 @@ use crate::{JOINTS, NODES};
 pub(super) const HOST_BYTES: usize = 48;
 /// Allowance for the bytes of host frames in the log: the average per tick, and the highest number at one time.
 const ALLOWANCE: (u16, u16) = (2, 500);
-/// Bytes that an event takes from the allowance, in addition to the bytes of its frame. An event takes 15 to 20 bits.
+/// Bytes that an event takes from the allowance, in addition to the bytes of its frame. Without its frame, an event
+/// takes 15 to 20 bits in the log.
 const EVENT_BYTES: u16 = 2;
 
 /// Values to which the encoding of the next inputs refers.
@@ -90,7 +91,7 @@ pub(super) mod head {
 struct Answers {
     positions: [u32; JOINTS],
     rates: [u32; JOINTS],
-    /// Distances of the joints. The next field is not zero if a joint has moved too far for [`WAY_BITS`].
+    /// Distances of the joints. `far` is not zero if a joint has moved too far for [`WAY_BITS`].
     ways: u32,
     far: u32,
     /// Bits in which the other words of the answers differ from the reference.

@@ -62,7 +62,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
 
     /// Returns the number of the newest block.
     fn newest(&self) -> Option<u32> {
-        // The loop reads only the heads of the blocks, because the memory is slow and the drives wait for the first frame after a reset.
+        // The loop reads only the heads of the blocks. The memory is slow, and the drives wait for the first frame
+        // after a reset.
         let mut below = None;
         for _ in 0..self.len() {
             let blocks = self.pieces.iter().flat_map(|piece| piece.as_ref());
@@ -334,7 +335,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
         let fill = self.fill;
         if value != 0 {
             let (low, high) = (value as u32, (value >> 32) as u32);
-            // A set bit and the 64 bits of the value make 65 bits.
+            // The value is written as a set bit, followed by its 64 bits, which is 65 bits in all.
             let (a, b, c) = (low << 1 | 1, low >> 31 | high << 1, high >> 31);
             let over = |word: u32| (word >> 1) >> (31 - fill);
             let words = [self.rest | a << fill, over(a) | b << fill];

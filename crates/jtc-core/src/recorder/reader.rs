@@ -7,7 +7,7 @@ use crate::bit_codec::BitSource;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reader<'a> {
     blocks: &'a [Block],
-    /// Index of the present block in the list. The next field is the index of the next bit in this block.
+    /// Index of the present block in the list. `bit` is the index of the next bit in this block.
     block: usize,
     bit: u32,
     current: Option<Whole<'a>>,

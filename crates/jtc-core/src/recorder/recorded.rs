@@ -64,9 +64,9 @@ impl RecordedEvent {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns the event as an input of the controller. A frame without bytes in the log is replaced by a frame that does not change the
-    /// controller. Segment 0 of a trajectory is replaced by a segment without points, which has the same effect in Operate as any segment 0
-    /// (J-30).
+    /// Returns the event as an input of the controller. If the log does not contain the bytes of the frame, the input
+    /// is a frame that does not change the controller. For segment 0 of a trajectory, the input is a segment without
+    /// points. In Operate, this segment has the same effect as any segment 0 (J-30).
     pub fn event(&self) -> HostEvent<'_> {
         let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
             (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),

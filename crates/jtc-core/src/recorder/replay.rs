@@ -157,7 +157,7 @@ pub struct Replay<'a, M> {
 impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
     /// Creates a replay of this log. `controller` has the recorded arm, and its memory contains the points with the hash `points_hash`.
     pub fn new(log: Log<'a>, mut controller: Controller<M>, points_hash: Option<u32>) -> Self {
-        // The number of calls is far above the number of parts in which the hash is computed.
+        // Each call computes a part of the hash. This number of calls is far more than needed.
         for _ in 0..IMAGE_MAX {
             controller.hash_arm();
         }
@@ -173,7 +173,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.points_hash == Some(points_hash)
     }
 
-    /// Returns the outcome that the ticks after this snapshot can have.
+    /// Returns the best outcome that the ticks after this snapshot can have. The outcome is unsure if the arm or the
+    /// required points differ from the recording.
     fn worth(&self, snapshot: &Snapshot) -> Outcome {
         let Origin { arm, points_hash, .. } = snapshot.origin;
         if arm != self.arm {
@@ -276,8 +277,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        // A missing input possibly had no effect. The replay assumes that a missing input had no effect, as long as its outputs are equal
-        // to the log.
+        // A missing input may have had no effect. The replay assumes this as long as its outputs are equal to the
+        // log.
         self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
         let outcome = if self.follows { Outcome::Same } else { self.outcome };
         self.step(Some(*recorded), Some(outputs), outcome)

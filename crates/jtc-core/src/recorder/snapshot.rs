@@ -312,14 +312,15 @@ mod tests {
         }
     }
 
-    /// A Trajectory body with two points, 20 ms apart. Byte 9 is the low byte of the first position, and byte 45 is that of the second.
+    /// Returns a Trajectory body with two points, 20 ms apart. Bytes 9 and 45 are the low bytes of the first position
+    /// of point 0 and of point 1.
     fn body() -> [u8; 80] {
         let mut body = [0; 80];
         (body[5], body[7], body[9], body[45]) = (1, 20, 3, 4);
         body
     }
 
-    /// A log shows the state and the progress on the path from the snapshot.
+    /// The snapshot in a log shows the state of the controller and the path time.
     #[test]
     fn j56_a_snapshot_shows_the_state_and_the_time_on_the_path() {
         let body = body();

@@ -1,4 +1,4 @@
-//! Tests of the flight recorder. In this file: the reader returns any frames of the bus unchanged.
+//! Tests of the flight recorder. The tests in this file check that the reader returns all bus frames unchanged.
 extern crate std;
 use std::vec;
 use std::vec::Vec;
@@ -110,8 +110,9 @@ proptest! {
     }
 }
 
-/// Writes the inputs of ticks and reads them back. The number of each tick is its check value. Each tick has the number of completed host
-/// events. Returns the inputs of each tick, and the number of words that the tick takes in the log.
+/// Writes the inputs of ticks and reads them back. The second element of each tick is the number of completed host
+/// events. The index of a tick is its check value. Returns the inputs of each tick, and the number of words that the
+/// tick takes in the log.
 fn read_back(ticks: &[(Inputs<'_>, usize)]) -> Vec<(RecordedInputs, u32)> {
     let mut writer = Writer::new([vec![[0; BLOCK_WORDS]; 8]]);
     writer.begin();

@@ -41,14 +41,15 @@ fn watched(arm: &mut Arm, safety_input: bool, missed_ticks: u16) -> Option<u16> 
     arm.safety_stop_ms
 }
 
-/// A stop begins only if the arm comes to rest, is taught or executes a motion, and only if no joint yields. Otherwise the controller
-/// switches the torque off at once. An arm in Teaching that stands is at rest in the next tick.
+/// A stop begins only if the arm comes to rest, is in Teaching or executes a motion, and only if no joint yields.
+/// Otherwise the controller switches the torque off at once. If the arm does not move in Teaching, it is at rest in
+/// the next tick.
 #[test]
 fn j22_an_arm_in_teaching_or_in_execution_or_that_comes_to_rest_stops_first() {
     let operate = |phase: Phase| Arm { phase, ..arm(ControllerState::Operate, 0.0) };
     let cases: [(&dyn Fn() -> Arm, bool); 12] = [
         (&|| arm(ControllerState::HoldPos, 0.0), false),
-        // The arm moves for another reason.
+        // The arm moves, but neither a command nor a hand in Teaching moves it.
         (&|| arm(ControllerState::HoldPos, 0.5), false),
         (&coming_to_rest, true),
         (&|| yielding(coming_to_rest()), false),
@@ -126,7 +127,7 @@ fn j22_the_stop_ends_after_the_time_of_the_setting() {
             assert_eq!(arm.safety_input_releases(safety_input), after == OVER);
         }
     }
-    // In the tick after the end, the level of the input counts again.
+    // In the tick after the end of the stop, the controller evaluates the level of the input again.
     let mut arm = coming_to_rest();
     arm.safety_stop_ms = Some(OVER);
     assert_eq!(watched(&mut arm, true, 0), None);

@@ -124,7 +124,8 @@ fn j20_the_diagram_is_what_the_code_does() {
     is_in_the_protocol("states", &diagram());
 }
 
-/// Tests all combinations of conditions, including impossible combinations.
+/// The next state has torque only if no error is latched and everything is initialised. The test covers all
+/// combinations of conditions, including impossible combinations.
 #[test]
 fn j20_j21_torque_is_on_with_no_error_and_all_initialised_only() {
     for (state, conditions) in STATES.iter().flat_map(|state| all_conditions().map(move |c| (*state, c))) {

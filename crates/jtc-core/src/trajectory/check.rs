@@ -1,14 +1,16 @@
 //! Check of a trajectory during its upload, point by point, before the arm moves (J-36).
 //!
-//! Between two points (J-32), the commanded velocity is a cubic polynomial and the commanded position is a quintic polynomial. The
-//! derivative of the position is a quartic polynomial: the cubic plus a bump. The bump covers the distance that the velocities do not
-//! explain. In Bernstein form, each curve lies within the convex hull of a few control points. An interval passes the check at once if a
-//! rough estimate of the hulls of its curves is within the limits (`screen`). For any other interval, the check halves the curves until the
-//! hull is within the limits or a point of the curve is outside (`curve`).
+//! Between two points (J-32), the commanded velocity is a cubic polynomial and the commanded position is a quintic
+//! polynomial. The derivative of the position is a quartic polynomial. It differs from the commanded velocity if the
+//! distance between the points is not equal to the integral of the cubic. The difference has the shape of a bump. In
+//! Bernstein form, each curve lies within the convex hull of a few control points. An interval passes the check at
+//! once if a rough estimate of the hulls of its curves is within the limits (`screen`). For any other interval, the
+//! check halves the curves until the hull is within the limits or a point of the curve is outside (`curve`).
 //!
-//! The wire format rounds positions to steps of 96 µrad. The derivative of the rounded positions can exceed a limit that the path itself
-//! does not exceed. The check therefore reduces the distance of each interval by one rounding step. The module `range` handles the effect
-//! of rounding on the positions, and paths that begin outside the limits of a joint.
+//! The wire format rounds positions to steps of 96 µrad. The derivative of the rounded positions can exceed a limit
+//! that the path itself does not exceed. The check therefore reduces the distance of each interval by one rounding
+//! step. The module `range` handles the effect of rounding on the positions, and paths that begin outside the limits
+//! of a joint.
 mod curve;
 mod range;
 mod screen;
@@ -34,10 +36,10 @@ pub const REST_SPEED: f64 = 0.02;
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Highest number of times that the check halves curves in one interval, for all joints together. The check halves a curve until the
-/// distance of its hull from the curve is at most about a thousandth of the height of the curve. If six joints are at their limits in one
-/// interval, all six joints together may use this number of halvings. After the last permitted halving, the check compares the hull with
-/// the limits.
+/// Highest number of halvings in one interval, for all curves of all joints together. The check halves a curve until
+/// the distance of its hull from the curve is at most about a thousandth of the height of the curve. If six joints
+/// are at their limits in one interval, they may use up this number of halvings. After the last permitted halving,
+/// the check compares the hull with the limits.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.

@@ -43,10 +43,11 @@ pub(crate) struct SlopeBounds {
     pub full: Bounds,
 }
 
-/// Factor by which a slope in the wrong direction changes faster than the slope of a normal ramp, for example at a pause during a resume.
-/// The slope of a hurried stop also changes faster by this factor.
+/// Factor by which a slope may change faster than in a normal ramp. The factor applies to a slope in the wrong
+/// direction, for example at a pause during a resume, and to a hurried stop.
 const REVERSAL: f64 = 8.0;
-/// Change per tick of the slope of a path that is held back, as a fraction of the difference to the target slope.
+/// Filter coefficient of the slope while a path is held back: change of the slope per tick, as a fraction of its
+/// difference to the target slope.
 const SETTLES: f64 = 0.1;
 /// Share of the configured time within which a stop must end. The remaining time is a reserve for the part of the path that is still ahead.
 const PUNCTUAL: f64 = 0.6;
@@ -175,9 +176,9 @@ impl PathClock {
         }
     }
 
-    /// Keeps the present rate of path time, or reduces the rate if the slope would otherwise leave `bounds`. The function also keeps the
-    /// rate if the bounds of several joints contradict each other. The function also keeps the rate if only a faster path would reduce the
-    /// torque of a joint.
+    /// Keeps the present rate of path time, or reduces the rate if the slope would otherwise leave `bounds`. The rate
+    /// also stays constant in two other cases: the bounds of several joints contradict each other, or only a faster
+    /// path would reduce the torque of a joint.
     pub(crate) fn hold_back(&mut self, (low, high): Bounds) {
         let wanted = if low <= high { high.min(0.0) } else { 0.0 };
         // The bounds come from noisy torques, so the slope follows these bounds through a filter.

@@ -1,9 +1,10 @@
 //! Detection of encoder jumps (J-35).
 //!
-//! A drive has two encoders. The position that the drive reports comes from the encoder of the joint, and the speed comes from the encoder
-//! of the motor. The speed is the mean over a window, so the controller can compute the expected change of the position within this window.
-//! If a larger change occurs between two answers and lasts, the encoder has jumped and the joint has not moved. The controller subtracts
-//! this jump from all further answers, so the arm does not move.
+//! A drive has two encoders. The position that the drive reports comes from the encoder of the joint, and the speed
+//! comes from the encoder of the motor. The speed is the mean over a window of some milliseconds. From this speed,
+//! the controller computes the expected change of the position within the window. If the position changes by more
+//! than expected between two answers, and this difference lasts, the encoder of the joint has jumped. The joint
+//! itself has not moved. The controller subtracts this jump from all further answers, so the arm does not move.
 use jtc_wire::StopKind;
 
 use super::Reading;
@@ -23,12 +24,15 @@ const CHANGES: u8 = 2;
 const WITHIN_MS: u32 = 3;
 /// Difference between the encoders that is tolerated, in encoder steps.
 const STEPS: f64 = 3.0;
-/// Difference between the encoders that is always tolerated, rad, even if [`STEPS`] configured encoder steps are smaller.
+/// Lower bound of the tolerated difference between the encoders, rad. The bound applies if [`STEPS`] encoder steps
+/// are smaller.
 const LEAST: f64 = 2e-5;
-/// Difference between the encoders that is tolerated in addition, as a share of the distance.
+/// Additional tolerated difference between the encoders, as a fraction of the distance that corresponds to the
+/// reported speed.
 const SHARE: f64 = 0.1;
-/// Size that a jump must exceed, as a multiple of the tolerated difference. If the clock of a drive drifts against the clock of the
-/// controller, some answers contain an encoder reading that is one tick of the drive older. Two such answers do not count as a jump.
+/// Size that a jump must exceed, as a multiple of the tolerated difference. The clocks of a drive and of the
+/// controller drift against each other. An answer may therefore contain an encoder reading that is one drive tick too
+/// old. Two such answers must not count as a jump.
 const SLIPS: f64 = 2.0;
 /// Share of the full scale above which the controller does not use a reported speed.
 const SATURATED: f64 = 0.98;
@@ -87,12 +91,13 @@ impl Ways {
         Some(Self { measured: answer.position - from, reported: answer.velocity * window })
     }
 
-    /// Returns the distance that the speed does not explain, rad.
+    /// Returns the difference between the measured distance and the distance that corresponds to the reported speed,
+    /// rad.
     pub(crate) fn unexplained(&self) -> f64 {
         self.measured - self.reported
     }
 
-    /// Returns the unexplained distance that is tolerated, rad.
+    /// Returns the largest difference of the two distances that is tolerated, rad.
     pub(crate) fn tolerance(&self, config: &Config) -> f64 {
         (STEPS * config.encoder_step).max(LEAST) + SHARE * self.reported.abs()
     }
@@ -104,8 +109,8 @@ impl Jumps {
         self.taken_off
     }
 
-    /// Returns the fault that was found since the drive was configured. The second element is the size of a jump (rad) or the factor of a
-    /// speed.
+    /// Returns the fault that was found since the drive was configured. The second element is the size of the jump
+    /// (rad), or the ratio of the position rate to the reported speed.
     pub(super) fn found(&self) -> Option<(StopKind, f64)> {
         self.found.map(|kind| (kind, self.value.into()))
     }
@@ -122,7 +127,7 @@ impl Jumps {
         self.answers = 0;
     }
 
-    /// Subtracts this distance (rad) from each answer from now on.
+    /// Starts to subtract this distance (rad) from each answer.
     pub(super) fn take_off(&mut self, way: f64) {
         self.taken_off += way;
         self.found = Some(StopKind::EncoderJump);
@@ -134,9 +139,11 @@ impl Jumps {
         self.found = Some(StopKind::SpeedScale);
     }
 
-    /// Evaluates an unexpected answer that was due at `at_ms`. `velocity` is the velocity in the previous answer, rad/s. `twist` is the
-    /// largest possible twist of the gear, rad. If an object strikes a joint, the joint can move away from its motor within a few answers
-    /// and stay there. The distance of the joint from its motor is less than `twist`.
+    /// Evaluates an unexpected answer that was due at `at_ms`. `velocity` is the velocity in the previous answer,
+    /// rad/s. `twist` is the largest possible twist of the gear, rad.
+    ///
+    /// If an object strikes a joint, the gear can twist within a few answers and stay twisted. The joint then has
+    /// moved relative to its motor, by less than `twist`. This is a motion and not a jump.
     pub(super) fn look(
         &mut self,
         answer: &Reading,

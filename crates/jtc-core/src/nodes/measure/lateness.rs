@@ -1,16 +1,20 @@
 //! Detection of the lateness of a joint's answers (J-63).
 //!
-//! An answer does not identify its Move, but the answers of a node keep their order. The lateness of the newest answer is therefore the
-//! number of Moves that were sent after the Move of this answer. Moves that were sent after the Move of the newest answer are called
-//! *outstanding*. A missing answer may be late or lost. The controller cannot distinguish a late answer from a lost answer until two
-//! answers arrive in one tick, because the first of these answers was late. For a second after this *evidence*, the controller counts
-//! unanswered Moves as outstanding. The number of outstanding Moves is at most the highest number of late answers in one tick. Without
-//! evidence, the controller counts unanswered Moves as lost. Evidence may be wrong, because a frame that the bus repeats arrives twice. The
-//! controller detects a lost answer later, because the number of outstanding Moves then does not return to zero. Therefore the lowest
-//! number of outstanding Moves in a window is subtracted.
+//! An answer does not identify its Move, but the answers of a node keep their order. The lateness of the newest
+//! answer is therefore the number of Moves that were sent after the Move of this answer. These later Moves are called
+//! *outstanding*.
+//!
+//! If an answer is missing, it may be late or lost. Two answers in one tick are the *evidence* that answers can be
+//! late, because the first of these two answers was late. For a second after this evidence, the controller counts
+//! unanswered Moves as outstanding. The number of outstanding Moves is at most the highest number of late answers in
+//! one tick. Without evidence, the controller counts unanswered Moves as lost. The evidence can be wrong, because a
+//! frame that the bus repeats arrives twice.
+//!
+//! After a lost answer, the number of outstanding Moves does not return to zero. Therefore the controller subtracts
+//! the lowest number of outstanding Moves in a window.
 use crate::bit_codec::bit_codec;
 
-/// Time for which evidence is valid, ms.
+/// Time for which the evidence of late answers is valid, ms.
 const LASTS_MS: u16 = 1_000;
 /// Number of ticks in which the number of outstanding Moves must return to zero at least once.
 const WINDOW: u8 = 64;
@@ -20,13 +24,13 @@ const MOST: u8 = 7;
 /// State of the count of unanswered Moves of a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lateness {
-    /// Remaining time for which the last evidence is valid, ms.
+    /// Remaining time for which the last evidence of late answers is valid, ms.
     left_ms: u16,
     /// Number of Moves whose answers may still arrive.
     outstanding: u8,
     /// Upper bound of `outstanding`. While evidence is valid, this bound is the highest number of answers in one tick, minus one.
     most: u8,
-    /// Lowest value of `outstanding` in this window. The next field is the number of ticks of the window so far.
+    /// Lowest value of `outstanding` in this window. `window` is the number of ticks of the window so far.
     fewest: u8,
     window: u8,
     /// Mask of the recent ticks in which a Move was sent. Bit 0 stands for the newest tick.
@@ -36,8 +40,8 @@ pub(super) struct Lateness {
 bit_codec!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
-    /// Returns `true` if no answer is considered late and the tick has at most one answer, so that the tick contains no evidence. If the
-    /// function returns `true`, the caller does not need to call [`Self::count`] for the tick.
+    /// Returns `true` if no answer is considered late and the tick has at most one answer. Such a tick contains no
+    /// evidence of late answers, so the caller does not need to call [`Self::count`].
     pub(super) fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
@@ -53,7 +57,8 @@ impl Lateness {
             self.most = self.most.max(answers - 1).min(MOST);
         }
         self.left_ms = self.left_ms.saturating_sub(elapsed_ms.min(LASTS_MS.into()) as u16);
-        // The Move for this tick was sent in the previous tick, which may have been any time ago.
+        // The Move for this tick was sent in the previous tick. If more than 1 ms has passed since then, its bit is
+        // shifted further in the next line.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
         // If more answers arrive than Moves are outstanding, the controller has counted some of these answers as lost.
@@ -119,8 +124,9 @@ mod tests {
         all
     }
 
-    /// Returns a sequence of ticks that begins with a burst of answers, which shows the highest lateness. After the burst, any lateness may
-    /// occur. In every 24th tick, no answer is outstanding. Some Moves are not sent, and `lost` of 100 answers are lost in these `ticks`.
+    /// Returns a sequence of `ticks` ticks after a burst of answers in one tick. The burst shows the highest
+    /// lateness, which is `most`. After the burst, any lateness up to `most` may occur, some Moves are not sent, and
+    /// `lost` of 100 answers are lost. In every 24th tick, no answer is outstanding.
     fn sent(most: u8, lost: u32, ticks: usize) -> impl Strategy<Value = Vec<Sent>> {
         let any = (prop::bool::weighted(0.9), 0..100u32, 0..=most);
         prop::collection::vec(any, ticks).prop_map(move |any| {
@@ -147,8 +153,8 @@ mod tests {
         /// After some answers were lost, every count is correct again when the windows with these losses are over.
         #[test]
         fn j63_what_was_lost_is_taken_off(
-            // If the highest possible number of answers is outstanding, the count cannot show a lost answer. Therefore fewer answers are
-            // outstanding in the second part of the test.
+            // If the highest possible number of answers is outstanding, the count cannot show a lost answer. In the
+            // second part of the test, the lateness is therefore at most `most - 1`.
             some in (1..=MOST).prop_flat_map(|most| (sent(most, 20, 240), sent(most - 1, 0, 480))),
         ) {
             let (with, without) = some;
@@ -167,7 +173,7 @@ mod tests {
         }
     }
 
-    /// Missed ticks increase the lateness of an answer.
+    /// If ticks were missed, the lateness of an answer includes the missed ticks.
     #[test]
     fn j63_an_answer_is_as_late_as_the_ticks_were_long() {
         for long in 1..=u32::from(MOST) {
@@ -197,22 +203,23 @@ mod tests {
         assert!(lateness.stands(1));
     }
 
-    /// Before the first evidence, every Move counts as sent and as answered. If no Move was sent for the tick of the first evidence, the
-    /// newest answer belongs to the Move before it.
+    /// Before the first evidence, every Move counts as sent and as answered. If no Move was sent for the tick of the
+    /// first evidence, the newest answer belongs to the previous Move. The answer is then one tick late.
     #[test]
     fn j63_before_the_first_evidence_each_tick_counts_as_a_tick_with_a_move() {
         assert_eq!(Lateness::default().count(true, 2, 1), 0);
         assert_eq!(Lateness::default().count(false, 2, 1), 1);
     }
 
-    /// At most as many Moves are outstanding as answers were late in one tick. This number is forgotten with the evidence.
+    /// The number of outstanding Moves is at most the highest number of late answers in one tick. The controller
+    /// discards this bound when the evidence expires.
     #[test]
     fn j63_no_more_moves_are_outstanding_than_answers_were_late_in_one_tick() {
         let mut lateness = Lateness::default();
         for answers in [2, 4, 3, 8, 9, 2] {
             lateness.count(true, answers, 1);
             (0..10).for_each(|_| _ = lateness.count(true, 0, 1));
-            // All answers except the last one were late. The count ends at a lateness of 7.
+            // All answers of the burst except the last one were late. The highest lateness that is counted is 7.
             assert_eq!(lateness.count(true, 1, 1), (answers - 1).min(7), "{answers} answers");
             lateness.count(true, 1, u32::from(LASTS_MS));
             assert!(lateness.stands(1));
@@ -246,7 +253,7 @@ mod tests {
             (0b1111_1111, 1, 1),
             (0b1111_1111, 2, 2),
             (0b1111_1111, 3, 3),
-            // No more Moves are outstanding than before.
+            // The correction must not increase the number of outstanding Moves.
             (0b1111_1111, 7, 3),
             // In the last two ticks, one Move was sent.
             (0b1111_1101, 2, 1),

@@ -63,7 +63,8 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-12);
 }
 
-/// The prediction of a joint that was thrown is slower than this joint.
+/// If an external force makes a joint faster than its velocity limit, the rate of the prediction is limited to 1.2
+/// times this limit.
 #[test]
 fn j63_no_more_is_carried_on_than_a_little_over_the_velocity_limit() {
     for (velocity, carried) in [(1.7, 1.7), (2.5, 1.2 * VELOCITY_MAX), (-2.5, -1.2 * VELOCITY_MAX)] {
@@ -167,11 +168,13 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     for (rate, reported, off, since, carried) in [
         (0.4, 0.5, 0.0, 0, 0.4),
         (0.4, 0.3, 0.0, 0, 0.4),
-        // The distance in 5 ms is now longer by a tenth of the implausible distance in one millisecond.
+        // A deviation of a tenth of the implausible distance of 1 ms still counts as a motion. The rate over the last
+        // 5 ms then includes this deviation. After a larger deviation, the prediction uses the reported velocity.
         (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
         (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
         (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
-        // The prediction uses the reported velocity until only answers after the jump determine the rate.
+        // After a larger deviation, the prediction uses the reported velocity until the window of 5 ms contains only
+        // answers after the deviation.
         (0.4, 0.5, 2.0 * unexpected, 0, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 4, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 5, 0.4),
@@ -182,8 +185,8 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     }
 }
 
-/// During a loss of answers, the predicted velocity follows the commands. After the loss, the difference between prediction and answer
-/// fades.
+/// During a loss of answers, the predicted velocity follows the commanded velocity. After the loss, the velocity has
+/// no step.
 #[test]
 fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     let mut joint = moving(0.4);
@@ -194,7 +197,8 @@ fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-9, "{:?}", joint.used());
 }
 
-/// A missing or unusable answer leaves a difference that fades. If no Move has requested an answer, the answer is not missing.
+/// After a missing or unusable answer, the difference between prediction and next answer fades. If no Move has
+/// requested an answer, the answer does not count as missing, and the next answer is used directly.
 #[test]
 fn j63_only_what_was_expected_or_came_can_be_missing() {
     for (lost, jumps) in [
@@ -235,7 +239,7 @@ fn j63_an_offset_fades_like_a_critically_damped_filter() {
             assert!((fading.slope - exact.1).abs() < 1e-4 * 1e-3, "{ms} ms: {fading:?} {exact:?}");
         }
     }
-    // A small remainder of an offset is not dropped at once either.
+    // A small remainder of an offset also fades, and is not set to zero at once.
     let mut little = Fading { left: 1e-6, slope: 0.0 };
     little.step(1, &config);
     assert!(little.left > 0.9e-6, "{little:?}");

@@ -30,14 +30,16 @@ impl Joint {
         self.differs.differ(&ways, &mut self.node, 0.0, &config.joints[0], &config)
     }
 
-    /// Returns the result of this check five times. The result of the first four checks must be `false`.
+    /// Executes this check five times, and returns the result of the fifth check. The results of the first four
+    /// checks must be `false`.
     fn five(&mut self, measured: f64, reported: f64) -> bool {
         (0..4).for_each(|n| assert!(!self.check(measured, reported) && !self.node.misbehaved, "check {n}"));
         self.check(measured, reported)
     }
 }
 
-/// The permitted difference includes the twist of the gear by the change of the torque: |6 − 2| N·m at 4 N·m/rad is 1 rad.
+/// The permitted difference includes the twist of the gear by the change of the torque. Here this twist is |6 − 2|
+/// N·m / 4 N·m/rad = 1 rad.
 #[test]
 fn j35_the_twist_by_a_change_of_the_torque_is_permitted() {
     for (torque, before) in [(6.0, 2.0), (2.0, 6.0), (-6.0, -2.0), (-2.0, 2.0)] {
@@ -54,15 +56,17 @@ fn j35_the_twist_by_a_change_of_the_torque_is_permitted() {
     }
 }
 
-/// Five consecutive differences with a sum of more than twice the twist at the torque limit (2 · 8 / 4 = 4 rad) are a fault.
+/// Five consecutive differences are a fault if their sum exceeds twice the twist at the torque limit. The twist at
+/// the torque limit is 8 N·m / 4 N·m/rad = 2 rad.
 #[test]
 fn j35_five_differences_of_more_than_twice_the_twist_are_a_fault() {
     let mut joint = Joint::default();
-    // The fifth check has a sum of 5 · 2 − 5 · 1 = 5 rad. The speed is half of the rate of the positions.
+    // In the fifth check, the sum of the differences is 5 · 2 − 5 · 1 = 5 rad. The reported speed is half of the rate
+    // of the positions.
     assert!(joint.five(2.0, 1.0));
     assert_eq!(joint.node.measured.misfit(), Some((StopKind::SpeedScale, 2.0)));
     assert!(!joint.node.misbehaved);
-    // After the fault, the controller counts five differences again.
+    // After the fault is reported, the count of differences begins again at zero.
     assert!(joint.five(2.0, 1.0));
 }
 
@@ -70,7 +74,8 @@ fn j35_five_differences_of_more_than_twice_the_twist_are_a_fault() {
 fn j35_a_sum_of_exactly_twice_the_twist_is_not_a_fault() {
     for sign in [1.0, -1.0] {
         let mut joint = Joint::default();
-        // 4 · 0.78125 + 0.875 = 4 rad, and one more difference of 0.78125 rad exceeds this sum.
+        // The sum of the first five differences is 4 · 0.78125 + 0.875 = 4 rad, which is still permitted. The sixth
+        // difference of 0.78125 rad exceeds the limit.
         (0..4).for_each(|_| assert!(!joint.check(sign * 0.78125, 0.0)));
         assert!(!joint.check(sign * 0.875, 0.0) && !joint.node.misbehaved);
         assert_eq!(joint.differs.looks, 5);
@@ -78,7 +83,7 @@ fn j35_a_sum_of_exactly_twice_the_twist_is_not_a_fault() {
     }
 }
 
-/// A difference that is permitted ends the sequence. A later sequence does not contain the earlier distances.
+/// A check with a permitted difference ends the sequence. A later sequence does not contain the earlier distances.
 #[test]
 fn j35_a_sequence_of_differences_begins_without_the_earlier_distances() {
     let mut joint = Joint::default();
@@ -86,7 +91,7 @@ fn j35_a_sequence_of_differences_begins_without_the_earlier_distances() {
     assert!(!joint.check(0.5, 0.0));
     assert_eq!(joint.differs.looks, 0);
     assert!(joint.five(2.0, 1.0));
-    // With the earlier distances, the ratio would be 42 / 9.
+    // The ratio of the distances is 2. If the earlier distances were included, the ratio would be 42 / 9.
     assert_eq!(joint.node.measured.misfit(), Some((StopKind::SpeedScale, 2.0)));
 }
 
@@ -101,8 +106,8 @@ fn j35_only_differences_in_one_direction_are_added() {
     }
 }
 
-/// If both encoders move, the speed has another scale. If one distance is less than a tenth of the other distance, one encoder does not
-/// move, which is an error of the joint.
+/// If both encoders move, but over different distances, the reported speed has another scale than configured. If one
+/// distance is less than a tenth of the other, one encoder does not move, which is an error of the joint.
 #[test]
 fn j35_an_encoder_with_less_than_a_tenth_of_the_distance_does_not_move() {
     for (measured, reported, factor) in [

@@ -29,7 +29,8 @@ fn j53_a_joint_is_absent_at_once_and_the_others_stay() {
     }
 }
 
-/// A joint that was absent before starts like every joint: the joint is not configured, and may be silent while it starts.
+/// A joint that was absent before starts like every other joint. It is not configured, and may be silent while it
+/// starts.
 #[test]
 fn j53_a_joint_that_is_no_longer_absent_is_brought_up() {
     let (config, before) = (Config::avena(), without_joint_3());
@@ -45,7 +46,8 @@ fn j53_a_joint_that_is_no_longer_absent_is_brought_up() {
     assert!(!nodes.node(2).absent() && !nodes.node(2).valid);
 }
 
-/// A drive that answers although its joint is absent is an error in each tick with an answer. Other settings do not hide this drive.
+/// If the drive of an absent joint answers, this is an error in each tick with an answer. The error remains if the
+/// settings are applied again.
 #[test]
 fn j53_a_drive_of_an_absent_joint_that_answers_is_an_error_while_it_answers() {
     let config = without_joint_3();
@@ -63,7 +65,8 @@ fn j53_a_drive_of_an_absent_joint_that_answers_is_an_error_while_it_answers() {
     }
 }
 
-/// The nodes must accept a new configuration if a setting changes that the controller sends to them, or the scale of their speed.
+/// If a setting that the controller sends to the nodes changes, or the scale of their speed, the nodes must accept a
+/// new configuration. Other settings do not require this.
 #[test]
 fn j53_only_settings_of_the_nodes_require_a_new_configuration() {
     type Change = fn(&mut Config);
@@ -85,7 +88,7 @@ fn j53_only_settings_of_the_nodes_require_a_new_configuration() {
     }
 }
 
-/// ClearCurrentErrors reports if a node in its mask has an error to clear.
+/// A clear returns `true` if a node in its mask has an error.
 #[test]
 fn j21_a_clear_tells_if_a_node_has_an_error() {
     for (mask, errors, any) in [

@@ -56,7 +56,8 @@ fn j16_j20_the_diagram_is_what_is_requested() {
     is_in_the_protocol("bring-up", &diagram());
 }
 
-/// Tests all other combinations of the information that the controller has about a drive.
+/// The controller enables a drive only with the goal Enabled, and only if the drive is in ReadyToOperate or in a
+/// transition. The test covers all state codes.
 #[test]
 fn j16_only_a_drive_that_is_ready_and_wanted_enabled_is_enabled() {
     for (goal, known) in GOALS.iter().flat_map(|(goal, _)| KNOWN.map(|known| (*goal, known))) {

@@ -106,7 +106,7 @@ fn j12_at_most_one_tick_of_four_sends_another_frame_than_move() {
     assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x7F)), Sent::ResetAll);
 }
 
-/// Without a gripper, the joints are the only nodes.
+/// If the arm has no gripper, the controller neither resets nor clears the gripper node.
 #[test]
 fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     for (gripper, mask, frame) in [
@@ -160,7 +160,8 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
 }
 
-/// Configuration frames and changes of state alternate, but an enabled node refuses a configuration.
+/// Configuration frames and changes of state alternate. An enabled node refuses a configuration, so the controller
+/// first disables the nodes that are enabled.
 #[test]
 fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     for (state, seen, configured_last, frame) in [
@@ -208,8 +209,8 @@ fn j20_configurations_and_changes_of_state_take_turns() {
     }
 }
 
-/// Returns the request to a gripper in this state, while the joints are in the state of the goal. A frame without a change of state
-/// contains no request to the gripper.
+/// Returns the state that the next frame requests from a gripper in this state, while the joints are in the state of
+/// the goal. Returns `NoChange` if the frame contains no such request.
 fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool, clear: bool) -> Target {
     let mut nodes = ready();
     if goal == Goal::Enabled {

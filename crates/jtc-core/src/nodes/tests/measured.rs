@@ -35,7 +35,8 @@ fn close(found: f64, ms: f64) -> bool {
     (found - SPEED * 1e-3 * ms).abs() < ROUNDED
 }
 
-/// Without an answer, the position of a joint moves on, in a long tick for its whole length. The other joints are used as measured.
+/// Without an answer, the position of a joint is predicted for the whole length of the tick, even if ticks were
+/// missed. For the other joints, the controller uses the measured positions.
 #[test]
 fn j63_a_joint_without_an_answer_moves_on_for_the_length_of_the_tick() {
     for missed_ticks in [0u16, 1, 3] {
@@ -56,8 +57,8 @@ fn j63_a_joint_without_an_answer_moves_on_for_the_length_of_the_tick() {
     }
 }
 
-/// After evidence of late answers, an answer that did not come is outstanding only if its Move was sent and acknowledged. The next answer is
-/// then one tick late.
+/// After evidence of late answers, a missing answer counts as outstanding only if its Move was sent and acknowledged.
+/// The next answer is then one tick late.
 #[test]
 fn j63_only_a_move_that_was_sent_and_acknowledged_is_outstanding() {
     for (sent, acknowledged, late) in
@@ -78,7 +79,7 @@ fn j63_only_a_move_that_was_sent_and_acknowledged_is_outstanding() {
     }
 }
 
-/// A restart of the set values with another velocity does not change the prediction of the restarted joints.
+/// If the set values of some joints restart with another velocity, the prediction of these joints does not change.
 #[test]
 fn j63_a_restart_of_set_values_is_not_a_change_of_the_motion() {
     let mut nodes = moving(20);

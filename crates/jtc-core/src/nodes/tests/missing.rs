@@ -37,15 +37,16 @@ fn j14_only_moves_that_were_sent_count_and_each_for_the_bus_or_for_a_node() {
     assert_eq!(booting.unacknowledged, 0, "nobody is there to acknowledge");
 }
 
-/// If answers are not possible, the controller predicts the motion of a joint until the transmit timeout. Each of these ticks counts as a
-/// missing answer of the joint.
+/// If no node acknowledges a Move, no answer can arrive. Until the transmit timeout, the controller predicts the
+/// motion of each joint whose position is known, and counts a missing answer in each tick.
 #[test]
 fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known() {
     let lost = BusState { acknowledged: false, bus_off: false };
     for (unacknowledged, sent_move, valid, before, missed) in [
         (0, true, true, 0, 1),
         (3, true, true, 0, 1),
-        // In this tick, the controller raises the transmit timeout, which applies to all joints.
+        // In this tick, the controller raises the transmit timeout, which applies to all joints, and the joint's
+        // count starts again.
         (4, true, true, 0, 0),
         (4, true, true, 3, 0),
         (2, false, true, 3, 3),
@@ -65,8 +66,9 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     assert!(!nodes.node(GRIPPER).misbehaved);
 }
 
-/// If two answers arrive in a tick, the first answer was late, so the distance between both answers is not a motion within this tick. In
-/// the next tick, a single answer may again be on time. The difference between this answer and the prediction is also bridged.
+/// If two answers arrive in one tick, the first answer was late. The distance between both answers is not a motion
+/// within this tick, so it must not cause a step. In the next tick, a single answer may again be on time. Its
+/// difference from the prediction must not cause a step either.
 #[test]
 fn j63_the_second_answer_of_a_tick_makes_no_step() {
     let mut nodes = ready();
@@ -79,7 +81,7 @@ fn j63_the_second_answer_of_a_tick_makes_no_step() {
     bus[2] = answer(0.001);
     tick(&mut nodes, &bus, GOOD);
     let before = nodes.positions()[2];
-    // The answer contains the present position of the joint plus 1 mrad.
+    // The second answer of this tick is 1 mrad beyond the position of the joint.
     bus.push(answer(0.003));
     tick(&mut nodes, &bus, GOOD);
     let carried = nodes.positions()[2] - before;
@@ -91,7 +93,7 @@ fn j63_the_second_answer_of_a_tick_makes_no_step() {
     tick(&mut nodes, &bus, GOOD);
     let step = nodes.positions()[2] - before;
     assert!(step.abs() < 0.1e-3, "{step} rad");
-    // The offsets of both differences fade.
+    // The offsets for both differences fade.
     for _ in 0..250 {
         tick(&mut nodes, &bus, GOOD);
     }

@@ -44,12 +44,13 @@ fn j69_a_cause_shows_the_value_and_the_limit_of_its_kind() {
     };
     let still = set(0.0, 0.0, 0.0);
     for (kind, point, value, limit) in [
-        // 5 N·m of the model, 2 − 0.5 + 1 N·m of the position controller, and 3 N·m of friction.
+        // The value is the sum of 5 N·m (model), 2 − 0.5 + 1 N·m (position controller) and 3 N·m (friction).
         (StopKind::Overload, still, 10.5, 64.0),
         (StopKind::Unstable, still, 10.5, 64.0),
-        // Only the position controller, and 0.25 of the torque limit.
+        // The value is the torque of the position controller alone. The limit is a quarter of the torque limit.
         (StopKind::Push, still, 2.5, 16.0),
-        // The joint moves at 1 rad/s. RUSH is a fifth of the velocity limit.
+        // The joint moves at 1 rad/s, and the commanded velocity is 0.25 rad/s. The limit is a fifth (`RUSH`) of the
+        // velocity limit of 1.5 rad/s.
         (StopKind::Shove, set(0.0, 0.25, 0.0), 0.75, 0.3),
         (StopKind::Shove, set(0.0, -0.5, 0.0), 1.5, 0.3),
         // The due position is 0.75 rad, and the measured position is 0.5 rad.

@@ -63,8 +63,8 @@ fn replayed(bench: &Bench, points_hash: Option<u32>) -> Replayed {
     all
 }
 
-/// Each case is a list of ticks: the host event, and whether the recorded outputs differ from those of the controller. A snapshot and a
-/// quiet tick follow.
+/// Each case is a list of ticks. Each tick has a host event, and a flag that is `true` if the recorded outputs differ
+/// from the outputs of the controller. A snapshot and a quiet tick follow each list.
 #[test]
 fn j56_each_tick_of_a_replay_has_its_outcome() {
     use Host::{Exec, Long, Quiet, StoreArm};
@@ -75,13 +75,14 @@ fn j56_each_tick_of_a_replay_has_its_outcome() {
     // The first two columns show whether the arm and the points are known.
     let cases: &[Case<'_>] = &[
         (true, true, &[(Quiet, false), (Quiet, true), (Quiet, false)], &[Same, Differs, Differs, Same]),
-        // A frame that is not in the log possibly had no effect. This is assumed until the outputs differ.
+        // A frame whose bytes are not in the log may have had no effect. The replay assumes this until the outputs
+        // differ.
         (true, true, &[(Long, false), (Quiet, false), (Quiet, false)], &[Same, Same, Same, Same]),
         (true, true, &[(Long, false), (Quiet, true), (Quiet, false)], &[Same, INPUT, INPUT, Same]),
         (true, true, &[(Long, true), (Quiet, false)], &[INPUT, INPUT, Same]),
         (true, true, &[(StoreArm, false), (Quiet, true)], &[Same, INPUT, Same]),
         (true, true, &[(StoreArm, true), (Quiet, false)], &[INPUT, INPUT, Same]),
-        // A difference before the frame does not become uncertain.
+        // After a difference, a frame that is not in the log does not change the outcome to unsure.
         (true, true, &[(Quiet, true), (Long, false), (Exec, false)], &[Differs, Differs, Differs, Same]),
         (true, false, &[(Quiet, true), (Exec, false)], &[Differs, Differs, Same]),
         (true, true, &[(Exec, false), (Quiet, false), (Quiet, true)], &[Same, Same, Differs, Same]),
@@ -111,7 +112,8 @@ fn j56_each_tick_of_a_replay_has_its_outcome() {
     }
 }
 
-/// The controller changes between two ticks, and the outputs do not show this change.
+/// The controller changes between two ticks, and the outputs do not show this change. The replay must report the
+/// difference at the next snapshot.
 #[test]
 fn j56_a_snapshot_that_differs_from_the_replayed_state_is_reported() {
     let mut bench = Bench::new();

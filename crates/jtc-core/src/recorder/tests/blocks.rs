@@ -1,4 +1,4 @@
-//! Format of a block: its head, its check value, and the bits that count (J-56).
+//! Tests of the format of a block: its head, its check value, and its committed bits (J-56).
 use crate::recorder::block::{
     BITS, HEAD, MAGIC, NONE, Whole, commit, doubled, flags, head, in_place, mix, sealed_block,
 };
@@ -31,7 +31,8 @@ fn words() -> [u32; WORDS] {
 /// The check value is FNV-1a with whole words and a rotation: (hash XOR word) times 0x0100_0193, rotated left by 7 bits.
 #[test]
 fn j56_the_hash_of_the_bits_is_that_of_the_layout() {
-    // 0x0100_0193 << 7 = 0x8000_0000 + 0xC980; the multiplication by 2 shifts by one more bit, and bit 31 moves to bit 0.
+    // 0x0100_0193, rotated left by 7 bits, is 0x8000_C980. For the word 2, the product is twice as large, so bit 31
+    // of this value moves to bit 0: 0x0001_9301.
     for (hash, word, expected) in [
         (0, 0, 0),
         (5, 5, 0),
@@ -70,14 +71,14 @@ fn j56_a_block_with_any_wrong_bit_is_not_valid() {
 fn j56_a_block_cannot_have_more_bits_than_fit() {
     let most = block(&words(), BITS, 0, flags(LogState::Recording, false));
     assert_eq!(Whole::parse(&most).map(|whole| whole.bits), Some(251 * 32));
-    // The check value of the further bit, which the block does not contain, is correct.
+    // The block claims one bit more than it can contain, and the check value matches this number of bits.
     let mut more = most;
     let hash = words().iter().fold(mix(MAGIC, 3), |hash, word| mix(hash, *word));
     more[head::COMMIT] = commit(hash, 0, BITS + 1);
     assert!(Whole::parse(&more).is_none());
 }
 
-/// An interrupted tick may have written bits after the committed bits.
+/// An interrupted tick may have written bits after the committed bits. The reader must ignore these bits.
 #[test]
 fn j56_bits_after_the_committed_bits_are_ignored() {
     for bits in [1, 31, 32, 40, 63] {
@@ -136,7 +137,7 @@ fn j56_a_block_is_in_place_if_it_is_marked_and_has_its_number() {
     let mut block = sealed_block(7, 0, &[1]);
     assert!(in_place(&block, 7));
     assert!(!in_place(&block, 8));
-    // The recorder clears the mark before it overwrites a block, and when it discards the log.
+    // The recorder clears the magic number before it overwrites a block, and when it discards the log.
     block[head::MAGIC] = 0;
     assert!(!in_place(&block, 7));
 }

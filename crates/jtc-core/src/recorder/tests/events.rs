@@ -27,7 +27,8 @@ fn kinds(inputs: &RecordedInputs) -> Vec<RecordedKind> {
     inputs.host().iter().map(|event| event.kind).collect()
 }
 
-/// Each input alone makes a tick that is not quiet. The bus is empty, or all nodes have answered in order.
+/// In each tick of this test, at most one input differs from a quiet tick. The bus is empty, or all nodes have
+/// answered in order.
 #[test]
 fn j56_each_input_is_recorded_if_all_others_are_quiet() {
     let mut twice = UrgentCommands::NONE;
@@ -144,7 +145,8 @@ fn j56_only_segment_0_of_a_trajectory_begins_an_upload_in_a_replay() {
     }
 }
 
-/// The controller has looked at the events that it has completed, and at the next event.
+/// The log contains the events that the controller has completed, and the next event, which the controller may have
+/// executed in part.
 #[test]
 fn j56_the_events_that_the_controller_has_looked_at_are_recorded() {
     let frames: Vec<_> = (0..4).map(|_| frame(FrameType::GetInfo, &[0; 6])).collect();

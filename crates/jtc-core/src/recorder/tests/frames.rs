@@ -38,8 +38,8 @@ fn words(ticks: &[&[Frame]]) -> Vec<u32> {
     read_back(&ticks).into_iter().map(|(_, words)| words).collect()
 }
 
-/// The first word, six words of velocity and torque, and one word of distances. If a joint moves more than 15 steps forward or 16 steps
-/// back, six positions replace the distances.
+/// A tick takes eight words: the first word, six words of velocity and torque, and one word of distances. If a joint
+/// moves more than 15 steps forward or 16 steps back, six words of positions replace the word of distances.
 #[test]
 fn j56_a_tick_of_moving_joints_takes_eight_words() {
     let positions = [0, 15, -1, -1, 15, 16];
@@ -50,8 +50,8 @@ fn j56_a_tick_of_moving_joints_takes_eight_words() {
     assert_eq!(words(&ticks), [8, 8, 8, 8, 13, 8]);
 }
 
-/// A flag for each of seven nodes, six flags for the words of the node, and the changed word are 45 bits, which take two words. Changed
-/// velocities are already in the first eight words.
+/// A changed word takes 45 bits, which are two words: a flag for each of seven nodes, six flags for the words of this
+/// node, and the changed word. Changed velocities are already in the first eight words.
 #[test]
 fn j56_a_changed_temperature_takes_two_words_more() {
     let first = answers(7, 0, 5);
@@ -83,25 +83,26 @@ fn j56_a_missing_answer_does_not_change_the_expected_nodes() {
     assert!(all[1] > 8, "{all:?}");
 }
 
-/// The identifiers 0x207 to 0x20F look like answers to a Move from nodes that do not exist.
+/// The identifiers 0x207 to 0x20F look like answers to a Move from nodes that do not exist. The log must contain such
+/// frames unchanged.
 #[test]
 fn j56_frames_that_look_like_answers_of_missing_nodes_are_recorded() {
     for node in [6, 7, 8, 15] {
         for len in [0, 8, 12, 16, 24] {
             let data = [0x5A; 24];
             let frames = [Frame::new(id::MOVE_ANSWER + node, &data[..len]).expect("a valid length")];
-            // The helper compares the frames.
+            // `read_back` compares the returned frames with the written frames.
             read_back(&[(Inputs { bus: &frames, ..Inputs::QUIET }, 0), (Inputs::QUIET, 0)]);
         }
     }
 }
 
-/// A bus frame cannot have 9 bytes, so a writer has not written these bits. The reader does not return the tick.
+/// A bus frame cannot have 9 bytes, so the reader treats these bits as damaged and does not return the tick.
 #[test]
 fn j56_a_frame_with_an_impossible_length_is_damage() {
     let mut bench = Bench::new();
     bench.record(1 + 3);
-    // A quiet tick without ordered answers, with one frame.
+    // These bits are a quiet tick without the flag ORDERED, and contain one frame of 9 bytes.
     let writer = &mut bench.recorder.writer;
     writer.append([1 << 2]);
     for (value, bits) in [(1, 6), (0, 1), (0x123, 11), (9, 5)] {
@@ -121,7 +122,7 @@ fn j56_a_frame_with_an_impossible_length_is_damage() {
 fn j56_a_tick_that_is_not_complete_is_not_returned() {
     let mut bench = Bench::new();
     bench.record(1 + 3);
-    // The tick is not quiet, but the other inputs do not follow.
+    // The first word announces further inputs, but these inputs do not follow.
     bench.recorder.writer.append([0]);
     bench.recorder.writer.commit();
     assert_eq!(bench.ticks_after_snapshots(), [3]);

@@ -19,7 +19,7 @@ const LONG: HostEvent<'_> = HostEvent {
     event: LinkEvent::Frame(FrameRef { frame_type: FrameType::ClearOccurredErrors, bytes: &[0; 49] }),
 };
 
-/// The first tick of a log is recorded as a snapshot.
+/// The first tick of a log is recorded as a snapshot. After every 500 ticks, the next snapshot follows.
 #[test]
 fn j56_a_snapshot_follows_after_every_500_ticks() {
     let mut bench = Bench::new();
@@ -27,7 +27,8 @@ fn j56_a_snapshot_follows_after_every_500_ticks() {
     assert_eq!(bench.ticks_after_snapshots(), [500, 500, 0]);
 }
 
-/// The next snapshot comes after 250 ticks, or at once if more ticks have passed.
+/// After an input that is not in the log, the next snapshot is due 250 ticks after the last snapshot. If more ticks
+/// have passed, the snapshot comes at once.
 #[test]
 fn j56_the_next_snapshot_comes_early_after_a_frame_that_is_not_in_the_log() {
     for (omitted_at, expected) in [(10, [250, 500, 250]), (250, [250, 500, 250]), (300, [300, 500, 200])] {
@@ -71,7 +72,7 @@ fn j56_the_log_stops_300_ms_after_the_first_error_whatever_follows() {
     assert_eq!(bench.recorder.state(), LogState::Recording);
     bench.record(1);
     assert_eq!(bench.recorder.state(), LogState::Error);
-    // 9 ticks before the error, the error, and 300 ticks after the error.
+    // The log contains 9 ticks before the error, the tick of the error, and 300 ticks after the error.
     assert_eq!(bench.ticks_after_snapshots(), [310]);
 }
 
@@ -128,8 +129,9 @@ fn j56_a_page_begins_at_the_requested_word() {
     }
 }
 
-/// Two ticks that differ in one word of the outputs never have the same value, because each step of the computation is reversible. The
-/// states are one word: errors << 16 | state << 8 | trajectory << 4 | safety output.
+/// Two ticks that differ in one word of the outputs never have the same check value, because each step of the
+/// computation is reversible. The states are combined in one word: errors << 16 | state << 8 | trajectory << 4 |
+/// safety output.
 #[test]
 fn j56_the_check_value_depends_on_every_output() {
     use ControllerState::{HoldPos, Init};
@@ -147,7 +149,8 @@ fn j56_the_check_value_depends_on_every_output() {
         values.push(chain(before, &bench.controller, errors, &Outputs { bus, safety_output, ..OUTPUTS }));
     };
     add(0, 0, Init, Null, false, None);
-    // The earlier value is rotated left by 5 bits: 0x8000_0000, which none of the states below contains.
+    // This earlier check value, rotated left by 5 bits, is 0x8000_0000. None of the words of states below has this
+    // value.
     add(0x0400_0000, 0, Init, Null, false, None);
     add(0, 1, Init, Null, false, None);
     add(0, 2, Init, Null, false, None);

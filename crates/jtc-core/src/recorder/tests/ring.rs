@@ -59,7 +59,7 @@ fn j56_the_oldest_block_is_the_first_without_a_gap() {
         ([sealed(4), EMPTY, sealed(6), sealed(7)], (6, 8)),
         ([sealed(8), sealed(5), sealed(6), sealed(7)], (5, 9)),
         ([sealed(0), sealed(1), EMPTY, EMPTY], (0, 2)),
-        // No block precedes block 0, even if the memory contains the mark of the block with the highest number.
+        // No block precedes block 0, even if the memory contains a damaged block with the highest block number.
         ([sealed(0), EMPTY, EMPTY, unreadable], (0, 1)),
     ] {
         assert_eq!(Writer::new([memory.to_vec()]).range(), range);
@@ -102,7 +102,7 @@ fn j56_the_commit_counts_every_bit() {
     }
 }
 
-/// A block has 251 words after its head. 31 times eight words and three words fill the block.
+/// A block has 251 words after its head: 31 times eight words, and three more words.
 #[test]
 fn j56_words_that_fit_exactly_end_a_block() {
     let mut writer = writer();
@@ -115,7 +115,7 @@ fn j56_words_that_fit_exactly_end_a_block() {
     let (first, second) = (parsed(&writer, 0).unwrap(), parsed(&writer, 1).unwrap());
     assert_eq!((first.bits, first.closed, first.words[250]), (BITS, true, 31));
     assert_eq!((second.bits, second.closed, second.words[7]), (256, false, 32));
-    // Words that do not fit begin the next block, and the first block ends earlier.
+    // If words do not fit into the block, they begin the next block, and the first block ends earlier.
     let mut writer = self::writer();
     for n in 0..32 {
         writer.append([n; 8]);
@@ -144,7 +144,7 @@ fn j56_a_value_of_zero_takes_one_bit_and_other_values_take_65_bits() {
     assert_eq!((reader.take(32), reader.take(32)), (0x9ABC_DEF0, 0x1234_5678));
 }
 
-/// The value begins up to four words before the end of a block, at every bit of a word.
+/// The value begins in one of the last four words of a block, at every bit of this word.
 #[test]
 fn j56_a_value_at_the_end_of_a_block_continues_in_the_next_block() {
     const VALUE: u64 = 0x8765_4321_0FED_CBA9;

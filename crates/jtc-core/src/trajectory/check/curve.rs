@@ -8,8 +8,8 @@ const DEPTH: usize = 6;
 pub(super) struct Leaves {
     /// Position in the interval, 0..1.
     pub at: f64,
-    /// Value of the curve at the position `at`. If the number of halvings was too small, this is the value of a control point, which the
-    /// curve may not reach.
+    /// Value of the curve at the position `at`. If all permitted halvings were used, this is the value of a control
+    /// point, which the curve may not reach.
     pub value: f64,
     /// Bound that the curve leaves.
     pub bound: f64,
@@ -120,7 +120,7 @@ mod tests {
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 255).expect("it leaves its bounds");
         assert_eq!((found.at, found.bound), (1.0 / 128.0, 1.0));
         assert!(found.value > 1.0 && found.value < 1.0001, "{found:?}");
-        // All shared halvings are used before the curve is halved to the full depth.
+        // Only two halvings remain, so the curve cannot be halved to the full depth.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 2).expect("it may leave them");
         assert_eq!((found.at, found.bound), (1.0 / 8.0, 1.0));
     }

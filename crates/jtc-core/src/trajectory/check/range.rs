@@ -1,9 +1,10 @@
 //! Positions of a joint that a path may have (J-36).
 //!
-//! The check adds two allowances to the position limits. The first allowance of the check is a tolerance for rounding. Rounding to the wire
-//! format can move a path that ends exactly on a position limit slightly beyond this limit, which is not an error of the path. The second
-//! allowance of the check is for a joint that is outside a position limit when the path begins. If the joint is outside a position limit,
-//! the path may also start outside this limit. Until the joint is inside its limits again, the path must not move the joint further out.
+//! The check adds two allowances to the position limits. The first allowance is a tolerance for rounding. If a path
+//! ends exactly on a position limit, rounding to the wire format can move its end slightly beyond this limit. This is
+//! not an error of the path. The second allowance is for a joint that is outside a position limit when the path
+//! begins. The path may then also start outside this limit. Until the joint is inside its limits again, the path must
+//! not move the joint further out.
 use super::{POSITION_STEP, VELOCITY_STEP};
 use crate::config::{Config, WORKING_AREA};
 

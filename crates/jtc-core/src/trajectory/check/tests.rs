@@ -27,8 +27,8 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
-/// Returns the largest effect of rounding on a position. The effect of rounding is one position step, plus the effect of one velocity step
-/// at both points in the middle of the quintic.
+/// Returns the largest effect of rounding on a position. This effect is one position step, plus the change in the
+/// middle of the quintic if the velocities of both points are wrong by one step in opposite directions.
 fn tolerance(step_ms: u16) -> f64 {
     let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
     let (a, b) = (moving(1.0), moving(-1.0));
@@ -60,10 +60,12 @@ fn sampled(j: usize, step_ms: u16, a: &RawPoint, b: &RawPoint) -> ([f64; 2], f64
     (position, velocity, speed)
 }
 
-/// Returns the margins to the limits of joint 0 around two points, for any signs of the velocities and accelerations. The first two margins
-/// belong to the hull of the positions (rad, below and above). The third margin belongs to the hull of the velocities (rad/s). The hull of
-/// the velocities includes the bump for the unexplained distance, reduced by one step. The last margin belongs to the acceleration of `b`
-/// (rad/s²).
+/// Returns the margins to the limits of joint 0 around two points, for any signs of the velocities and accelerations:
+///
+/// - margins of the hull of the positions to the lower and to the upper position limit, rad
+/// - margin of the hull of the velocities to the velocity limit, rad/s; this hull includes the bump for the
+///   unexplained distance, reduced by one step
+/// - margin of the acceleration of `b`, rad/s²
 fn room(config: &Config, step_ms: u16, a: &RawPoint, b: &RawPoint) -> [f64; 4] {
     let (limit, h, more) = (&config.joints[0], f64::from(step_ms) / 1000.0, tolerance(step_ms));
     let [a, b] = [a, b].map(|point| {
@@ -239,7 +241,7 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     let later =
         inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
-    // The check reports the first of several equally fast points, in both directions.
+    // If several points are equally fast, the check reports the first of them, in both directions.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, 0.4, high + 0.001, high + 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -300,8 +302,8 @@ fn j36_a_table_that_leaves_standstill_out_is_no_table_for_a_path() {
     assert_eq!((v.joint, v.quantity, v.value), (5, Quantity::FrictionVelocity, 0.0));
 }
 
-/// The host may change the friction model between two segments. When the path is executed, the controller checks points that were loaded
-/// before again, including standstill.
+/// The host may change the friction model between two segments. Before the path is executed, the controller therefore
+/// checks that the friction table contains the velocities of all points, and velocity 0.
 #[test]
 fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     let crate::Friction::Table(mut tables) = crate::Parameters::avena_friction_table() else {
@@ -510,7 +512,8 @@ fn j36_between_two_points_a_path_comes_no_further_out_either() {
         check.take(&b)
     };
     for (v0, v1) in [(0.4, -0.4), (-0.4, 0.4)] {
-        // In half a second, the joint moves out by 62 mrad in the middle of the interval.
+        // The interval takes half a second. In its middle, the joint is 62 mrad further out, or 62 mrad further in
+        // before it moves out again.
         let (a, b) = (point(1, 1.315, v0, 0.0), point(1, 1.31, v1, 0.0));
         let violation = after(500, a, b).unwrap_err();
         assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, 1.3));

@@ -113,16 +113,16 @@ fn j33_each_tick_of_a_stop() {
     let on_time = 0.001 * (PUNCTUAL * 500.0);
     for (rate, slope, easy, full, expected) in [
         (1.0, 0.0, FREE, FREE, -rounded),
-        // The bounds with margins allow only one slope, which is larger than needed. In other cases, the bounds contradict each other or
-        // allow no slope.
+        // In this row, the bounds with margins allow only one slope, which is larger than needed. In the next two
+        // rows, the bounds contradict each other or allow no slope.
         (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
         (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
         (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
-        // A stop within its bounds that just keeps its time limit is not hurried.
+        // A stop within its bounds that ends exactly at its time limit is not hurried.
         (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
         // At full speed, path time does not become faster, for any motion of the arm.
         (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
-        // In the last step, path time is at rest and does not slow down any further.
+        // This tick covers the remaining rate, so path time is at rest and its slope is zero.
         (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
         // The remaining rate counts as zero, although the bounds do not allow any slope.
         (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
@@ -193,7 +193,8 @@ fn j33_each_tick_of_a_resume() {
     for (rate, slope, bounds, expected) in [
         (0.0, 0.0, FREE, rounded),
         (0.5, -1.0, FREE, -1.0 + 8.0 * rounded),
-        // The bounds allow only one slope. In other cases, the bounds contradict each other or allow only the opposite direction.
+        // The bounds allow only one slope. In the next rows, the bounds contradict each other, or allow only the
+        // opposite direction or no slope.
         (0.5, 5.0, (2.0, 2.0), 2.0),
         (0.5, 5.0, (2.0, 1.0), 0.0),
         (0.5, 5.0, (-2.0, -1.0), 0.0),
@@ -211,7 +212,8 @@ fn j33_each_tick_of_a_resume() {
 /// When a tick covers the remaining change of the rate, path time is at full speed and its slope is zero.
 #[test]
 fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
-    // `rest` is a remaining change without a rounding error, and `enough` is the slope that is just sufficient for it.
+    // `rest` is a remaining change of the rate. It is a power of two, so it has no rounding error. `enough` is the
+    // slope that just covers this change in one tick.
     let rest = 1.0 / 16_384.0;
     let enough = rest / DT;
     assert_eq!(enough * DT, rest);
@@ -233,7 +235,8 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
 fn j33_the_rest_of_the_way_flattens_the_slope_out() {
     let ramp = Ramp::of(200.0);
     for ticks in [1.0, 2.0, 7.0, 40.0] {
-        // `way` is the sum of a slope that falls from `ticks` times the change per tick to one time this change.
+        // `way` is the change of the rate while the slope falls from `ticks` steps to one step. A step is the change
+        // of the slope per tick.
         let way = ramp.round * DT * ticks * (ticks + 1.0) / 2.0;
         assert!((ramp.flatten(way) - ticks * ramp.round).abs() < 1e-9, "{ticks}");
     }
@@ -287,7 +290,7 @@ proptest! {
                 if clock.ramping() {
                     clock.change_pace(200.0, FREE);
                 }
-                // The rate stays within the range of the targets so far, except for the change that removes a slope.
+                // The rate stays within the range of the targets so far.
                 let (least, most) = wanted.iter().fold((1.0f64, 0.0f64), |(l, m), w| (l.min(*w), m.max(*w)));
                 prop_assert!(clock.rate >= least - 1e-9 && clock.rate <= most + 1e-9, "{clock:?}");
                 prop_assert!((clock.slope - before.slope).abs() <= REVERSAL * round + 1e-9, "{before:?} {clock:?}");

@@ -19,8 +19,8 @@ struct Joint {
 }
 
 impl Joint {
-    /// Returns a joint whose answered positions have changed by `per_ms` (rad) in each of the last 20 ms, up to 100 ms. The reported speed
-    /// is zero.
+    /// Returns a joint whose answered positions have changed by `per_ms` (rad) per millisecond for 20 ms. The last
+    /// answer is at 100 ms. The reported speed is zero.
     fn drifting(per_ms: f64) -> Self {
         let position = |ms: u32| per_ms * f64::from(ms);
         let mut history = History::of(&Answered { position: position(80), at_ms: 80 });
@@ -40,7 +40,8 @@ impl Joint {
         self.jumps.look(&answer, 0.0, at_ms, TWIST, &self.history, &self.config)
     }
 
-    /// Evaluates the answer of the next millisecond. The history then contains the position at which the controller uses the answer.
+    /// Evaluates the answer of the next millisecond, and adds it to the history. If the answer shows a jump or a
+    /// possible jump, the history gets the position without this jump.
     fn see(&mut self, position: f64) -> Seen {
         self.ms += 1;
         let seen = self.look_at(position, self.ms);
@@ -121,7 +122,8 @@ fn j35_an_expected_answer_ends_a_possible_jump() {
     assert_eq!(joint.see(1.0), Seen::Jump(1.0));
 }
 
-/// A change of the size by the permitted difference does not count. A larger change begins a new count of five answers.
+/// A change of the size by at most the permitted difference does not restart the count. After a larger change, the
+/// controller counts five answers again.
 #[test]
 fn j35_a_changed_size_counts_from_the_first_answer_with_this_size() {
     let mut joint = Joint::at_rest();
@@ -163,7 +165,7 @@ fn j35_a_changed_size_within_the_twist_of_the_gear_is_a_motion() {
     }
 }
 
-/// A difference of the encoders that existed before the jump is not a part of the jump.
+/// A difference of the encoders that existed before the jump is not counted as a part of the jump.
 #[test]
 fn j35_a_difference_before_the_jump_is_not_a_part_of_it() {
     // The positions change by 10 · 0.25 rad in the window. The reported speed is zero.
@@ -174,7 +176,7 @@ fn j35_a_difference_before_the_jump_is_not_a_part_of_it() {
     assert_eq!(joint.see(0.25 * 101.0 - 4.0), Seen::Perhaps(-4.0));
 }
 
-/// A jump is detected only if the last answer is at most 3 ms older.
+/// A jump is detected only if the previous answer is at most 3 ms older than the present answer.
 #[test]
 fn j35_a_jump_appears_between_two_answers_within_three_milliseconds() {
     for (after_ms, seen) in [
@@ -188,8 +190,8 @@ fn j35_a_jump_appears_between_two_answers_within_three_milliseconds() {
     }
 }
 
-/// While the answers at the start of the window are missing, a possible jump stays undecided for 15 answers in all. Without a possible jump,
-/// such an answer cannot be classified.
+/// While the answers at the start of the window are missing, a possible jump stays undecided for 15 answers in all.
+/// If no possible jump has begun before, such an answer is treated as a motion.
 #[test]
 fn j35_a_possible_jump_stays_undecided_for_fifteen_answers() {
     let mut joint = Joint::at_rest();
@@ -205,7 +207,7 @@ fn j35_a_possible_jump_stays_undecided_for_fifteen_answers() {
         assert_eq!(joint.look_at(7.0, at_ms), Seen::Perhaps(1.0), "{at_ms} ms");
         assert!(joint.jumps.watching());
     }
-    // This is the 16th answer.
+    // This is the 16th answer, which ends the possible jump.
     assert_eq!(joint.look_at(7.0, 117), Seen::Motion);
     assert!(!joint.jumps.watching());
 }

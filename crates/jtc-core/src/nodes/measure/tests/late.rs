@@ -19,7 +19,8 @@ struct Motion {
     commanded: f64,
 }
 
-/// Difference between the values that the control law uses and the real motion of the joint, in one millisecond.
+/// Errors of the values that the control law uses, relative to the real motion of the joint, in one millisecond of
+/// the test.
 #[derive(Clone, Copy, Debug)]
 struct Off {
     /// Difference of the position, rad.
@@ -126,21 +127,22 @@ fn motion() -> impl Strategy<Value = Motion> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// After the burst, the position from a late answer differs from the real position only by encoder steps and by the error of the
-    /// predicted rate. If the controller used a late answer like an answer on time, the error would be the lateness times the speed, 3
-    /// mrad.
+    /// After the burst, the error of the used position consists only of encoder steps and the error of the predicted
+    /// rate. If the controller used a late answer like an answer on time, the error would be the lateness times the
+    /// speed, 3 mrad.
     #[test]
     fn j63_late_answers_are_used_as_of_the_time_at_which_they_were_due(
         motion in motion(),
         late in (1u32..=5).prop_flat_map(lateness),
     ) {
         let off = motion.off(&arrivals(&late, &[]));
-        // The differences during the burst have been bridged, and they fade.
+        // At the end of the burst, the used position has an offset from the answers. By this time, the offset has
+        // faded.
         prop_assert!(most(&off[300..]) <= 4.0 * ENCODER, "{} rad", most(&off[300..]));
     }
 
-    /// If a joint follows its command, the used velocity is the velocity in the late answer plus the later change of the commanded
-    /// velocity.
+    /// If a joint follows its command, the used velocity is the velocity in the late answer, plus the change of the
+    /// commanded velocity since then.
     #[test]
     fn j63_late_velocities_are_taken_on_by_what_was_commanded(motion in motion(), late in lateness(3)) {
         let motion = Motion { commanded: 1.0, ..motion };
@@ -149,9 +151,9 @@ proptest! {
         }
     }
 
-    /// The position error has an upper bound, however many answers between the late answers are lost. The bound is twice the distance that
-    /// the joint moves in the highest lateness. Half of the bound is the difference that is bridged when the loss is detected. After the
-    /// loss, no part of this error remains.
+    /// Any number of answers between late answers may be lost, but the position error has an upper bound. The bound
+    /// is twice the distance that the joint moves in the highest lateness. Half of the bound is the offset that the
+    /// controller adds when it detects the loss. After this offset has faded, no error remains.
     #[test]
     fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
         motion in motion(),
@@ -167,8 +169,9 @@ proptest! {
     }
 }
 
-/// After a lost answer, the next answer of a fast joint is at the predicted position, and does not lag by the distance of a millisecond.
-/// The controller therefore detects the lost answer before the window ends.
+/// After a lost answer, the next answer of a fast joint is at the predicted position. A late answer would lag by the
+/// distance that the joint moves in a millisecond. The controller therefore detects the lost answer before the window
+/// ends.
 #[test]
 fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -178,7 +181,8 @@ fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
 }
 
-/// Late answers before the first evidence do not cause a step, because their difference from the prediction is bridged and fades.
+/// Late answers before the first evidence do not cause a step, because their difference from the prediction becomes
+/// an offset that fades.
 #[test]
 fn j63_the_first_late_answers_make_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -223,7 +227,8 @@ fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     }
 }
 
-/// If answers leave their predictions and return to them in small steps, the bridged differences do not add up.
+/// If answers repeatedly deviate from their predictions and return to them in small steps, the resulting offsets do
+/// not add up.
 #[test]
 fn j63_what_was_bridged_is_taken_back() {
     let mut joint = moving(0.0);
@@ -242,7 +247,7 @@ fn j63_what_was_bridged_is_taken_back() {
     }
 }
 
-/// The remaining offset changes towards zero, but not beyond zero.
+/// A correction only reduces the offset, and never changes its sign.
 #[test]
 fn j63_only_what_is_left_is_taken_back() {
     for (left, by, remains) in [

@@ -2,7 +2,8 @@
 use super::*;
 use crate::interpolation::SetPoint;
 
-/// Joint 2 was commanded to k² rad and 3·k rad/s in tick k, so each pair of ticks has another distance. The present tick is tick 9.
+/// Joint 2 was commanded to k² rad and 3·k rad/s in tick k, so the distance between any two ticks is different. The
+/// present tick is tick 9.
 #[test]
 fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
     let mut commanded = Commanded::default();
@@ -13,13 +14,16 @@ fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
         commanded.put(&SetPoint { position, velocity, ..SetPoint::default() });
     }
     for (delay_ticks, ticks, ms, velocity, way) in [
-        // The answer was due 2 ticks ago, in tick 7, and belongs to tick 4: 49 − 16.
+        // With a delay of 2 ticks, an answer on time belongs to tick 7. An answer that is 3 ticks late belongs to
+        // tick 4. The commanded distance since then is 7² − 4² = 33 rad.
         (2, 3, 3, 12.0, 33.0),
         (2, 0, 0, 21.0, 0.0),
         (2, 5, 5, 6.0, 45.0),
-        // The commands of the last 7 ticks are stored, so the answer counts as 5 ticks late: 49 − 4.
+        // Only the commands of the last 7 ticks are stored. The answer counts as 5 ticks late and belongs to tick 2,
+        // so the distance is 7² − 2² = 45 rad.
         (2, 7, 5, 6.0, 45.0),
-        // Without a configured delay, an answer belongs to the last tick, tick 8: 64 − 36.
+        // Without a configured delay, an answer on time belongs to the last tick, tick 8. This answer belongs to tick
+        // 6, so the distance is 8² − 6² = 28 rad.
         (0, 2, 2, 18.0, 28.0),
         (1, 2, 2, 18.0, 28.0),
         (4, 1, 1, 12.0, 9.0),
@@ -31,25 +35,26 @@ fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
     }
 }
 
-/// The young velocity is the rate of the positions of the last 5 ms. Its distance from the commanded velocity (`due`) is limited to 2.5
-/// times the distance of the reported velocity, in the same direction. The remainder of a fading offset does not belong to the reported
-/// velocity.
+/// The young velocity is the rate of the positions over the last 5 ms (`rate`). Its difference from the commanded
+/// velocity (`due`) is at most 2.5 times the difference of the reported velocity from `due`, with the same sign. The
+/// reported velocity is `used` minus the fading `offset`.
 #[test]
 fn j66_the_velocity_from_positions_is_bounded_around_the_commanded_velocity() {
     for (rate, used, offset, due, young) in [
-        // 1 − 0.25 = 0.75 of at most 2.5 · (0.75 − 0.25 − 0.25) = 0.625.
+        // The difference 1 − 0.25 = 0.75 is limited to 2.5 · (0.75 − 0.25 − 0.25) = 0.625. The result is `due` plus
+        // 0.625.
         (1.0, 0.75, 0.25, 0.25, 0.875),
         (-1.0, -0.75, -0.25, -0.25, -0.875),
-        // 0.5 − 0.25 = 0.25 of at most 2.5 · 0.5.
+        // The difference 0.5 − 0.25 = 0.25 is less than its limit, 2.5 · (1 − 0.25 − 0.25) = 1.25.
         (0.5, 1.0, 0.25, 0.25, 0.5),
-        // 0.5 − 0.75 = −0.25 of at most 2.5 · |0.5 − 0.75| = 0.625.
+        // The magnitude of the difference 0.5 − 0.75 = −0.25 is less than its limit, 2.5 · |0.5 − 0.75| = 0.625.
         (0.5, 0.5, 0.0, 0.75, 0.5),
         (-1.0, 0.5, 0.0, 0.75, 0.125),
-        // The differences have opposite signs, so the encoder has jumped.
+        // The two differences have opposite signs, so the encoder has jumped. The result is the commanded velocity.
         (0.75, 0.0, 0.0, 0.25, 0.25),
         (0.0, 0.75, 0.0, 0.25, 0.25),
         (0.75, 0.25, 0.25, 0.25, 0.25),
-        // The reported velocity is the due velocity, or the positions follow the due velocity.
+        // One of the two differences is zero, so the result is the commanded velocity.
         (0.75, 0.25, 0.0, 0.25, 0.25),
         (0.25, 0.75, 0.0, 0.25, 0.25),
     ] {
@@ -86,8 +91,9 @@ fn j35_the_distance_of_the_positions_contains_only_answers() {
     }
 }
 
-/// An answer up to a tenth of the implausible distance from its prediction is used as it is. Such an answer does not show a jump or a turn
-/// of the drive's positions, even if a jump is subtracted. After 10 s without an answer, the implausible distance is 60 rad.
+/// An answer up to a tenth of the implausible distance from its prediction is used as it is. Such an answer does not
+/// show a jump or a wrap-around of the drive's positions, even if a jump is subtracted from each answer. After 10 s
+/// without an answer, the implausible distance is 60 rad, and a tenth of it is 6 rad.
 #[test]
 fn j35_an_answer_near_its_prediction_is_used_as_it_is() {
     let bound = UNEXPECTED * (IMPLAUSIBLE * DT * VELOCITY_MAX * 10_000.0);
@@ -101,8 +107,8 @@ fn j35_an_answer_near_its_prediction_is_used_as_it_is() {
     }
 }
 
-/// A late answer is at most as old as the time since the last answer. Here the last answer arrived one tick ago, so both answers of this
-/// tick belong to this tick, because the bus has repeated a frame.
+/// The lateness of an answer is limited to the time since the last answer. Here the last answer arrived one tick ago.
+/// The bus has repeated a frame, so both answers belong to this tick.
 #[test]
 fn j63_an_answer_is_never_older_than_the_last_answer() {
     let mut joint = moving(0.1);
@@ -123,7 +129,7 @@ fn j63_the_first_answer_may_be_late() {
     assert!((joint.used().position - (0.25 + 0.5 * DT)).abs() < 1e-12);
 }
 
-/// Discarding the prediction does not change the knowledge that answers of this joint may be late.
+/// When the prediction is discarded, the evidence of late answers remains valid.
 #[test]
 fn j63_the_evidence_of_late_answers_survives_a_discarded_prediction() {
     let mut joint = moving(0.0);
@@ -135,9 +141,10 @@ fn j63_the_evidence_of_late_answers_survives_a_discarded_prediction() {
     assert!(!joint.lateness.stands(1));
 }
 
-/// A joint at rest answers at 4 mrad, further than a tenth of the implausible distance of 6 mrad. On time, this answer may show a jump of
-/// the encoder, so the controller assumes that the joint has not moved. The answer of the tick before cannot show a jump, because the speed
-/// of a late answer belongs to another window. The encoder of a joint without torque is not checked either.
+/// A joint at rest answers at 4 mrad, which is more than a tenth of the implausible distance of 6 mrad. If the answer
+/// is on time, it may show a jump of the encoder, so the controller assumes that the joint has not moved. A late
+/// answer is not checked for a jump, because its speed belongs to another window. The encoder of a joint without
+/// torque is not checked either.
 #[test]
 fn j35_only_an_answer_on_time_of_an_enabled_joint_may_show_a_jump() {
     for (enabled, late, watched) in
@@ -149,7 +156,8 @@ fn j35_only_an_answer_on_time_of_an_enabled_joint_may_show_a_jump() {
             enabled,
             ..tick((answers > 0).then_some(position), 0.0)
         };
-        // An answer arrives together with the answer of the next tick, which is the evidence of late answers.
+        // No answer arrives in the first tick, and two answers arrive in the second tick. This is the evidence of
+        // late answers.
         step(&mut joint, &at(0, 0.0));
         step(&mut joint, &at(2, 0.0));
         if late {

@@ -13,8 +13,9 @@ fn at_rest() -> Measurement {
     joint
 }
 
-/// Returns the use of an answer at `position` (rad) with this difference and this implausible distance, rad. The answer comes `after_ms`
-/// after the last answer.
+/// Returns the position that is used for an answer at `position` (rad), and the outcome. `off` is the prediction
+/// minus the answer, and `reach` is the implausible distance, both in rad. The answer arrives `after_ms` after the
+/// last answer.
 fn used(
     joint: &mut Measurement,
     position: f64,
@@ -41,7 +42,7 @@ fn j35_a_position_without_its_jump_may_have_wrapped_around() {
         // The remaining difference is 2π − 6 rad = 0.28 rad.
         (0.5, 6.0, 1.0, Some(TAU), Outcome::Used),
         (0.5, -6.0, 1.0, Some(-TAU), Outcome::Used),
-        // The answer is within half a turn.
+        // The difference is at most half a turn (π), so the position has not wrapped around.
         (0.5, 0.5, 1.0, Some(0.0), Outcome::Used),
         (0.5, -0.5, 1.0, Some(0.0), Outcome::Used),
         (0.5, PI, 4.0, Some(0.0), Outcome::Used),
@@ -70,7 +71,7 @@ fn j35_an_answer_within_a_tenth_of_the_implausible_distance_is_a_motion() {
     for sign in [1.0, -1.0] {
         let at = |distance: f64| used(&mut at_rest(), sign * distance, -sign * distance, reach, 1, &config);
         assert_eq!(at(tenth), (Some(sign * tenth), Outcome::Used));
-        // As a possible jump, the position is used without the jump.
+        // The controller treats this answer as a possible jump, and uses the position without the jump.
         assert_eq!(at(0.03125), (Some(0.0), Outcome::Used));
     }
 }
@@ -91,17 +92,20 @@ fn j35_the_twist_of_the_gear_is_its_torque_limit_over_its_stiffness() {
     }
 }
 
-/// After the jump is subtracted, the position must be within half of the implausible distance from the prediction.
+/// After the jump is subtracted, the distance of the position from the prediction must be at most half of the
+/// implausible distance.
 #[test]
 fn j35_a_jump_must_leave_an_answer_near_its_prediction() {
     // The answer shows a jump by 0.25 rad, so it is at 0 rad without the jump. The implausible distance is 0.5 rad.
     for (off, position, outcome) in [
         (-0.25, Some(0.0), Outcome::Used),
-        // 0.25 rad from the prediction.
+        // Without the jump, the position is 0.25 rad from the prediction, which is still near enough.
         (-0.5, Some(0.0), Outcome::Used),
-        // More than 0.25 rad from the prediction: the answer itself is not usable.
+        // Without the jump, the position is 0.5 rad from the prediction, which is too far. The answer itself is 0.75
+        // rad away, so it is not usable.
         (-0.75, None, Outcome::Predicted),
-        // 0.375 rad from the prediction, and the answer itself is only 0.125 rad away.
+        // Without the jump, the position is 0.375 rad from the prediction, which is too far. The answer itself is
+        // only 0.125 rad away, so it is used as it is.
         (0.125, Some(0.25), Outcome::Used),
     ] {
         assert_eq!(used(&mut at_rest(), 0.25, off, 0.5, 1, &config()), (position, outcome), "{off}");
@@ -139,7 +143,8 @@ fn j35_the_first_answer_has_no_rate_and_keeps_the_jump() {
     assert_eq!((joint.used().position, joint.speed(), joint.taken_off()), (-1.0, 0.0, 0.5));
 }
 
-/// The first answer is used directly, even if it is the second answer of its tick. No earlier position exists from which it could differ.
+/// The first answer is used directly, even if it is the second answer of its tick. No earlier position exists, so no
+/// step can occur.
 #[test]
 fn j63_the_first_answer_is_not_bridged() {
     let mut joint = Measurement::default();
@@ -148,12 +153,13 @@ fn j63_the_first_answer_is_not_bridged() {
     assert_eq!(joint.used().position, 1.0);
 }
 
-/// An answer on time that returns after a missing answer is bridged, even if it is close to its prediction.
+/// If an answer on time follows a missing answer, the used position has no step, even if the answer is close to its
+/// prediction.
 #[test]
 fn j63_a_returned_answer_on_time_makes_no_step() {
     let mut joint = at_rest();
     step(&mut joint, &tick(None, 0.0));
-    // Two encoder steps are 192 µrad.
+    // The answer is 100 µrad from its prediction. Two encoder steps are 192 µrad.
     assert!(step(&mut joint, &tick(Some(1e-4), 0.0)));
     assert!(joint.used().position.abs() < 1e-9, "{:?}", joint.used());
 }
@@ -175,7 +181,7 @@ fn past(commanded: f64, commanded_way: f64) -> impl Fn(u8) -> Late {
     }
 }
 
-/// A late answer at a distance of two encoder steps from its prediction is used directly, as of the time at which it was due.
+/// A late answer that is two encoder steps from its prediction is used directly, for the time at which it was due.
 #[test]
 fn j63_a_late_answer_two_steps_from_its_prediction_is_in_its_place() {
     // Two steps of 2⁻¹⁴ rad are 2⁻¹³ rad.
@@ -186,7 +192,8 @@ fn j63_a_late_answer_two_steps_from_its_prediction_is_in_its_place() {
         assert_eq!(joint.step(&tick(Some(0.0), 0.0), past(0.0, way), &config), Outcome::Used);
         assert_eq!(joint.used().position, way);
     }
-    // A larger distance fits an answer on time, so the outstanding answer was lost.
+    // If this answer were late, it would be three steps from its prediction. If it is on time, it is at its
+    // prediction. The outstanding answer was therefore lost.
     let mut joint = one_outstanding();
     assert_eq!(joint.step(&tick(Some(0.0), 0.0), past(0.0, 1.5 * two), &config), Outcome::Used);
     assert_eq!(joint.used().position, 0.0);
@@ -212,7 +219,8 @@ fn j63_a_late_velocity_makes_no_step() {
         commanded: 0.25,
         ..tick(None, 0.0)
     };
-    // The prediction is at 0.25 mrad. The answer is at 0.7 mrad, less 0.125 mrad, because the joint is slower than its command.
+    // The prediction is at 0.25 mrad. The late answer is at 0.7 mrad. Extrapolated to this tick, it is at 0.575 mrad,
+    // because the joint is slower than its command by 0.125 rad/s.
     assert_eq!(joint.step(&late, past(0.125, 0.0), &Config::avena()), Outcome::Used);
     assert!((joint.used().velocity - 0.25).abs() < 1e-12, "{:?}", joint.used());
     assert!((joint.used().position - 0.25 * DT).abs() < 1e-9, "{:?}", joint.used());

@@ -69,7 +69,7 @@ impl Display for FrameRef<'_> {
         match Command::parse(*self) {
             Ok(command) => {
                 command.fmt(f)?;
-                // Two frame types have the meaning of this command, but only one of the two types is correct.
+                // A host may also send this command as an empty frame of another type. The text then shows this type.
                 if self.frame_type != command.frame_type() {
                     write!(f, " (sent as an empty {})", self.frame_type)?;
                 }

@@ -41,7 +41,7 @@ pub mod field {
     pub const NODE_INIT: usize = 15;
     /// Trajectory execution state.
     pub const TES: usize = 16;
-    /// Index of the current 1 ms point, as a u32.
+    /// Index of the current point, counted as if the points were 1 ms apart, as a u32.
     pub const POINT: Range<usize> = 17..21;
     /// Friction type.
     pub const FRICTION_TYPE: usize = 21;
@@ -106,7 +106,7 @@ pub struct Status {
     pub node_init: u8,
     /// State of the trajectory.
     pub trajectory: Code<TrajectoryState>,
-    /// Index of the current 1 ms point.
+    /// Index of the current point, counted as if the points were 1 ms apart.
     pub point: u32,
     /// Kind of friction: 0 polynomial, 1 table.
     pub friction_type: u8,
@@ -253,7 +253,8 @@ impl Status {
 
     /// Parses a complete frame of 165, 173 or 175 bytes. Returns `None` if the type, length or CRC is wrong.
     ///
-    /// If this version does not know a code in the response record, the record gets the status Idle, so that it confirms nothing.
+    /// If this version does not know a code in the response record, the record gets the status Idle and does not
+    /// confirm a frame.
     pub fn parse(bytes: &[u8]) -> Option<Status> {
         let frame = crate::FrameRef::new_checked(bytes)?;
         if frame.frame_type != FrameType::JtcStatus {

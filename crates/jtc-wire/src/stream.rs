@@ -1,16 +1,19 @@
-//! The stream parser of the device: finds frames in bytes that arrive in pieces of any length, and reports all other bytes (J-03, J-04).
+//! The stream parser of the device: finds frames in bytes that arrive in pieces of any length, and reports all other
+//! bytes (J-03, J-04).
 //!
-//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. A run ends
-//! at the next good frame or at a gap. The parser reports one event for a run as soon as it knows the fault of the first byte, and skips
-//! the other bytes of the run without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap, the parser
-//! scans again from the second byte of the incomplete frame, so that a false header does not hide the frames that follow it.
+//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a
+//! good frame. A run ends at the next good frame or at a gap. The parser reports one event for a run, as soon as it
+//! knows the fault of the first byte. It skips the other bytes of the run without an event. An incomplete frame ends
+//! when its last byte arrives, or at a gap. After a gap, the parser scans again from the second byte of the
+//! incomplete frame. A false header therefore does not hide the frames that follow it.
 //!
-//! Terms: a *candidate* is a position with a header, a known type and a length that is valid for this type. A *gap* is a silence of at
-//! least the inter-byte timeout after received bytes.
+//! Terms: a *candidate* is a position with a header, a known type and a length that is valid for this type. A *gap*
+//! is a silence of at least the inter-byte timeout after received bytes.
 //!
-//! Cost: the parser copies each byte once and adds it to the CRC once, when it arrives. The CRC register is stored at every 64th byte, so
-//! that the parser can check a candidate of any length with two registers and some arithmetic. In hostile input full of false headers, the
-//! work for each header is constant, and [`Receiver::poll`] scans a bounded number of headers per call.
+//! Cost: the parser copies each byte once and adds it to the CRC once, when it arrives. The CRC register is stored at
+//! every 64th byte. With two of these registers and some arithmetic, the parser can check a candidate of any length.
+//! In hostile input full of false headers, the work for each header is constant, and [`Receiver::poll`] scans a
+//! bounded number of headers per call.
 use crate::crc::advance;
 use crate::event::{LinkEvent, ReceivedEvent};
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
@@ -165,7 +168,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     /// continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
-            // If the list of gaps is full, its last gap is at the last byte, or the loop below shortens the list.
+            // If the list of gaps is full, this call has no effect. Then the last gap in the list is at the last
+            // byte, or the loop below removes gaps from the list.
             self.gaps.mark(self.end);
         }
         self.busy = false;

@@ -29,8 +29,8 @@ fn j05_a_frame_needs_its_header_type_length_and_crc_at_once() {
     }
 }
 
-/// A list of floats that did not pass a receiver is a command only if its number of floats is permitted for
-/// its type.
+/// A list of floats that a receiver has not checked is a command only if its number of floats is permitted for its
+/// type.
 #[test]
 fn j07_floats_of_another_count_are_no_command() {
     let bytes = vec![0; 10_580];

@@ -28,8 +28,9 @@ fn only_frames_of_floats_are_made_of_floats() {
     assert_eq!(Command::PidParam(Floats::new(&bytes)).emit(&mut out), Err(error));
 }
 
-/// An encoder writes a frame while it reads the numbers, so the length in the first error can be less than the final length. A buffer
-/// of the length in the error can hold more of the frame. The length in the error must never exceed the length of the complete frame.
+/// If the buffer is too short, the error contains a length. The encoder stops before it has read all numbers, so this
+/// length can be less than the length of the complete frame, but never more. A buffer of this length can hold more of
+/// the frame.
 #[test]
 fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     type Encoder = fn(&mut [u8]) -> Result<usize, EncodeError>;

@@ -34,7 +34,7 @@ fn j02_printed_crcs() {
     assert_eq!(crc_of(&fixed::PUMP_OFF), 0xDF2E);
 }
 
-/// E-04: the manual prints the CRC of another frame for this frame.
+/// E-04: for this frame, the manual prints the CRC of another frame.
 #[test]
 fn e04_friction_polynomial_use_default() {
     assert_eq!(fixed::FRICTION_POLYNOMIAL_USE_DEFAULT, [0x9B, 0x0F, 0x00, 0x06, 0x94, 0x77]);

@@ -169,7 +169,7 @@ fn j06_coefficients_are_called_by_their_index() {
     check::<6>();
 }
 
-/// A frame never contains this command, but code can construct it.
+/// A received frame never contains this command, but code can construct it. Its text must also be correct.
 #[test]
 fn j07_a_polynomial_of_too_few_numbers_can_be_said() {
     let command = Command::FrictionPolynomial(Floats::new(&[0; 20]));
@@ -260,7 +260,8 @@ fn a_capture_in_pieces() {
     assert_eq!(pieces(&[]).next(), None);
 }
 
-/// J-31: the states in which the controller holds the arm, and the state in which the arm moves. The bytes are those of the manual.
+/// J-31: the states in which the controller holds the arm, and the state in which the arm moves. The expected bytes
+/// are the bytes in the manual.
 #[test]
 fn a_status_knows_whether_the_controller_comes_up_or_executes() {
     let of = |state: u8, trajectory: u8| Status {

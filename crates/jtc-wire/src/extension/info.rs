@@ -45,7 +45,7 @@ mod field {
     pub(super) const REACTIONS: Range<usize> = 144..168;
 }
 
-/// Bits for the capabilities of a device that version 1 of the extensions does not require.
+/// Bits for optional capabilities of a device. Version 1 of the extensions does not require these capabilities.
 pub mod capability {
     /// Settings, names, and requests that read back the arm (J-53, J-54).
     pub const SETTINGS: u32 = 1;
@@ -93,7 +93,7 @@ codes! {
     }
 }
 
-/// Program in flash that the device runs, as the device read the program at its start (J-67).
+/// Program in flash that the device runs. The device has read these values from the flash at its start (J-67).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Program {
     /// Length of the program from the first byte of the flash, bytes.

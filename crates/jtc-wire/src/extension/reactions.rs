@@ -140,7 +140,7 @@ pub struct Reactions {
     pub jumped: u8,
     /// Rate of path time, in seconds of path time per second.
     pub rate: f32,
-    /// Time for which the controller has slowed the path down in this run, ms (J-75).
+    /// Time for which the controller has slowed the path down during this execution, ms (J-75).
     pub held_back_ms: u32,
 }
 

@@ -137,7 +137,7 @@ fn j53_values_travel_whole() {
     assert_eq!(short, Err(EncodeError::BufferTooShort { needed: 16, given: 15 }));
 }
 
-/// The expected bytes are those of the examples on the protocol page.
+/// The expected bytes are the bytes of the examples on the protocol page.
 #[test]
 fn j50_requests_are_these_bytes() {
     assert_eq!(fixed::GET_INFO[..4], [0x9B, 0x40, 0, 6]);
@@ -152,7 +152,7 @@ fn j50_requests_are_these_bytes() {
     assert_eq!(value.emit(), [3, 6, 0xBF, 0xF8, 0, 0, 0, 0, 0, 0]);
 }
 
-/// The expected bytes are those of the examples on the protocol page.
+/// The expected bytes are the bytes of the examples on the protocol page.
 #[test]
 fn j56_a_page_of_the_log_is_these_bytes() {
     let page = LogPage {

@@ -87,7 +87,8 @@ impl<'a> Reader<'a> {
             }
             12 => [HEADER].repeat(self.byte().into()),
             13 => {
-                // Returns frames in the body of a Trajectory frame, which may be damaged.
+                // Returns a Trajectory frame whose body contains other frames. The CRC of the Trajectory frame may be
+                // wrong.
                 let mut body: Vec<u8> = (0..4).flat_map(|_| self.frame()).collect();
                 body.resize(8 + body.len().next_multiple_of(36), self.byte());
                 let mut frame = sealed(FrameType::Trajectory as u8, &body);
@@ -183,7 +184,8 @@ impl Driver {
             let ends: Vec<u64> = (before + 1..=before + piece.len() as u64)
                 .filter(|end| self.watch.overtaken(0, end - 1))
                 .collect();
-            // Only the last command determines the position `overtaken`; the earlier commands are only counted.
+            // The position `overtaken` depends only on the last command in this piece. The earlier commands are only
+            // counted.
             self.urgent.extend(ends.last().filter(|_| count > 0));
             self.urgent_count += count;
         }

@@ -90,8 +90,8 @@ fn j03_a_slow_reader_is_no_gap() {
     assert_eq!(received.bytes, frame);
 }
 
-/// The test sends 15,000 false headers, and each header announces tens of thousands of bytes. The parser must need a bounded number of
-/// bounded steps.
+/// The test sends 15,000 false headers, and each header announces tens of thousands of bytes. The parser must need
+/// only a limited number of calls, each with a limited amount of work.
 #[test]
 fn j07_hostile_bytes_cost_little() {
     let mut receiver = receiver();
@@ -141,8 +141,8 @@ fn a_short_buffer() {
     panic!("the frame was not found");
 }
 
-/// The last bytes of a frame arrive after lost bytes. The loss must get one record (J-04), the parser must not treat the last bytes as a
-/// frame, and it must find the next frame at its true position.
+/// The last bytes of a frame arrive after lost bytes. The loss must get one record (J-04). The parser must not treat
+/// the last bytes as a frame, and must find the next frame at its true position.
 #[test]
 fn j04_lost_bytes_have_one_record_and_are_not_joined_across() {
     let mut receiver = receiver();

@@ -169,7 +169,7 @@ fn j05_gap() {
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
 
-/// The bytes after a gap may arrive before the next call of `poll`.
+/// The bytes after a gap may arrive before the next call of `poll`. The parser must still detect the gap.
 #[test]
 fn j05_gap_seen_with_the_next_bytes() {
     for (us, expected) in
@@ -213,7 +213,7 @@ fn j03_a_false_header_that_fills_up_costs_no_frame() {
     assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
-/// After a frame that lost a byte, the complete frame follows without a gap.
+/// After a frame that lost a byte, the complete frame follows without a gap. Only the damaged frame may be lost.
 #[test]
 fn j03_a_lost_byte_costs_only_its_frame() {
     let frame = segment(10);
@@ -251,7 +251,8 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
 }
 
-/// A line becomes plain 2 s after an extension request. For a frame of any length, the time of its first byte decides.
+/// A line becomes plain 2 s after an extension request. For a frame of any length, the time of its first byte
+/// determines whether the line was plain.
 #[test]
 fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
     // Returns a flag for each complete frame: true if the line was plain.
@@ -277,7 +278,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         assert_eq!(plain(&mut line, &fixed::STOP), [is_plain], "{after_us} \u{b5}s");
-        // The time of the first byte decides. A frame that takes 4.7 s at 115 200 Bd ends much later.
+        // Only the time of the first byte matters. A frame that takes 4.7 s at 115 200 Bd ends much later.
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         let long = segment(1_500);

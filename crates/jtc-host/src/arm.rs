@@ -65,7 +65,7 @@ pub struct ArmChoice {
     pub tip: Option<String>,
 }
 
-/// Arm from a robot description, with the gravity and the friction from this description.
+/// Arm that was read from a robot description, together with its gravity and its friction.
 struct Described {
     arm: Arm,
     /// Acceleration of gravity in the base frame, m/s². In the frame of the robot description, z points upwards.
@@ -230,7 +230,8 @@ impl Arm {
         let mut config =
             Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
         for value in &self.others {
-            // `apply` skips an out-of-range value, but the file readers have already rejected such values.
+            // The result is ignored: `apply` skips an out-of-range value, but the file readers have already rejected
+            // such values.
             let _ = settings::apply(&mut config, *value);
         }
         config

@@ -69,7 +69,7 @@ impl Positions {
     }
 }
 
-/// Least significant bit of positions and velocities in a serial frame.
+/// Smallest step of a position in a serial frame, rad. `VELOCITY_BIT` is the smallest step of a velocity, rad/s.
 pub(crate) const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
 const VELOCITY_BIT: f64 = jtc_wire::VELOCITY_SCALE / 32767.0;
 
@@ -118,8 +118,8 @@ impl<'a> Checker<'a> {
         verdict.done()
     }
 
-    /// Adds the problems that the controller's own check would find during the upload (J-36). A problem that is already in the verdict is
-    /// not added again, unless its occurrences are counted.
+    /// Adds the problems that the controller's own check would find during the upload (J-36). If the verdict already
+    /// contains a problem of this kind and joint, it is added again only for kinds whose occurrences are counted.
     fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
         let tables = match self.friction {
             Some(Friction::Table(tables)) => Some(tables),

@@ -38,7 +38,8 @@ pub struct Observation {
     pub other_baud: Option<u32>,
     /// Joints that the user has marked as absent (J-53).
     pub absent: Vec<Joint>,
-    /// Report of the controller about a held stop and the encoders (J-69); `None` if the report was not requested or is not supported.
+    /// Report of the controller about a held stop and about the encoders (J-69). In a held stop, the drives hold the
+    /// arm. `None` if the report was not requested or is not supported.
     pub reactions: Option<Reactions>,
 }
 
@@ -194,7 +195,8 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
             held_stop::next_step(s, Some(cause)),
         );
     }
-    // The finding about the cause of the held stop already contains the joint `said`.
+    // The finding about the cause of the held stop already names the joint `said`, so this joint is not reported
+    // again.
     let said = cause.filter(|(cause, _)| cause.kind == StopKind::EncoderJump);
     let said = said.and_then(|(cause, _)| held_stop::joint(cause));
     let jumped = held_stop::joints(reactions.map_or(0, |reactions| reactions.jumped));
@@ -214,8 +216,8 @@ fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCa
     s.is_held_stop().then_some((cause, *ago_ms))
 }
 
-/// Finds errors in the status. If `told` is `true`, a finding about the cause of a held stop already exists. This finding is more precise
-/// than the errors of the joints, so these joint errors are not added.
+/// Finds errors in the status. `told` is `true` if the findings already contain the cause of a held stop. The cause
+/// is more precise than the error bits of the joints, so these bits are then not reported.
 fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {

@@ -170,7 +170,8 @@ pub fn names(family: Family, word: u32) -> Vec<&'static str> {
 
 /// Returns the texts that commands print for the code of a page.
 fn shown(page: &Page) -> Vec<String> {
-    // The text of a decoded frame contains the node numbers of the protocol instead of the joint numbers.
+    // A decoded frame is printed with the node numbers of the protocol instead of the joint numbers. A search must
+    // also find this text.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }

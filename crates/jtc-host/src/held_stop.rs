@@ -1,4 +1,5 @@
-//! Description of a held stop (J-69) for all front ends, with its cause, value, limit and remedy.
+//! Description of a held stop (J-69), in which the drives hold the arm. All front ends show this description: cause,
+//! value, limit and remedy.
 
 use host_kit::{Next, next};
 use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
@@ -27,7 +28,7 @@ pub struct HeldStop {
     pub number: u8,
     /// Name of the explain page about this cause, for `jtc explain CODE`.
     pub code: &'static str,
-    /// Number of the first joint with the cause, from 1; `None` if no joint has the cause.
+    /// Number, from 1, of the first joint in which the cause occurred; `None` if the cause does not concern a joint.
     pub joint: Option<u8>,
     /// Measured value that caused the held stop; `None` if this kind of cause has no value.
     pub value: Option<f32>,
@@ -75,11 +76,12 @@ impl HeldStop {
 /// Reactions of a controller to faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reacting {
-    /// Last held stop; `None` if the controller has not had a held stop since its start or since its occurred errors were cleared.
+    /// Last held stop; `None` if no held stop has occurred since the start of the controller, or since the errors
+    /// were last cleared.
     pub last_held_stop: Option<HeldStop>,
     /// Numbers, from 1, of the joints that yield to a push or lower their loads.
     pub yields: Vec<u8>,
-    /// Numbers, from 1, of the joints whose encoder has jumped after the last configuration of their drives.
+    /// Numbers, from 1, of the joints whose encoder has jumped since their drives were last configured.
     pub encoder_jumped: Vec<u8>,
     /// Rate of the path time (seconds of path time per second); 0 if no trajectory is executed.
     pub path_rate: f32,
@@ -112,7 +114,7 @@ pub fn joints(mask: u8) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| mask & 1 << joint.index() != 0).collect()
 }
 
-/// Returns the first joint that has the cause of a held stop.
+/// Returns the first joint in which the cause of a held stop occurred.
 pub fn joint(cause: &StopCause) -> Option<Joint> {
     Joint::from_number(cause.joint.into())
 }
@@ -135,7 +137,7 @@ pub fn figures(cause: &StopCause) -> (Option<f32>, Option<f32>) {
     (known.0.then_some(cause.value), (known.1 && cause.limit != 0.0).then_some(cause.limit))
 }
 
-/// Returns the explain page about a kind of cause.
+/// Returns the page of `jtc explain` about a kind of cause.
 pub fn page(kind: StopKind) -> Option<&'static Page> {
     explain::pages().find(|page| page.family == explain::Family::Stop && page.code == u32::from(kind as u8))
 }
@@ -145,7 +147,7 @@ pub fn remedy(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.remedy))
 }
 
-/// Returns the usual reason for a cause as a part of a sentence, without a full stop.
+/// Returns the usual reason for this kind of held stop as a part of a sentence, without a full stop.
 pub fn usual_cause(kind: StopKind) -> String {
     page(kind).map_or_else(String::new, |page| clause(page.cause))
 }
@@ -201,7 +203,7 @@ mod tests {
         assert_eq!(figures(&scale), (Some(2.0), None));
     }
 
-    /// Each kind of cause has its own remedy and an explain page.
+    /// Each kind of cause has its own remedy and its own page of `jtc explain`.
     #[test]
     fn j69_each_kind_has_its_own_remedy() {
         let remedies = StopKind::ALL.map(remedy);

@@ -264,7 +264,7 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.is_held_stop() {
         after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
-        // The short option `--defaults` follows the long form of the command.
+        // The text names the full command first. As an alternative, it then names only the option `--defaults`.
         next!("{}, or ", RecoverWithArm)
             .then(Next::typed(Action::RecoverWithDefaults, "--defaults"))
             .then(" for the arm that is built into the controller")

@@ -18,7 +18,7 @@ pub use timeline::{Event, Timeline};
 use jtc_core::recorder::{BLOCK_WORDS, Block, Log, Record};
 use jtc_wire::{LogState, RawPoint};
 
-/// Maximum time between two snapshots, in ticks of 1 ms.
+/// Maximum time between two snapshots of the controller in a log, in ticks of 1 ms.
 const SPAN_MS: f64 = 1_100.0;
 
 /// Data of the flight recorder that a device returned.
@@ -51,8 +51,8 @@ impl FlightLog {
         self.log().next().is_none()
     }
 
-    /// Returns which points of the trajectory with this hash the log needs. The result is the index of the first point and the number of
-    /// points. Returns `None` if the log contains no motion along this trajectory.
+    /// Returns the range of trajectory points that the log needs: the index of the first point and the number of
+    /// points. `hash` identifies the trajectory. Returns `None` if the log contains no motion along this trajectory.
     pub fn needed_points(&self, hash: u32, total: usize) -> Option<(usize, usize)> {
         let mut needed: Option<(f64, f64)> = None;
         let mut need = |from: f64, to: f64| {

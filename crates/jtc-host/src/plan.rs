@@ -54,18 +54,18 @@ use sampled::{least_s, sampled, step_ms};
 
 /// Time step between the points of planned moves, ms.
 const STEP_MS: u16 = 10;
-/// Duration of a change of the acceleration if the jerk is not limited, s. If the duration were shorter than two steps, the acceleration
-/// between the points (J-32) would be higher than at the points.
+/// Duration of a change of the acceleration if the jerk is not limited, s. The duration is two steps. With a shorter
+/// duration, the interpolated acceleration between two points (J-32) would be higher than at the points.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
 /// Maximum share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in serial
 /// frames.
 const SHARE: f64 = 0.98;
-/// Time in which the remainder of a trajectory reaches its speed, s. If the check rejects the remainder, the planner tries the longer times
-/// `RAMPS_S`.
+/// Time in which the arm reaches full speed when it continues an interrupted trajectory, s. If the check rejects the
+/// motion, the planner tries the longer times `RAMPS_S`.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Lowest bearing temperature that a plan assumes by default, °C. The default is the temperature of a cold factory hall. At this
-/// temperature, the friction is higher than at the usual temperature.
+/// Lowest bearing temperature that a plan assumes by default, °C. In a factory hall of this temperature, the friction
+/// of cold bearings is higher than usual.
 pub const COLD: f64 = 20.0;
 /// Largest slow-down factor of a motion. A motion that needs a larger factor is rejected.
 const SLOWEST: f64 = 50.0;
@@ -90,8 +90,8 @@ pub struct Planner<'a> {
     pub temperature: f64,
     /// Speed of planned motions, 1 to 100 % of the limits.
     pub speed_pct: f64,
-    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If the blend is 0, the arm stops at each
-    /// waypoint.
+    /// Size of a rounded corner, rad. Within this distance from the waypoint, the path leaves the straight segments.
+    /// The distance is the largest distance of a joint. If the blend is 0, the arm stops at each waypoint.
     pub blend: f64,
     /// `true` if the jerk is limited. If the value is `false`, the acceleration changes within two steps.
     pub jerk: bool,
@@ -307,14 +307,15 @@ impl<'a> Planner<'a> {
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
-            // The planner checks with cold bearings first, then with the bearing temperature during operation. The warm check is also
-            // needed because friction helps to brake: with less friction, the braking torque is higher.
+            // The planner checks with cold bearings first, and then with the bearing temperature during operation.
+            // The second check is needed because friction helps to brake: with less friction, the braking torque of
+            // the drives is higher.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict =
                 if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
-            // A warning with a long step shows that the distance between corners is shorter than a step. A slower motion would not help,
-            // because its steps would be longer.
+            // If there is a warning and the step is long, the corners are closer together than one step. A slower
+            // motion would not help, because its steps would be even longer.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
@@ -328,8 +329,8 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // The torque can exceed the limit that the margin allows, because of the rounding in serial frames, and between the samples of
-            // the plan.
+            // The trajectory may exceed the torque limit that the margin allows, although the plan does not. The
+            // reasons are the rounding in serial frames, and the torque between the samples of the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -391,7 +392,7 @@ fn slower(verdict: &Verdict) -> Option<f64> {
         match p.kind {
             Velocity | PositionSpeed | FrictionVelocity => Some(over),
             Acceleration => Some(over.sqrt()),
-            // A part of the torque is the gravity torque, which does not depend on the speed.
+            // The gravity part of the torque does not depend on the speed, so this factor is only an estimate.
             Torque | NoStop => Some(over.max(1.03)),
             _ => None,
         }

@@ -24,7 +24,7 @@ pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 
-/// Number of times that other programs stopped or paused the arm, through a port of this program or through the agent that
+/// Number of Stops and Pauses by other programs. These programs use either this program's port, or the agent that
 /// holds the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Halts {

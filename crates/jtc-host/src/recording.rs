@@ -270,7 +270,7 @@ pub struct Scanned {
     pub cut: Option<String>,
 }
 
-/// Maximum number of incomplete samples in memory; the missing messages of these samples follow later in the file. 4096 samples fill
+/// Maximum number of samples in memory that still wait for messages from a later part of the file. 4096 samples fill
 /// several chunks of an MCAP file.
 const ROOM: usize = 4096;
 
@@ -285,7 +285,7 @@ pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingE
     scan_with(path, ROOM, see)
 }
 
-/// Content of a file without the samples. For an incomplete file, the content includes the reason.
+/// Content of a file without the samples. For an incomplete file, `cut` describes the missing part.
 struct Found {
     info: Option<RecordingInfo>,
     ending: Ending,

@@ -33,8 +33,8 @@ pub struct Order<'a> {
     pub later: &'a Trajectory,
     /// Number of runs. 0 is treated as 1.
     pub runs: u32,
-    /// Speed of an approach, % of the limits. If the value is `None`, the run makes no approaches, and the arm must be at the first point
-    /// of each run.
+    /// Speed of an approach (the motion to the first point), % of the limits. If the value is `None`, the run makes
+    /// no approaches, and the arm must be at the first point of each run.
     pub approach_pct: Option<f64>,
 }
 
@@ -63,7 +63,7 @@ impl Phase {
     }
 }
 
-/// Ended motion of a run.
+/// Motion of a run that has ended.
 #[derive(Debug)]
 pub struct Leg {
     /// Purpose.

@@ -62,8 +62,8 @@ impl JointSample {
         internal: 0,
     };
 
-    /// Returns the sample with NaN instead of the values that a silent joint cannot have sent. A plot of NaN shows a gap instead of a joint
-    /// at 0 rad.
+    /// Returns the sample of a joint that does not answer, with NaN instead of measured values. In a plot, NaN is a
+    /// gap, while 0 would look like a joint at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
         Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
@@ -107,7 +107,7 @@ impl From<&JointTelemetry> for JointSample {
 /// State of the arm and its controller at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Time of the sample, in seconds since the start of the clock that the first sample uses.
+    /// Time of the sample, s. All samples of a run use the same clock.
     pub time_s: f64,
     /// State of the controller.
     pub state: Code<ControllerState>,

@@ -1,9 +1,9 @@
-//! Session with the controller. Only the session writes to the port. The session receives the stream of statuses and a confirmation of each
-//! request.
+//! Session with the controller. Only the session writes to the port. The session receives the stream of statuses and
+//! a confirmation of each request.
 //!
-//! The controller sends each record only once (J-04). For each frame that the controller receives, exactly one status contains the record
-//! of this frame. The records are in the order of the frames. The session queues the records, and passes each record to the request that
-//! waits for this record.
+//! The controller sends each response record only once (J-04). For each frame that the controller receives, exactly
+//! one status contains the response record of this frame. The response records are in the order of the frames. The
+//! session queues the response records, and passes each of them to the request that waits for it.
 
 mod bench;
 mod capture_pose;
@@ -230,8 +230,8 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Reads all received bytes, and discards records and denials of earlier frames. Records and denials of earlier frames may still be in
-    /// the receive buffer.
+    /// Reads all received bytes, and discards response records and denials of earlier frames. Otherwise they could be
+    /// taken for the answer to the next frame.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();
@@ -297,15 +297,17 @@ impl<P: Port> Session<P> {
 
     /// Returns the maximum time until the confirmation of a frame of `len` bytes must arrive.
     fn confirmation_time(&self, len: usize) -> Duration {
-        // The confirmation time covers the transmission of the frame, of a status that is already being sent, and of the status with the
-        // record.
+        // The confirmation time covers the transmission of the frame, of a status that is already being sent, and of
+        // the status with the response record.
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
-    /// Sends a frame and waits for its record. If the frame arrived damaged, or if its record does not arrive, the session sends the frame
-    /// again. The session repeats Execute and TeachingModeEnable only if the frame arrived damaged. If only the record is missing, the
-    /// controller may have executed the frame, and a Stop from another line may then have stopped the arm. The function `request` is not
-    /// public, because a frame can start a motion.
+    /// Sends a frame and waits for its response record. If the frame arrived damaged, or if no response record
+    /// arrives, the session sends the frame again.
+    ///
+    /// The session repeats Execute and TeachingModeEnable only if the frame arrived damaged. If only the response
+    /// record is missing, the controller may have executed the frame, and a Stop from another line may then have
+    /// stopped the arm. The function `request` is not public, because a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
@@ -320,14 +322,14 @@ impl<P: Port> Session<P> {
             let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
-                // The first record that reports an unknown frame type may mean that the frame was damaged. A second equal record means that
-                // the device does not know the frame type.
+                // The first response record that reports an unknown frame type may mean that the frame was damaged. A
+                // second equal response record means that the device does not know the frame type.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // If neither a record nor a status has arrived, the device is late and has not lost the frame. Therefore the session
-                // repeats the frame only if it is a Stop or a Pause.
+                // If neither a response record nor a status has arrived, the device is late and has not lost the
+                // frame. Therefore the session repeats the frame only if it is a Stop or a Pause.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;
@@ -341,12 +343,14 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })
     }
 
-    /// Returns the record of the frame that was just sent. Returns `None` if no record arrived in time.
+    /// Returns the response record of the frame that was just sent. Returns `None` if no response record arrived in
+    /// time.
     fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
         let mut limit = Limit::new(self.confirmation_time(len));
         loop {
             while let Some(record) = self.records.pop_front() {
-                // A record of another frame type that reports no error belongs to an earlier request that has timed out.
+                // A response record of another frame type that reports no error belongs to an earlier request that
+                // has timed out.
                 if record.status != FrameStatus::NoError || record.frame_type == kind {
                     return Ok(Some(record));
                 }
@@ -357,7 +361,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Reads bytes for the duration of the next wait of `limit`. Returns `false` if no time is left.
+    /// Reads bytes during the next wait of `limit`, and subtracts this wait from the limit. Returns `false` if no
+    /// time is left.
     fn wait_within(&mut self, limit: &mut Limit) -> Result<bool, LinkError> {
         let Some(wait) = limit.next_wait() else { return Ok(false) };
         let begun = self.port.now();
@@ -373,8 +378,8 @@ impl<P: Port> Session<P> {
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }
 
-    /// Returns the error for the request that this record rejects. Either the device or an agent that shares the line has
-    /// rejected the request.
+    /// Returns the error for the request that this response record rejects. Either the device or an agent that shares
+    /// the line has rejected the request.
     fn refused(&mut self, record: Response) -> LinkError {
         if let Some(reason) = self.port.take_denial() {
             return LinkError::Denied { request: frame_type(record.frame_type), reason };
@@ -424,7 +429,7 @@ fn frame_type(kind: u8) -> FrameType {
     FrameType::from_byte(kind).unwrap_or(FrameType::JtcStatus)
 }
 
-/// Returns `true` if the record rejects the request because of the state.
+/// Returns `true` if the controller rejects the request because of its state.
 fn not_allowed(record: &Response) -> bool {
     record.status == FrameStatus::NoError && record.data == DataStatus::NotAllowed
 }

@@ -193,15 +193,15 @@ impl WaypointFile {
         Ok(())
     }
 
-    /// Returns `true` if the flange moves on a line or an arc on at least one leg. If `line` is set, legs without a specified type of
-    /// motion are lines.
+    /// Returns `true` if the flange moves on a line or an arc on at least one leg (segment between two waypoints). If
+    /// `line` is set, legs without a specified type of motion are lines.
     pub fn has_lines(&self, line: bool) -> bool {
         let is_line = |w: &FileWaypoint| w.leg.map_or(line, |leg| leg != LegKind::Joint);
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Returns the indices of flange poses whose previous waypoint is also a flange pose, if the leg between the two poses is in joint
-    /// space.
+    /// Returns the index of each flange pose whose previous waypoint is also a flange pose. Includes only legs
+    /// (segments between two waypoints) in joint space.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
@@ -250,12 +250,14 @@ impl WaypointFile {
         Ok(found)
     }
 
-    /// Returns the waypoints as a route for [`Planner::on_route`](crate::plan::Planner::on_route), and their times. If `line` is set, legs
-    /// without a specified type of motion are lines. `blends` are the arguments of [`Route::new`].
+    /// Returns the waypoints as a route for [`Planner::on_route`](crate::plan::Planner::on_route), and their times.
+    /// If `line` is set, legs (segments between two waypoints) without a specified type of motion are lines. `blends`
+    /// are the arguments of [`Route::new`].
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`positions`](Self::positions), and [`WaypointError::Route`] for an impossible line or arc.
+    /// Returns the errors of [`positions`](Self::positions), and [`WaypointError::Route`] for an impossible line or
+    /// arc.
     pub fn route(
         &self,
         arm: &Arm,

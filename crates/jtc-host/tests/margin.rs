@@ -88,8 +88,8 @@ fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String,
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let end = (planned.trajectory.duration_s() * 1e3).round() as u32;
-    // The breakaway friction is the greatest friction at low speeds. The highest of these low speeds is slightly above the width of the
-    // friction's sign transition.
+    // The breakaway friction is the greatest friction at speeds from 0 to `fastest`. `fastest` is slightly above the
+    // speed range in which the friction changes its sign (`friction_sign_width`).
     let breakaway: [f64; JOINTS] = std::array::from_fn(|j| {
         let fastest = config.friction_sign_width + config.joints[j].velocity_max / 128.0;
         let speeds = (-20..=20).map(|i| f64::from(i) / 20.0 * fastest);
@@ -155,7 +155,7 @@ proptest! {
         }))).collect();
         let planned = match planner.through(&waypoints) {
             Ok(planned) => planned,
-            // With this load, gravity alone exceeds the torque of the arm.
+            // With this load, gravity alone exceeds the torque limits of the arm.
             Err(PlanError::Plan(jtc_plan::PlanError::Torque { .. })) => return Ok(()),
             Err(PlanError::Refused(verdict)) => {
                 use jtc_host::check::ProblemKind::{HoldTorque, NoStop, Torque};
@@ -174,7 +174,8 @@ proptest! {
     }
 }
 
-/// Returns the arm with a payload. In the stretched pose, the weight of the payload requires the share `share` of the torque of joint 2.
+/// Returns the arm with a payload. In the stretched pose, the weight of the payload needs the fraction `share` of the
+/// torque limit of joint 2.
 fn stretched(share: f64) -> (Arm, Config) {
     let (arm, mut config) = (Arm::avena(), Arm::avena().config());
     let hold = |config: &Config| {

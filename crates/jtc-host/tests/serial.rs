@@ -93,7 +93,8 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
     assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
-    // The owner of the port does not read. The port still finds the record, and the owner receives the bytes of the record later.
+    // The port owner does not read. The port still finds the response record, and the port owner receives its bytes
+    // later.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
@@ -178,7 +179,8 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     };
     halt_unconfirmed(&path, Halt::Pause);
     read(&mut far, &[fixed::PAUSE; 8]);
-    // After a Pause, the port writes another Pause. A Stop replaces a Pause.
+    // After another program's Pause, the port owner may also send a Pause. A later Stop of another program replaces
+    // its Pause.
     port.write_all(&fixed::PAUSE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     read(&mut far, &[fixed::PAUSE; 1]);
@@ -258,8 +260,8 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. Teaching that has not begun is considered ended
-/// when the record of the command that ends teaching has arrived.
+/// Teaching was requested but has not begun, and would begin as soon as the arm is at rest. The port considers this
+/// teaching ended when the response record of the command that ends teaching has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {
@@ -322,7 +324,7 @@ fn a_socket_of_a_living_program_is_left_alone() {
     let socket = door(&path);
     let kept = socket.with_extension("kept");
     std::fs::rename(&socket, &kept).unwrap();
-    // Another program now listens at the path of this socket.
+    // Another program has created its own socket at this path.
     let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     drop(port);
     assert!(socket.exists(), "it is not the port's own");

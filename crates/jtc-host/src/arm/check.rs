@@ -86,9 +86,10 @@ pub struct Holding {
 pub struct Checked {
     /// All findings, the most severe first.
     pub findings: Vec<ArmFinding>,
-    /// Gravity torque of each joint; empty if the numbers of the arm do not allow the computation.
+    /// Greatest gravity torque of each joint; empty if it cannot be computed because numbers of the arm are invalid.
     pub holding: Vec<Holding>,
-    /// Allowed ratios of the rotor inertias to the values in the file; `None` if the gains are unstable or missing.
+    /// Factors by which the rotor inertias may differ from the values in the file; `None` if the gains are unstable
+    /// or missing.
     pub rotor_margins: Option<RotorMargins>,
 }
 

@@ -49,14 +49,16 @@ impl ParameterFile {
         Self::load_all(std::slice::from_ref(&path.to_owned()))
     }
 
-    /// Reads several files and directories into one set of parameters. If two files contain the same parameter, the value of the later file
-    /// is used. If a parameter has one file for each joint, the parameter is used only if `paths` lists all six files or their directory.
-    /// Therefore no joint receives the values of another joint, and the loader reads only files that the user has listed.
+    /// Reads several files and directories into one set of parameters. If two files contain the same parameter, the
+    /// value of the later file is used.
+    ///
+    /// If a parameter has one file for each joint, `paths` must contain all six files or their directory. The loader
+    /// reads only files that the user has listed. Therefore no joint receives the values of another joint.
     ///
     /// # Errors
     ///
-    /// Returns an error for the first file that cannot be read or parsed, and if the tables of some joints are missing. Also returns an
-    /// error if a number cannot be sent ([`ParameterSet::check`]).
+    /// Returns an error for the first file that cannot be read or parsed, and if the tables of some joints are
+    /// missing. Also returns an error if a number cannot be sent ([`ParameterSet::check`]).
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, FileError> {
         let mut all = Self::default();
         let mut joints = JointTables::default();

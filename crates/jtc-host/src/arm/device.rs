@@ -1,8 +1,9 @@
-//! Differences between an arm file and the settings of a controller. A host can send the friction, the gains and the arm model to a
-//! controller. The limits, the gravity and the rotor inertias are settings of the controller.
+//! Differences between an arm file and the settings of a controller. A host can send the friction, the gains and the
+//! arm model to a controller. The limits, the gravity and the rotor inertias are settings of the controller.
 //!
-//! If the limits or the gravity of a controller differ from the arm file, a motion check with this file is not valid for the real arm
-//! (J-55). A controller without extensions is assumed to use the settings of the built-in arm, [`Config::avena`].
+//! The limits and the gravity of the controller may differ from the arm file. A motion check with this file is then
+//! not valid for the real arm (J-55). A controller without extensions is assumed to use the settings of the built-in
+//! arm, [`Config::avena`].
 
 use jtc_core::settings::{Setting, TABLE};
 use jtc_core::{Config, JointConfig};
@@ -41,7 +42,7 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// Text for messages that names the settings that are not sent with the friction, the gains and the arm model.
+/// Part of a message: the settings that are not sent together with the friction, the gains and the arm model.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
@@ -150,7 +151,7 @@ mod tests {
         );
     }
 
-    /// An arm file without gravity does not differ from a controller with any gravity, because the controller uses its own value.
+    /// If an arm file contains no gravity, the controller uses its own gravity, and no difference is reported.
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
@@ -168,13 +169,13 @@ mod tests {
             urdf.device_differences(&Config::avena()).iter().map(|d| d.name.clone()).collect();
         assert!(!names.contains(&"rotor_inertia_kg_m2".to_owned()), "{names:?}");
         assert_eq!(urdf.settings_not_given(), ["gravity", "rotor inertia"]);
-        // A check for a controller uses the rotor inertias of that controller.
+        // The check of a motion always uses the rotor inertias of the controller.
         assert_eq!(
             urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
             Config::avena().joints[3].rotor_inertia
         );
-        // An arm file created from the URDF file also does not contain the rotor inertia. If an arm file contains the rotor inertia 0, the
-        // rotor inertia is known.
+        // An arm file that is written from the URDF arm contains no rotor inertia either. In contrast, a rotor
+        // inertia of 0 in an arm file is a known value.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);

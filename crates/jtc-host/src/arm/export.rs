@@ -38,7 +38,7 @@ pub(crate) fn frame_name(i: usize) -> String {
 }
 
 impl Arm {
-    /// Writes the names of the proposed numbers of a joint or of the whole arm.
+    /// Writes the line `proposed = [...]`, which lists the proposed numbers of a joint or of the whole arm.
     fn write_marks(&self, out: &mut String, joint: Option<Joint>) {
         let marked = self.sources.marked(joint);
         if !marked.is_empty() {

@@ -127,7 +127,8 @@ fn is_positive(mut a: Matrix) -> bool {
     true
 }
 
-/// Returns `true` if the mass matrix with the given rotors is at least `stable` times `reserve`.
+/// Returns `true` if the inertia of the arm with the given rotors is large enough in this pose: the mass matrix minus
+/// `reserve` times the lower limits in `stable` is positive definite.
 pub(super) fn is_heavy_enough(
     m: &Matrix,
     rotor: &JointVec,
@@ -139,7 +140,8 @@ pub(super) fn is_heavy_enough(
     is_positive(a)
 }
 
-/// Returns `true` if the mass matrix with the given rotors is at most `stable` divided by `reserve`.
+/// Returns `true` if the inertia of the arm with the given rotors is small enough in this pose: the upper limits in
+/// `stable` divided by `reserve`, minus the mass matrix, are positive definite.
 pub(super) fn is_light_enough(
     m: &Matrix,
     rotor: &JointVec,

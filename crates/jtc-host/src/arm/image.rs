@@ -1,4 +1,5 @@
-//! Image of an arm in a controller with extensions (J-54), with the hash of this image (J-52) and its differences from an arm file (J-55).
+//! Binary image of an arm, as a controller with extensions stores it (J-54). The module also computes the hash of the
+//! image (J-52) and its differences from an arm file (J-55).
 
 use jtc_core::settings::{self, SettingError};
 use jtc_core::{Config, Friction, JOINTS, PidGains, TableOf};
@@ -28,7 +29,8 @@ impl Arm {
         settings::values(&self.config(), 0, true).collect()
     }
 
-    /// Returns the image that a controller stores for this arm. Returns `None` if the gains or the friction are missing.
+    /// Returns the binary image that a controller stores for this arm. Returns `None` if the gains or the friction
+    /// are missing.
     ///
     /// # Errors
     ///
@@ -61,7 +63,7 @@ impl Arm {
         Ok(self.image()?.map(|image| Hash::of_image(&image)))
     }
 
-    /// Creates the arm from the image of a controller.
+    /// Creates the arm from the binary image that a controller stores.
     ///
     /// # Errors
     ///
@@ -93,7 +95,7 @@ impl Arm {
     pub fn differences(&self, device: &Self) -> Vec<Difference> {
         let mut all = Vec::new();
         let mut compare = |name: String, joint, file: f64, device: f64, unit| {
-            // Gains, friction and model are sent as 32-bit floats.
+            // Gains, friction and model are sent as 32-bit floats, so the values are compared as 32-bit floats.
             if file as f32 != device as f32 {
                 all.push(Difference { name, joint, file, device, unit });
             }
@@ -126,7 +128,8 @@ impl Arm {
         compare: &mut impl FnMut(String, Option<Joint>, f64, f64, &'static str),
     ) {
         let has = device.friction();
-        // A file may contain a friction table and a friction polynomial. The comparison uses the one that the controller also uses.
+        // An arm file may contain both a friction table and a friction polynomial. The comparison uses the kind that
+        // the controller uses.
         let own = match has {
             Some(Friction::Table(_)) => self.table.as_ref().map(|t| Friction::Table(**t)).or(self.friction()),
             _ => self.friction(),
@@ -145,7 +148,8 @@ impl Arm {
                         let torque = t.torque.into_iter().flatten();
                         t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
                     };
-                    // The list contains only the first of the differences between the 440 numbers of two friction tables.
+                    // Two friction tables can differ in up to 440 numbers. The list contains only the first
+                    // difference and the number of differences.
                     let pairs = numbers(own).into_iter().zip(numbers(has));
                     if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
                         let count = pairs.filter(|(own, has)| own != has).count();

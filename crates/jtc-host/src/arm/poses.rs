@@ -49,7 +49,8 @@ impl Arm {
         self.at_pose(name, position).map(|()| *position)
     }
 
-    /// Checks that a position (rad) is within the arm's limits. The error of this check contains `name`.
+    /// Checks that a position (rad) is within the arm's limits. If the position is outside, the error contains
+    /// `name`.
     ///
     /// # Errors
     ///
@@ -73,8 +74,8 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a valid name of a pose. A valid name can be used in an option that also accepts lists of numbers, and in a cell of a
-/// waypoint file.
+/// Returns `true` for a valid name of a pose. A valid name is never a number. Therefore it can be used in a cell of a
+/// waypoint file, and in an option that also accepts lists of numbers.
 pub fn is_pose_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
@@ -198,7 +199,7 @@ fn as_it_was(changed: &str, before: &str) -> String {
         _ => (*line).to_owned(),
     };
     let mark = before.starts_with(MARK).then(|| MARK.to_string());
-    // The last line of the old text may not have had a line ending.
+    // The last line of the old text may have no line ending.
     let kept = |(new, old): (&&str, &&str)| if old.ends_with('\n') { (*old).to_owned() } else { fresh(new) };
     let (first, last) = (lines.iter().zip(&old).take(head).map(kept), old.len() - tail);
     let between = lines[head..lines.len() - tail].iter().map(fresh);

@@ -69,7 +69,8 @@ pub const RULES: [Rule; 11] = [
 const TEACH_DAMPING_RATE: f64 = 100.0;
 /// Tool speed limit of an imported arm, m/s. ISO 10218 requires this limit while a person near the robot sets it up.
 const TOOL_SPEED_MAX: f64 = 0.25;
-/// Damping of the proposed gains: Kd multiplied by the age of the derivative, divided by the least inertia (J-71).
+/// Damping of the proposed gains, without a unit: Kd multiplied by [`DERIVATIVE_AGE`], divided by the least inertia
+/// (J-71).
 const DAMPING: f64 = 0.7;
 /// Age of the derivative, s: half of the time window of the derivative, plus half a tick. A torque stays constant for one tick, so its
 /// average delay is half a tick.
@@ -80,7 +81,8 @@ const STIFFNESS_RATE: f64 = 20.0;
 const INTEGRAL_RATE: f64 = 2.0;
 /// Proposed Ki as a share of the greatest Ki that is stable without friction.
 const INTEGRAL_PART: f64 = 1.0 / 3.0;
-/// Safety factor for the gains: the gains must be stable up to this factor beyond both ends of the range of rotor inertias.
+/// Safety factor for the proposed gains: the gains must also be stable if the range of rotor inertias is extended by
+/// this factor at both ends.
 const RESERVE: f64 = 1.5;
 /// Maximum number of steps in the search for gains with the safety factor [`RESERVE`].
 const REDUCTIONS: usize = 60;
@@ -146,8 +148,8 @@ impl Arm {
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
                 let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];
-                // The arm model contains only the proposed rotor inertia. If the real rotor is heavier, a position error causes the torque
-                // for the additional inertia.
+                // The arm model contains only the proposed rotor inertia. If the real rotor is heavier, the model
+                // torque is too low, and the controller supplies the missing torque only through a position error.
                 let unknown = (PROPOSED_RANGE.up - 1.0) * to.rotor_inertia;
                 let kp = self.pid.map_or(f64::INFINITY, |pid| pid[j].kp);
                 let lag = ERROR_PART * to.position_error_max * kp / unknown;
@@ -269,7 +271,7 @@ mod tests {
         }
     }
 
-    /// The documentation page about arms contains the text of each rule.
+    /// The page docs/arm.md contains each rule with the same text.
     #[test]
     fn the_rules_are_those_of_the_page() {
         let page = include_str!("../../../../docs/arm.md");

@@ -90,7 +90,7 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
                     break;
                 }
             }
-            // A difference within the rounding errors does not count.
+            // A torque that is higher only by a rounding error does not replace the best pose.
             if height > best.torque * (1.0 + GAIN) + 1e-9 {
                 best = Worst { torque: height, pose: plain(&q, sign, height, ranges, &torque) };
             }
@@ -99,7 +99,8 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
     })
 }
 
-/// Returns the pose in which each position that does not affect the torque is 0, or the value nearest to 0 in its range.
+/// Returns the pose `q` in a simpler form: each position that does not affect the torque is set to 0, or to the value
+/// nearest to 0 in its range.
 fn plain(
     q: &JointVec,
     sign: f64,

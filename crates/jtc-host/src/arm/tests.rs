@@ -117,7 +117,8 @@ fn fixed_bodies_become_part_of_their_link() {
     assert!((link.mass - 1.082).abs() < 1e-12);
     assert!((link.origin.xyz[0] - 0.2 / 1.082).abs() < 1e-12);
     assert!((link.origin.xyz[2] - (0.0181 + 0.1) / 1.082).abs() < 1e-12);
-    // By the parallel-axis theorem, the inertia about z increases by the reduced mass times the squared distance.
+    // By the parallel-axis theorem, the inertia about z increases by the reduced mass times the squared distance. The
+    // bodies have 1 kg and 0.082 kg, and their distance is 0.2 m.
     let izz = 8e-5 + 0.01 + 0.082 / 1.082 * 0.04;
     assert!((link.inertia[5] - izz).abs() < 1e-12, "{} {izz}", link.inertia[5]);
     assert!(arm.warnings.iter().any(|w| w.place == "link tool"));
@@ -128,7 +129,8 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
     assert!(error_of(&urdf("0 0 0", "revolute")).contains("no direction"));
     assert!(error_of("<robot name=\"x\"></robot>").contains("0 rotary joints"));
-    // The hint does not suggest other file formats or options, because they do not help if the description has too few joints.
+    // If the description has too few joints, another file format or option does not help. Therefore the hint must not
+    // suggest one.
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
@@ -342,7 +344,7 @@ fn the_existing_parameter_files_are_read() {
     }
     if let Some(file) = load("model_default.txt") {
         let model = file.model.unwrap();
-        // In the old default arm, only the z offset of joint 4 has another sign.
+        // The old default arm differs from the present default arm only in the sign of the z offset of joint 4.
         assert_eq!((model.joints[3].xyz[2], model.links), (0.005, arm.model.links));
     }
     if let Some(file) = load("avena_arm_id.urdf") {

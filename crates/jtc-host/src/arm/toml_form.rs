@@ -292,7 +292,7 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
             )));
         }
     };
-    // The friction tables are checked even if the arm uses polynomials. The friction tables must be valid if an operator selects them
+    // The friction tables are checked even if the arm uses polynomials, because an operator may select the tables
     // later.
     for (joint, table) in Joint::ALL.into_iter().zip(all.iter()) {
         check_table(joint, table).map_err(|e| FileError::at(Place::name("friction_table"), e.to_string()))?;

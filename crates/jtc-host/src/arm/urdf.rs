@@ -1,8 +1,9 @@
-//! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the arm model of the
-//! controller cannot represent.
+//! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the arm model
+//! of the controller cannot represent.
 //!
-//! If the axis of a joint is not +z, the reader rotates the frame of its link. The rotation of the frame does not change positions or
-//! torques. A body becomes part of the link to which it is attached if its joint is fixed, or is not one of the six joints of the arm.
+//! If the axis of a joint is not +z, the reader rotates the frame of its link. The rotation of the frame does not
+//! change positions or torques. A body becomes part of the link that carries it in two cases: its joint is fixed, or
+//! its joint is not one of the six joints of the arm.
 
 mod choice;
 mod frames;
@@ -25,7 +26,7 @@ use crate::file::FileError;
 struct Chain<'a> {
     robot: &'a Robot,
     rotary: [&'a Joint; JOINTS],
-    /// Joints from the last link to the flange.
+    /// Joints on the path from the last link to the flange, in this order.
     flange: Vec<&'a Joint>,
     warnings: Vec<Warning>,
     sources: Sources,

@@ -86,7 +86,7 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "position_error_max_rad" => Some(POSITION_ERROR_DEFAULT),
         "rotor_inertia_kg_m2" => Some(0.0),
         "torque_gain" => Some(1.0),
-        // This default depends on the torque limit, which differs from joint to joint.
+        // There is no single default, because it depends on the torque limit of the joint.
         "teach_damping_nm_s_rad" => None,
         // The other numbers of a joint have no default, because an arm file must contain them.
         _ if row.of_joint() => None,
@@ -212,7 +212,8 @@ mod tests {
         );
         assert_eq!((of("pid.kd", 1).from, of("pid.kd", 1).value), (Source::Proposed, Some(80.0)));
         assert_eq!(of("friction_polynomial.c0", 3).value, arm.polynomial.map(|c| c[2][0]));
-        // The list has 3 numbers of gravity, 19 of each joint, 6 of each frame, 13 of each link, and the settings of the controller.
+        // Expected number of values: 3 for gravity, 19 for each of 6 joints, 6 for each of 7 frames and 13 for each
+        // of 7 links. `own` is the number of controller settings that are not counted in these numbers.
         let own = settings::count(true) - 6 * 8 - 3;
         assert_eq!(all.len(), 3 + 6 * 19 + 7 * 6 + 7 * 13 + own);
         let missing = Arm { pid: None, ..arm }.values();

@@ -20,7 +20,7 @@ pub struct Cause {
     pub unit: &'static str,
     /// Joints in which the problem occurs; empty if the problem concerns the whole trajectory.
     pub joints: Vec<Joint>,
-    /// Number of file points with the problem, either at the point or before the next point.
+    /// Number of points of the file at which, or directly after which, the problem occurs.
     pub points: usize,
     /// First occurrence of the problem along the path.
     pub first: Seen,

@@ -140,7 +140,7 @@ impl CheckedTrajectory {
     /// Returns [`PlanError::Refused`] with the verdict on the remainder of the path.
     pub fn check_rest(&self, device: &Config, from_ms: u32) -> Result<(), PlanError> {
         let (arm, checked_with) = &*self.basis;
-        // A changed path speed does not need a check, because the path speed can only slow down the motion.
+        // A changed path speed needs no check, because it can only slow down the motion.
         let config = Config { speed: checked_with.speed, ..arm.config_on_device(device) };
         if config == *checked_with {
             return Ok(());

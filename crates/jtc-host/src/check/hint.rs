@@ -17,7 +17,8 @@ impl Verdict {
             let over = (p.value / p.limit).abs();
             speed = speed.min(match p.kind {
                 Velocity => 0.95 / over,
-                // The value of this problem belongs to one step between two points. The joint may be faster in another step of the path.
+                // The value of this problem comes from one step between two points, but the joint may be faster in
+                // another step. Therefore the peak velocity of the joint is also used.
                 PositionSpeed => {
                     let peak = p
                         .joint

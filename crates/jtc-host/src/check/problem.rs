@@ -20,7 +20,8 @@ pub struct Seen {
     pub time_s: f64,
     /// Value that causes the problem, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit for the value. If two channels disagree, `limit` is the value of the other channel.
+    /// Limit for the value. If positions, velocities or accelerations contradict each other, `limit` is the value of
+    /// the other quantity.
     pub limit: f64,
 }
 
@@ -41,7 +42,8 @@ pub struct Problem {
     pub time_s: f64,
     /// Worst value, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit for the value. If two channels disagree, `limit` is the value of the other channel.
+    /// Limit for the value. If positions, velocities or accelerations contradict each other, `limit` is the value of
+    /// the other quantity.
     pub limit: f64,
     /// Number of milliseconds, points or steps with the problem.
     pub count: usize,
@@ -56,8 +58,8 @@ impl Problem {
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// Returns the worst value relative to its limit, for sorting. If the problem has no limit, returns the absolute value or the
-    /// difference of two channels.
+    /// Returns the worst value relative to its limit, for sorting. If the problem has no limit, returns the absolute
+    /// value. If positions, velocities or accelerations contradict each other, returns the difference.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {

@@ -50,7 +50,8 @@ pub(super) fn stops(
     let end = points.len().saturating_sub(1) as f64 * f64::from(step_ms);
     let last = (end / SPACING).ceil() as usize;
     let stop_ms = f64::from(config.stop_ms).max(SPACING);
-    // During a ramp, the path time advances by half of the ramp's duration.
+    // During a ramp, the path time advances by half of the ramp's duration. Therefore the window must contain this
+    // part of the path.
     let ahead = (0.5 * stop_ms / SPACING).ceil() as usize + 1;
     let mut window = VecDeque::with_capacity(ahead + 1);
     let mut next = 0;

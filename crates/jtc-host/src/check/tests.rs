@@ -93,7 +93,8 @@ fn all_problems_are_reported_with_their_worst_place() {
     );
 }
 
-/// If all velocities are 0, the arm would stop at every point.
+/// If all velocities were 0, the arm would stop at every point. The check refuses this trajectory, because its
+/// positions contradict its velocities.
 #[test]
 fn channels_that_contradict_each_other_all_along_are_refused() {
     let mut t = smooth();
@@ -125,7 +126,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     let arm = Arm::avena();
     let mut config = arm.config();
     config.joints[1].torque_max = 100.0;
-    // In the horizontal pose joint 2 needs about 130 N·m to hold the arm.
+    // In the horizontal pose, joint 2 needs about 130 N·m to hold the arm, which is more than its limit of 100 N·m.
     let t = plan::joint_move(&[0.0; 6], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     let verdict = Checker { model: Some(&arm.model), ..Checker::new(&config) }.check(&t);
     assert_eq!(
@@ -221,7 +222,8 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     let bump = verdict.refusals().next().expect("refused");
     assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Joint::from_number(5)), "{verdict}");
     assert!((19..=20).contains(&bump.point) && bump.ms > 0.0, "{verdict}");
-    // The limits in these settings are beyond the range of the drives.
+    // This position limit is beyond the range of the drives. The check uses the limit of the drives (2.9905 rad)
+    // instead.
     let mut config = Config::avena();
     config.joints[0].position_max = 3.05;
     let mut out = Trajectory { step_ms: 100, points: vec![Point::default(); 3] };
@@ -251,7 +253,8 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
             let verdict = Checker::new(&config).check(&t);
             assert!(verdict.is_ok() && verdict.problems.is_empty(), "{verdict}");
         }
-        // The next position that a serial frame can represent is outside the limit.
+        // The end of this motion is one step of the serial frame (96 µrad) beyond the limit, so the check refuses the
+        // motion.
         let verdict = Checker::new(&config).check(&of_joint_2(from, limit + 96e-6 * f64::signum(limit)));
         let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
         assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
@@ -414,7 +417,8 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     }
     let text = check(&there, 0.98, None).to_string();
     assert!(text.contains("joint 2: rest at point") && text.contains("98.0 % of the torque limit"), "{text}");
-    // In the pose with the high holding torque, joint 1 rotates about the vertical axis, so the arm is not at rest.
+    // While the arm is in the pose with the high holding torque, joint 1 rotates about the vertical axis. Therefore
+    // the arm is not at rest there, and the check accepts the motion.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {
         let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();
@@ -440,7 +444,8 @@ fn the_existing_trajectories_pass() {
         let checker =
             Checker { model: Some(&arm.model), friction: friction.as_ref(), ..Checker::new(&config) };
         let verdict = checker.check(&t);
-        // At five joins between pieces of the trajectory, the positions are one sample ahead of the velocities.
+        // At five joins between pieces of the trajectory, the positions are one sample ahead of the velocities. The
+        // check reports only warnings.
         assert!(verdict.is_ok(), "{name}: {verdict}");
         assert!(
             verdict.warnings().all(|p| p.kind == ProblemKind::VelocityMismatch && p.count == 5),

@@ -12,8 +12,8 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of points with contradictory channels that the check tolerates. Existing files have contradictory channels at the joins between
-/// two pieces.
+/// Number of points with a contradiction between positions, velocities and accelerations that the check tolerates.
+/// Existing files have such points at the joins between two pieces.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.
@@ -87,8 +87,8 @@ pub struct Verdict {
     places: Places,
     /// Values of the joints along the path.
     pub joints: [JointFigures; JOINTS],
-    /// Smallest torque margin of the arm model, with friction at 20 °C and at the temperature of the check; `None` if the torque was not
-    /// computed.
+    /// Smallest torque margin of the arm model. The friction is computed at 20 °C and at the temperature of the
+    /// check. `None` if the torque was not computed.
     pub margin: Option<TorqueMargin>,
 }
 

@@ -11,7 +11,7 @@ use crate::held_stop::HeldStop;
 use crate::plan::{MARGIN_PCT_MAX, PlanError};
 use crate::{explain, held_stop, labels};
 
-/// Returns the usual cause from the explain page that belongs to the text `words`.
+/// Returns the usual cause from the page of `jtc explain` that belongs to the text `words`.
 fn cause(words: &str) -> Option<&'static str> {
     explain::find(words).first().map(|page| page.cause)
 }
@@ -154,7 +154,8 @@ mod tests {
         let facts = refused.expect_err("it is over its limit").facts();
         assert_eq!((facts.joint, facts.point), (Some(2), Some(0)));
         assert_eq!(facts.limit, Some(limit));
-        // The value is rounded to the resolution of a serial frame.
+        // The reported value is not exactly 0.5 rad beyond the limit, because it is rounded to the resolution of a
+        // serial frame.
         assert!(facts.value.is_some_and(|value| (value - limit - 0.5).abs() < 1e-3), "{:?}", facts.value);
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
     }

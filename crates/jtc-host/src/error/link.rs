@@ -207,8 +207,8 @@ fn after_refused_execution(
             TrajCheck
         ));
     }
-    // While no trajectory runs (`idle`), the controller refuses Execute with another code, and the session does not send Resume. Therefore
-    // the refused request is Pause or Stop.
+    // In this state, the controller refuses Execute with another code, and the session does not send Resume.
+    // Therefore the code NotAllowed can only be the answer to Pause or Stop.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then(|| {
         next!(

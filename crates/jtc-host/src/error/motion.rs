@@ -46,7 +46,7 @@ pub enum MotionError {
     HeldStop {
         /// Index of the 1 ms point at which the motion is paused.
         point: u32,
-        /// Errors of each joint that had occurred before the motion.
+        /// Error bits of each joint that had already occurred before the motion.
         before: [u16; 6],
         /// Status that contains the errors.
         status: Box<Status>,
@@ -65,8 +65,8 @@ pub enum MotionError {
     },
 }
 
-/// Returns the cause of the held stop in one line. If the status does not contain the cause any more, returns the errors that have occurred
-/// since the start of the motion.
+/// Returns the cause of the held stop in one line. If the held stop has ended and its cause is unknown, returns the
+/// errors that have occurred since the start of the motion.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
         labels::why_held(status, cause)
@@ -79,7 +79,7 @@ fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> St
 fn after_held_stop(cause: Option<&StopCause>) -> Next {
     let remedy = match cause.map(|cause| cause.kind) {
         None => "remove the obstacle, or set the payload".to_owned(),
-        // After an encoder jump, no trajectory can continue before the drive is reset.
+        // After an encoder jump, the controller executes no trajectory until the drive is reset.
         Some(StopKind::EncoderJump) => return held_stop::after_encoder_jump(),
         Some(kind) => held_stop::remedy(kind),
     };

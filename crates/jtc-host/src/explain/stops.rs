@@ -1,4 +1,5 @@
-//! Pages about the causes of a held stop (J-69). The page with the number 0 is about held stops in general.
+//! Pages about the causes of a held stop (J-69), in which the drives hold the arm. The page with the number 0 is
+//! about held stops in general.
 
 use jtc_wire::StopKind;
 

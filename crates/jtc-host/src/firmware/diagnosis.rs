@@ -1,4 +1,4 @@
-//! Advice for the user after an image was not written to a board, or if the board does not run the image.
+//! Advice for the user if an image could not be written to a board, or if the board does not run the image.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 

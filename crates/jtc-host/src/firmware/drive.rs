@@ -47,7 +47,8 @@ pub struct Drive {
 /// USB device of a board's ST-LINK. The USB device presents a drive, a serial port and a debugger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
-    /// Folder of the USB device in the device tree of the operating system. The name of this folder contains the USB connector.
+    /// Folder of the USB device in the device tree of the operating system. The name of this folder contains the
+    /// number of the USB connector.
     pub folder: PathBuf,
     /// Number of the device on the USB bus. The number changes each time the device is plugged in.
     pub number: String,

@@ -87,7 +87,7 @@ mod tests {
     fn segments_stand_where_they_are_loaded() {
         let bytes = file(&[(FLASH + 8, &[1, 2]), (FLASH, &[3, 4, 5])]);
         assert_eq!(flat(&bytes).unwrap(), [3, 4, 5, 255, 255, 255, 255, 255, 1, 2]);
-        // A segment without bytes in the file is not part of the flash.
+        // A segment without bytes in the file, here in RAM, is not part of the flash.
         assert_eq!(flat(&file(&[(0x2000_0000, &[]), (FLASH, &[7])])).unwrap(), [7]);
     }
 

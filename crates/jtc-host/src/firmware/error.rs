@@ -8,7 +8,7 @@ use jtc_wire::{Code, ControllerState};
 use super::{CatalogueImage, DriveAfter};
 use crate::port::PortError;
 
-/// Reason why a board was not flashed, or why it is not verified that the board runs the image.
+/// Reason why a board was not flashed, or why the program could not verify that the board runs the image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {

@@ -85,7 +85,7 @@ struct Flashed {
     program: Option<Program>,
     board: String,
     started: Instant,
-    /// Time for which the board has run before the test began, ms.
+    /// Time for which the board had already run when the test began, ms.
     before_ms: u64,
     status: Status,
 }
@@ -230,7 +230,7 @@ impl StLink {
         Self { _folder: folder, path, stop, thread: Some(thread) }
     }
 
-    /// Returns the drive as a program that searches for drives finds it.
+    /// Returns the drive in the form in which a search for drives returns it.
     pub(super) fn drive(&self) -> Drive {
         Drive::at(&self.path).unwrap()
     }

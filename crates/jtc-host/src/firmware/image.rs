@@ -211,7 +211,8 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
 fn starts_second_core(bytes: &[u8]) -> bool {
     let bank2 = FLASH + BANK1 as u32;
     let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    // The program of the second core begins with two instructions. The second instruction jumps back to the first instruction.
+    // The program of the second core begins with an endless loop: its second instruction jumps back to its first
+    // instruction.
     reset.is_some_and(|reset| {
         reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
     })
@@ -272,7 +273,7 @@ mod tests {
             let said = parsed(good[..end].to_vec()).unwrap_err();
             assert!(said.contains("incomplete") && said.contains("second core"), "{end}: {said}");
         }
-        // The NUCLEO-H743ZI2 has only one core.
+        // The NUCLEO-H743ZI2 has only one core, so its image contains no second program.
         assert_eq!(image_bytes("nucleo-h743zi2", 7).len(), 0x1000);
         assert!(parsed(image_bytes("nucleo-h743zi2", 7)).is_ok());
     }

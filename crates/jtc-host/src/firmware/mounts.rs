@@ -87,7 +87,8 @@ impl Places {
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
-        // A drive that was removed from USB may still be mounted.
+        // A drive may still be mounted after its USB device was removed. Such a drive is ignored, because its USB
+        // device is not found.
         let here = self.at(&drive.path).ok().filter(|found| connector(found) == own);
         here.or_else(|| {
             own.as_ref()?;
@@ -154,7 +155,7 @@ impl Places {
     fn usb_device(&self, class: &str, node: &Path) -> Option<UsbDevice> {
         let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
         let mut folder = fs::canonicalize(self.classes.join(class).join(node.file_name()?)).ok()?;
-        // The folder of a USB device contains a vendor id.
+        // Only the folder of a USB device contains a vendor id. The search goes up to this folder.
         while !folder.join("idVendor").exists() {
             folder = folder.parent()?.to_owned();
         }
@@ -282,7 +283,7 @@ mod tests {
             found,
             [(one.clone(), Some("NOD_H745ZIQ")), (desk.at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]
         );
-        // The drive that is found at its path equals the listed drive, with the label of the block device.
+        // A search by path returns the same drive as the list of drives, including the label of the block device.
         let named = desk.places.at(&one).unwrap();
         assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
         assert_eq!(desk.places.at(&other).unwrap().label.as_deref(), Some("usb"));
@@ -300,8 +301,8 @@ mod tests {
     #[test]
     fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
         let mut desk = Desk::new();
-        // The folder belongs to the second NUCLEO-H743ZI on a computer. The name of the folder is the label of the first board with an
-        // appended digit.
+        // Two NUCLEO-H743ZI boards are connected, and the operating system has appended the digit 2 to the folder
+        // name of the second drive. This folder name must not be used as the label of the drive.
         let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
         let drive = desk.places.at(&path).unwrap();
         assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));
@@ -353,7 +354,7 @@ mod tests {
             let error = desk.places.still_there(&drive).unwrap_err();
             assert!(matches!(error, FirmwareError::Changed { .. }), "{error}");
         };
-        // The USB device was unplugged and plugged in again.
+        // The USB device was unplugged and plugged in again, so its number has changed.
         fs::write(desk.at("1-2/devnum"), "8\n").unwrap();
         refused(&desk);
         fs::write(desk.at("1-2/devnum"), "7\n").unwrap();
@@ -361,7 +362,7 @@ mod tests {
         // The drive of another board is mounted at the path of the drive.
         desk.mount("dev/sdb", b"one", "vfat");
         refused(&desk);
-        // No drive is mounted at the path, and the folder is on a disk of this computer.
+        // The drive was unmounted, so the folder is on a disk of this computer.
         fs::write(desk.at("mounts"), "").unwrap();
         refused(&desk);
         fs::remove_dir_all(&path).unwrap();

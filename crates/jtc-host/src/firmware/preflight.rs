@@ -113,8 +113,9 @@ impl Preflight {
         self.info().map(|info| info.store == StoreState::Stored)
     }
 
-    /// Returns the statement that an operator must confirm before the board is flashed with this image. Returns `None` if the controller on
-    /// the drive's board reports that the torque is off, that each joint answers, and that the gripper is off.
+    /// Returns the statement that an operator must confirm before the board is flashed with this image. Returns
+    /// `None` if no confirmation is necessary. Then the controller on the drive's board reports that the torque and
+    /// the gripper are off, and that each joint answers.
     pub fn to_confirm(&self, image: &Image) -> Option<String> {
         let reports = |line: &Asked| matches!(line.answers, Answers::Controller { .. });
         let mut doubts: Vec<String> = self.lines.iter().filter_map(Asked::doubts).collect();
@@ -166,8 +167,8 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     if answered(session.poll(SILENT))?.flatten().is_none() {
         return silent(session);
     }
-    // While the program waited for the operator, old status frames may have been buffered for minutes. The program skips these old frames,
-    // because it waits for the answer to the following request.
+    // While the program waited for the operator, old status frames may have accumulated in the receive buffer. The
+    // answer to this request arrives after them, so the status that is read next is current.
     let info = answered(session.info())?.flatten().map(Box::new);
     match answered(session.fresh_status())? {
         Some(status) => Ok(controller(&status, info)),

@@ -89,7 +89,8 @@ fn j67_the_program_of_before_may_start_anew_before_it_is_stopped() {
 
 #[test]
 fn a_controller_that_never_has_read_its_flash_is_not_waited_for() {
-    // The clock of this simulated controller does not advance, so the device always appears to have just started.
+    // The clock of this simulated controller does not advance, so the device always appears to have just started. The
+    // program must still stop waiting.
     let mut asked = 0;
     let port = crate::port::test::ScriptedPort::new(Some(9_600), move |_, bytes| {
         if bytes.is_empty() {

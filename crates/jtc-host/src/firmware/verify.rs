@@ -14,8 +14,8 @@ use crate::session::{Session, Timeouts};
 
 /// Maximum time that a device needs after its start to read its flash (J-67).
 const READ_WITHIN: Duration = Duration::from_secs(3);
-/// Tolerance between the clocks of this computer and of a device: a relative difference, and a delay until the program observes the start
-/// of the device.
+/// Tolerances for the comparison of a device's clock with the clock of this computer: relative clock error, and
+/// maximum delay until the program notices that the device has started.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
 
 /// Time after the copying during which the previous program may still run before the ST-LINK stops it.
@@ -47,9 +47,9 @@ pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriveAfter {
-    /// The drive disappeared and appeared again. A drive normally disappears and appears again after it has accepted an image.
+    /// The drive disappeared and appeared again, which is normal after it has accepted an image.
     CameBack,
-    /// The drive disappeared and has not appeared again. A drive normally does not appear again on a system that does not mount drives
+    /// The drive disappeared and has not appeared again. This is normal on a system that does not mount drives
     /// automatically.
     Gone,
     /// The drive has not disappeared.
@@ -106,7 +106,8 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // The drive shows an old failure report until the drive disappears. An old failure report does not concern the copied image.
+        // A failure report from before the copying stays on the drive until the drive disappears. Such a report does
+        // not concern the copied image.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
@@ -195,8 +196,9 @@ pub fn verify_program(
     }
 }
 
-/// Returns `true` if the ST-LINK will not replace the running program any more. Before the ST-LINK begins to write, the previous program
-/// can restart. The previous program also restarts after a reset without a write.
+/// Returns `true` if the ST-LINK has finished, so it will not replace the running program any more. Until then, the
+/// program that answers may be the previous program. The previous program can start again before the ST-LINK writes,
+/// and after a reset without a write.
 fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
     let written = watch.written;
     watch.seen == DriveAfter::CameBack
@@ -204,7 +206,8 @@ fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
         || written.began.elapsed() >= limits.wait
 }
 
-/// Returns `true` if the device started during the last `time`.
+/// Returns `true` if the device certainly started during the last `time`. The result includes the clock tolerances
+/// [`CLOCKS_DIFFER`].
 fn started_since(info: &Info, time: Duration) -> bool {
     let (share, late) = CLOCKS_DIFFER;
     Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
@@ -266,7 +269,8 @@ mod tests {
         let since = |uptime_ms, time_s| {
             started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
         };
-        // In the first case, the device started just before the copying began, and the clock of the device is 5 % too slow.
+        // In the first case, the copying began 10 s ago, and the device started 50 ms earlier. The clock of the
+        // device is 5 % slow, so the device reports about 9.55 s.
         assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
         assert!(since(1_000, 10.0) && since(0, 0.4));
     }

@@ -105,7 +105,8 @@ impl FlightLog {
             Replayed { config: Some(Box::new(controller.config().clone())), ..Replayed::default() };
         let mut replay = Replay::new(self.log(), controller, points);
         let own = replay.arm();
-        // A manipulated file may contain a state that no controller can reach. The replay ends at this state.
+        // A manipulated file may contain a state that no controller can reach, and the controller code then panics.
+        // The panic is caught, and the replay ends at this state.
         let all = std::panic::AssertUnwindSafe(|| {
             while let Some(step) = replay.next() {
                 let tick = tick(&step, &replay);

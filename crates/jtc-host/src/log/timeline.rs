@@ -18,7 +18,7 @@ use crate::sample::{JointSample, Sample};
 pub struct Event {
     /// Number of ticks since the start of the device.
     pub tick: u64,
-    /// Number of the start of the device.
+    /// Number of starts of the device up to this event.
     #[serde(skip)]
     pub boots: u32,
     /// Time from the start of the device to the event, s.
@@ -70,7 +70,7 @@ impl Timeline {
         Self { events, first }
     }
 
-    /// Returns the first error and all errors in the same tick, as the failure of a report.
+    /// Returns the first error and all other errors in the same tick, in the form that a report shows.
     pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
         let first = self.events.get(self.first?)?;
         let with = self.events.iter().filter(|event| event.error && event.ms_after(first) == Some(0));

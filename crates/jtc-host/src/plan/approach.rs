@@ -22,8 +22,9 @@ pub enum ApproachError {
     Check(#[from] CheckError),
 }
 
-/// Plans a straight motion in joint space from the position `here` to the first point of `trajectory`, and checks this approach like any
-/// other motion. The speed is `speed_pct` % of the limits of `arm` on this controller, at most 50 %.
+/// Plans an approach: a straight motion in joint space from the position `here` to the first point of `trajectory`.
+/// The approach is checked like any other motion. Its speed is `speed_pct` % of the limits of `arm` on this
+/// controller, at most 50 %.
 ///
 /// # Errors
 ///
@@ -44,7 +45,7 @@ pub fn approach(
         ..Planner::new(&config)
     };
     let path = planner.to(here, &first)?.trajectory;
-    // The option for the number of points per segment applies only to the trajectory, and not to the approach.
+    // The points per segment that the user has set apply only to the trajectory, and not to the approach.
     let upload = UploadOptions { points_per_segment: None, ..options.upload };
     Ok(CheckedTrajectory::check(&path, arm, here, &CheckOptions { upload, ..options.clone() })?)
 }

@@ -202,7 +202,8 @@ mod tests {
 
     use super::*;
 
-    /// The error messages of a move contain the words for the current pose and the goal instead of waypoint numbers.
+    /// The error message of a move contains no waypoint numbers. Waypoint 1 is called the present pose of the arm,
+    /// and the number of waypoint 2 (the goal) is omitted.
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];

@@ -1,11 +1,14 @@
-//! Torque margin of a plan: the share of each torque limit that the motion does not use. This reserve is for masses and friction that the
-//! model does not contain.
+//! Torque margin of a plan: the share of each torque limit that the motion does not use. This reserve is for masses
+//! and friction that the model does not contain.
 //!
-//! A plan keeps the torque of the arm model, including friction, below (100 % − margin) of each torque limit. The plan respects this
-//! reduced limit at its lowest bearing temperature and at the usual bearing temperature. If gravity and breakaway friction alone need
-//! nearly the whole reduced limit, or more, another rule applies ([`ArmDynamics::usable_torque`]). In such a pose, the motion may use a
-//! quarter of the torque that gravity and friction leave of the whole limit, and at least 2 % of the whole limit. Therefore the arm can
-//! reach and leave every pose that it can hold. [`Verdict::margin`](crate::check::Verdict::margin) contains the torque margin of a motion.
+//! A plan keeps the torque of the arm model, including friction, below (100 % − margin) of each torque limit. The
+//! plan respects this reduced limit at its lowest bearing temperature and at the usual bearing temperature.
+//!
+//! Another rule applies in a pose in which gravity and breakaway friction alone need nearly the whole reduced limit,
+//! or more ([`ArmDynamics::usable_torque`]). In such a pose, the available torque is the whole limit minus gravity
+//! and friction. The motion may use a quarter of the available torque, but at least 2 % of the whole limit. Therefore
+//! the arm can reach and leave every pose that it can hold. [`Verdict::margin`](crate::check::Verdict::margin)
+//! contains the torque margin of a motion.
 
 use jtc_core::JOINTS;
 use jtc_plan::{ArmDynamics, Limits, State};
@@ -19,8 +22,8 @@ use crate::trajectory::Trajectory;
 pub const MARGIN_PCT: f64 = 15.0;
 /// Largest valid torque margin, % of each torque limit.
 pub const MARGIN_PCT_MAX: f64 = 100.0 * jtc_plan::MARGIN_MAX;
-/// Difference between the requested and the actual torque margin, % of the limit. If the difference is larger, a note reports the actual
-/// margin.
+/// Largest difference between the requested and the actual torque margin that is not reported, % of the limit. If the
+/// difference is larger, a note reports the actual margin.
 const SHORT_PCT: f64 = 0.1;
 /// Relative rounding error up to which a torque counts as within the limit.
 const ROUNDING: f64 = 1e-9;

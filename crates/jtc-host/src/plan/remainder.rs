@@ -16,7 +16,8 @@ use crate::trajectory::{Point, Trajectory};
 pub fn remainder(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<Trajectory, PlanError> {
     let from_s = f64::from(from_ms) * 1e-3;
     let left = (trajectory.duration_s() - from_s).max(0.0);
-    // During the ramp, the path time advances by half of the ramp duration.
+    // During the ramp, the path time advances by half of the ramp duration. Therefore the ramp is at most twice as
+    // long as the remaining path time.
     let ramp = ramp_s.min(2.0 * left).max(1e-3);
     let seconds = left + 0.5 * ramp;
     let step_ms = step_ms(seconds)?;
@@ -51,7 +52,8 @@ fn ramped(t: f64, ramp: f64) -> (f64, f64, f64) {
     (ramp * u * u * u * (1.0 - 0.5 * u), u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) / ramp)
 }
 
-/// Returns the set values at `t` seconds of the path, with the controller's interpolation between points (J-32).
+/// Returns the setpoint (position, velocity, acceleration) at `t` seconds of the path, with the controller's
+/// interpolation between points (J-32).
 fn place(trajectory: &Trajectory, t: f64) -> SetPoint {
     let h = f64::from(trajectory.step_ms.max(1)) * 1e-3;
     let i = (t / h).max(0.0) as usize;
@@ -89,7 +91,8 @@ mod tests {
             assert!(verdict.is_ok(), "{from_ms}: {verdict}");
             for ms in (0..(rest.duration_s() * 1e3) as u32).step_by(7) {
                 let at = rest.at_ms(ms).unwrap().position;
-                // The test compares only the positions and ignores the path time.
+                // The test searches for the nearest position of the path, at any path time. It checks that the motion
+                // stays on the path, and ignores when the arm reaches a position.
                 let aside = (from_ms.saturating_sub(5)..=10_000)
                     .map(|k| near(&at, &whole.at_ms(k).unwrap().position));
                 let aside = aside.fold(f64::INFINITY, f64::min);

@@ -51,8 +51,8 @@ mod tests {
     use crate::check::Checker;
     use crate::trajectory::fit::Samples;
 
-    /// The test replans two motions on their paths. The first motion has twice the velocity limit and ends abruptly in the middle of its
-    /// path. The second motion is slow.
+    /// The test replans two motions on their paths. The first motion has about twice the velocity limit and ends
+    /// abruptly at high speed. The second motion is slow.
     #[test]
     fn a_way_that_is_too_fast_is_gone_within_the_limits() {
         let arm = Arm::avena();

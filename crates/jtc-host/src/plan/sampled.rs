@@ -14,8 +14,9 @@ const STEP_MIN_MS: f64 = 2.0;
 const STEP_MAX_MS: f64 = 1000.0;
 /// Maximum deviation of a trajectory from the motion between two points, rad.
 const ASIDE: f64 = 1e-3;
-/// Minimum number of points for each sharp corner. With fewer points, the trajectory deviates more from the motion. A corner is sharp if
-/// its change of direction exceeds `CORNER_TURN` (a share of the path length) and its segments are longer than `CORNER_LEG` (rad).
+/// Minimum number of points for each sharp corner. With fewer points, the trajectory deviates more from the motion. A
+/// corner is sharp under two conditions: its change of direction exceeds `CORNER_TURN` (a share of the path length),
+/// and its segments are longer than `CORNER_LEG` (rad).
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;
@@ -64,8 +65,8 @@ pub(super) fn sampled(
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // The first and the last point are exactly the requested positions. If the acceleration jumps at the start, the acceleration before the
-    // jump and the acceleration after the jump are both correct.
+    // The first and the last point are exactly the requested positions. If the acceleration jumps at the start, its
+    // values before and after the jump are both correct. Therefore the acceleration is not changed.
     if let Some(point) = points.first_mut() {
         (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }

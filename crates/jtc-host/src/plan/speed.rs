@@ -1,4 +1,5 @@
-//! Trajectories at another speed, and the set values of a trajectory at each millisecond.
+//! Trajectories at another speed, and the setpoints (position, velocity, acceleration) of a trajectory at each
+//! millisecond.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate, position_speed};
 
@@ -30,8 +31,8 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     if (step - step.round()).abs() < 1e-9 && (1.0..=1000.0).contains(&step) {
         return Ok(Trajectory { step_ms: step.round() as u16, points: own.iter().map(slower).collect() });
     }
-    // The new time step would not be a whole number of milliseconds. Therefore each channel (position, velocity, acceleration) is resampled
-    // from its own samples (J-32).
+    // The new time step would not be a whole number of milliseconds, or would be outside 1 to 1000 ms. Therefore each
+    // channel (position, velocity, acceleration) is resampled from its own samples (J-32).
     let seconds = trajectory.duration_s() / s;
     let step_ms = f64::from(STEP_MS).max((seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil());
     if step_ms > 1000.0 {
@@ -51,9 +52,9 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     Ok(Trajectory { step_ms: step_ms as u16, points: points.collect() })
 }
 
-/// Returns the set values between two points, for resampling. In some files the velocities differ from the speed of the positions by more
-/// than rounding, for example because all velocities are 0. If the velocities differ, the derivatives of the position replace the velocity
-/// and the acceleration.
+/// Returns the setpoint (position, velocity, acceleration) between two points, for resampling. In some files the
+/// velocities differ from the speed of the positions by more than rounding, for example because all velocities are 0.
+/// In this case, the derivatives of the position replace the velocity and the acceleration.
 fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     // The acceleration is computed from the speeds at two times, 0.0005 of the interval before and after `u`. This distance is precise
     // enough for a polynomial, and both times stay inside the interval.
@@ -72,8 +73,9 @@ fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
 }
 
 impl Trajectory {
-    /// Returns the set values at the 1 ms point `k`, with the controller's interpolation (J-31, J-32). After the end of the trajectory, the
-    /// function returns the values of the last point.
+    /// Returns the setpoint (position, velocity, acceleration) at the 1 ms point `k`, with the controller's
+    /// interpolation (J-31, J-32). After the end of the trajectory, the function returns the setpoint of the last
+    /// point.
     pub fn at_ms(&self, k: u32) -> Option<SetPoint> {
         let step = u32::from(self.step_ms.max(1));
         let (i, ms) = ((k / step) as usize, k % step);

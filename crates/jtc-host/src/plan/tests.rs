@@ -104,7 +104,8 @@ fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     }
 }
 
-/// An int16 file rounds 1.57 rad up to the raw position 16 376, which is 1.570077 rad.
+/// The goal is 1.57 rad after the rounding of an int16 file: the raw position 16 376 is 1.570077 rad, slightly
+/// outside the limit. The planner moves the goal to the limit.
 #[test]
 fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     let config = Config::avena();
@@ -131,7 +132,8 @@ fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let points = &start.checked.trajectory().points;
     assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(points.last().unwrap().position, t.points[0].position);
-    // If the arm is outside its limits by more than the start tolerance, only a jog can move the arm back.
+    // The arm is outside its limits by more than the start tolerance, so no approach is possible. Only a jog can move
+    // the arm back.
     assert!(order.start(1, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0]).is_err());
 }
 
@@ -249,8 +251,9 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// A motion that is too long even at the highest speed is rejected before planning. The planner has then not yet checked that the drives
-/// can hold the arm in the last pose. If the same waypoints are in degrees, the planner reports a position outside the limits.
+/// A motion that takes too long even at the highest speed is rejected at once, before the planner checks that the
+/// drives can hold the arm in the last pose. If the same waypoints are in degrees, the planner reports a position
+/// outside the limits instead.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();

@@ -13,9 +13,11 @@ const ASIDE_M: f64 = 5e-4;
 pub struct WayOptions {
     /// `true` if the flange moves along a straight line in each segment for which the file does not specify the motion.
     pub line: bool,
-    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. If `blend` is 0, the arm stops at each waypoint.
+    /// Size of a rounded corner, rad. Within this distance from the waypoint, the path leaves the straight segments.
+    /// The distance is the largest distance of a joint. If `blend` is 0, the arm stops at each waypoint.
     pub blend: f64,
-    /// Rounding of the corner between two lines or arcs, m. If `blend_m` is 0, the arm stops at each of these corners.
+    /// Size of a rounded corner between two lines or arcs of the flange, m. If `blend_m` is 0, the arm stops at each
+    /// of these corners.
     pub blend_m: f64,
 }
 
@@ -45,8 +47,8 @@ impl<'a> WaypointPath<'a> {
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop at a waypoint is allowed with every blend. At a sharp corner, a stop may be faster than a motion around a small blend.
-            // Therefore a route with rounded corners and a route with stops are planned.
+            // A stop at a waypoint is always within the blend. At a sharp corner, a stop may be faster than a small
+            // rounding. Therefore the planner gets one route with rounded corners and one route with stops.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
         } else {
@@ -86,7 +88,8 @@ impl<'a> WaypointPath<'a> {
     /// Returns the largest deviation of the flange from the straight line between two poses of the flange. Returns `None` if the deviation
     /// is smaller than 0.5 mm.
     pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
-        // If the option `line` is `true`, the user has explicitly selected joint space for each segment that is not a line.
+        // With the option `line`, the user has explicitly selected joint space for each segment that is not a line.
+        // Therefore no deviation is reported for these segments.
         let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
         furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
     }

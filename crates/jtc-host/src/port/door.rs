@@ -1,4 +1,4 @@
-//! Door of an open port, which is a socket through which other programs of the same user can stop the arm.
+//! Door of an open port: a local socket through which other programs of the same user can stop the arm.
 
 use std::fs;
 use std::io;
@@ -16,17 +16,17 @@ use super::halt::{Answer, End, REQUEST_MAX, Request, may_ask, peer, read_line, s
 use super::line::{Counted, Line};
 use super::runtime;
 
-/// Maximum number of programs that a door serves at the same time.
+/// Maximum number of client programs that a door (control socket) serves at the same time.
 const ASKERS: usize = 8;
-/// Maximum time until the door's thread detects that the door is closed. An event wakes the thread earlier.
+/// Interval at which the door's thread checks if the door was closed. A new connection wakes the thread earlier.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 /// Pause after an attempt to accept a connection has failed.
 const RETRY: Duration = Duration::from_millis(20);
 /// Timeout for receiving a request and for writing an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Door of an open port. The door must be closed before the port, because the next program that opens the port creates a door at the same
-/// path.
+/// Door (control socket) of an open port. The door must be closed before the port, because the next program that
+/// opens the port creates a door at the same path.
 pub(super) struct Door {
     path: PathBuf,
     /// Device and inode of the socket. Another socket at the same path has different numbers.
@@ -36,7 +36,8 @@ pub(super) struct Door {
 }
 
 impl Door {
-    /// Opens the door of this program's port. Returns `None` if no socket can be created. The port also works without a door.
+    /// Opens the door (control socket) of this program's port. Returns `None` if no socket can be created. The port
+    /// also works without a door.
     pub(super) fn open(line: &Arc<Line>) -> Option<Self> {
         let name = socket_name(&line.path)?;
         let (path, listener, file) = runtime::candidates().into_iter().find_map(|folder| {
@@ -77,9 +78,9 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// Creates the socket at `path`. If a socket file exists but no program serves it, a killed program left the file, and the function
-/// replaces it. If a program still serves the socket, the function returns an error. Only a program of the superuser meets such a socket,
-/// because only the superuser can open a port that is already open.
+/// Creates the socket at `path`. Replaces a socket file that a killed program has left. Returns an error if a running
+/// program still serves the socket. This can happen only to a program of the superuser, because only the superuser
+/// can open a port that is already open.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());
@@ -152,7 +153,7 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     let answer = Answer::of(line.path.clone(), line.baud, done);
     write_line(stream, &answer)?;
     if !answer.confirmed {
-        // The client reports the error and does not wait for the final message.
+        // The answer already tells the client about the failure, so the client does not wait for a final message.
         return Ok(());
     }
     let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };

@@ -93,7 +93,8 @@ pub struct End {
     pub stands: bool,
     /// `true` if the arm moved before the command.
     pub moved: bool,
-    /// Description of the motion that remains.
+    /// Description of the motion that has not ended, for example a moving joint or a paused trajectory; `None` if the
+    /// arm is at rest.
     pub moving: Option<String>,
     /// State of the controller.
     #[serde(default)]

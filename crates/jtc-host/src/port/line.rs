@@ -1,10 +1,10 @@
-//! Serial line to the controller, for sending and receiving. The owner of the port uses the line. The [door](super::door), through which
-//! other programs stop the arm, also uses the line.
+//! Serial line to the controller, for sending and receiving. The *port owner* is the code of this program that opened
+//! the port. The thread of the [door](super::door), through which other programs stop the arm, also uses the line.
 //!
-//! The thread of the door writes the Stop of another program even while the owner is busy. The Stop of another program is written between
-//! two frames of the owner. If a long frame is only partly written, the remainder of the frame is not sent. A gap on the line then causes
-//! the controller to discard the incomplete frame (J-03). After the Stop, the line does not write frames of a motion that was requested
-//! before the Stop.
+//! The thread of the door writes the Stop of another program even while the port owner is busy. This Stop is written
+//! between two frames of the port owner. If a long frame is only partly written, the remainder of the frame is not
+//! sent. A gap on the line then causes the controller to discard the incomplete frame (J-03). After the Stop, the
+//! line does not write frames of a motion that was requested before the Stop.
 
 use std::collections::VecDeque;
 use std::io;
@@ -30,11 +30,11 @@ const CHUNK: usize = 256;
 const GAP: Duration = Duration::from_millis(8);
 /// Maximum time between two pieces of one frame. A piece that is written later starts a new frame.
 const PIECE: Duration = Duration::from_millis(50);
-/// Timeout for the record of a Stop, in addition to the transmission time of three status frames.
+/// Timeout for the response record of a Stop, in addition to the transmission time of three status frames.
 const AWAITED: Duration = Duration::from_millis(150);
 /// Maximum number of times that a Stop is written. If the controller does not confirm any of these Stops, the Stop has failed.
 const TRIES: u32 = 8;
-/// Timeout for the record of a frame.
+/// Timeout for the response record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
 /// Time after another program's Stop in which motion requests are rejected. An agent rejects motion requests for the same duration.
 const CALM: Duration = Duration::from_secs(3);
@@ -44,7 +44,7 @@ const RECENT: Duration = Duration::from_millis(300);
 const AGAIN: Duration = Duration::from_millis(200);
 /// Maximum time in which an arm comes to rest after a Stop.
 const REST: Duration = Duration::from_secs(5);
-/// Maximum number of received bytes in the buffer while the owner does not read.
+/// Maximum number of received bytes in the buffer while the port owner does not read.
 const KEPT: usize = 1 << 16;
 
 /// Result of a Stop or Pause from another program.
@@ -64,9 +64,11 @@ pub(super) struct Line {
     pub baud: u32,
     pub start: Instant,
     output: Mutex<Output>,
-    /// Number of Stops that wait for access to the output. Stops that wait are written before the owner's next piece of a frame.
+    /// Number of Stops that wait for access to the output. These Stops are written before the next piece of the port
+    /// owner's frame.
     urgent: AtomicUsize,
-    /// Number of Stops and Pauses of other programs, and number of Stops alone. The two numbers change together with `Output::halted`.
+    /// Number of Stops and Pauses of other programs together. `stops` counts only the Stops. Both numbers change
+    /// together with `Output::halted`.
     halts: AtomicU64,
     stops: AtomicU64,
     /// Lock that is held until a Stop is written and confirmed. Therefore Stops are executed one after the other.
@@ -86,9 +88,9 @@ struct Output {
     free_at: Instant,
     /// `true` if the current frame was aborted because of a Stop.
     given_up: bool,
-    /// Last Stop or Pause from another program. The next motion request of the owner removes this entry.
+    /// Last Stop or Pause from another program. The next motion request of the port owner removes this entry.
     halted: Option<Halted>,
-    /// Time of the owner's last jog.
+    /// Time of the last jog that the port owner sent.
     jogged: Option<Instant>,
 }
 
@@ -102,11 +104,12 @@ struct Input {
     port: Box<dyn serialport::SerialPort>,
     timeout: Option<Duration>,
     receiver: StatusReceiver,
-    /// Bytes that the owner has not read yet.
+    /// Received bytes that the port owner has not read yet.
     pending: VecDeque<u8>,
 }
 
-/// Data from all received status frames. Either the owner's thread or the door's thread has read these frames.
+/// Data from all received status frames. Either the thread of the port owner or the thread of the door has read these
+/// frames.
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
@@ -114,9 +117,11 @@ struct Seen {
     moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
-    /// `true` if the owner has switched on teaching and no later record has confirmed that teaching is off.
+    /// `true` if the port owner has switched on teaching and no later response record has confirmed that teaching is
+    /// off.
     teaching: bool,
-    /// Execute, Pause and Stop frames whose records have not arrived, oldest first. Frames that the door wrote have a number.
+    /// Execute, Pause and Stop frames without a response record so far, oldest first. Frames that the door wrote have
+    /// a number.
     written: VecDeque<(Instant, Option<u64>)>,
     numbers: u64,
     answered: VecDeque<(u64, Response)>,
@@ -219,8 +224,9 @@ impl Line {
         Halts { all: self.halts.load(Ordering::SeqCst), stops }
     }
 
-    /// Permits the frames of a motion that was requested when the number of halts was `after`. The frames stay blocked if another halt has
-    /// occurred since the request, or if the last halt is less than 3 s old.
+    /// Permits the frames of a motion. `after` is the number of Stops and Pauses at the time of the motion request.
+    /// The frames stay blocked if another Stop or Pause has arrived since the request, or if the last one is less
+    /// than 3 s old.
     pub(super) fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }
@@ -244,14 +250,14 @@ impl Line {
         self.news.notify_all();
     }
 
-    /// Returns `true` if the owner is closing the port.
+    /// Returns `true` if the port is being closed.
     pub(super) fn is_closing(&self) -> bool {
         self.closing.load(Ordering::SeqCst)
     }
 
-    /// Writes the Stop or Pause of another program, and repeats the frame until the controller has received it. Returns `None` if the
-    /// controller does not confirm the command. An owner that closes the port waits for the end of `halt`, because the Stop may be the
-    /// reason for closing the port.
+    /// Writes the Stop or Pause of another program, and repeats the frame until the controller has received it.
+    /// Returns `None` if the controller does not confirm the command. A program that closes the port waits until
+    /// `halt` has ended, because the Stop may be the reason for closing the port.
     pub(super) fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
             // No Pause is written after a Stop, because a stopped motion cannot be paused.
@@ -265,7 +271,7 @@ impl Line {
 
     fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
-        // First, the line blocks all frames of the owner that move the arm.
+        // First, the line blocks all frames of the port owner that move the arm.
         self.urgently(|output| {
             if halt == Halt::Pause && output.is_stopped() {
                 return Err(output.refusal());
@@ -297,7 +303,8 @@ impl Line {
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            // If the owner has not read the port for some time, the first status frames that this function reads are old.
+            // If the port owner has not read for some time, the first status frames that arrive here are old.
+            // Therefore earlier signs of a motion also count.
             moved: moved || taught || self.moved_since(begin),
             status,
         }))
@@ -321,7 +328,8 @@ impl Line {
                     let _ = self.insist(&status);
                 }
                 standstill.see(at.duration_since(self.start), &status);
-                // Teaching that was requested earlier may begin as soon as the arm is at rest.
+                // Teaching that was requested earlier may begin as soon as the arm is at rest. Until this teaching
+                // has been ended, the arm is not considered at rest.
                 if lock(&self.seen).teaching && halt == Halt::Stop {
                     standstill.begin_again();
                 }
@@ -335,8 +343,9 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// Repeats the frames of a Stop whose effect the status frames do not show yet. If teaching is still on or may still begin, the
-    /// function sends the end of teaching again. If a Pause of another sender arrived after the Stop, the function sends the Stop again.
+    /// Repeats the frames of a Stop whose effect the status frames do not show yet. If teaching is still on or may
+    /// still begin, the function ends teaching again. If a Pause of another sender arrived after the Stop, the
+    /// function sends the Stop again.
     fn insist(&self, status: &Status) -> Result<(), PortError> {
         if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
@@ -352,7 +361,8 @@ impl Line {
         lock(&self.seen).moved_at.is_some_and(|at| at >= time)
     }
 
-    /// Waits for the record of a Stop whose number is at least `first`. Returns `None` if the record does not arrive in time.
+    /// Waits for the response record of a Stop whose number is at least `first`. Returns `None` if the response
+    /// record does not arrive in time.
     fn record_since(&self, first: u64) -> Option<Response> {
         let queued = lock(&self.output).free_at.saturating_duration_since(Instant::now());
         let end = Instant::now() + queued + AWAITED + line_time(3 * STATUS_LEN, Some(self.baud));
@@ -373,7 +383,7 @@ impl Line {
         }
     }
 
-    /// Waits for the next status frame. If the owner does not read from the line, this function reads.
+    /// Waits for the next status frame. If the port owner does not read from the line, this function reads.
     fn look(&self) {
         let seen = lock(&self.seen);
         let before = seen.statuses;
@@ -384,7 +394,7 @@ impl Line {
             return;
         }
         if let Ok(mut input) = self.input.try_lock() {
-            // An error is ignored here, because the owner receives the error at its next read.
+            // An error is ignored here, because the port owner receives the error at its next read.
             let _ = self.receive(&mut input, Duration::from_millis(20));
         }
     }
@@ -414,7 +424,8 @@ impl Line {
         Ok(())
     }
 
-    /// Checks bytes of the owner at the beginning of a frame, or at the beginning of a further piece of a frame.
+    /// Checks a new frame, or the next piece of a frame, before the port owner writes it. Returns an error if the
+    /// frame is blocked because of a Stop or Pause.
     fn begin(&self, output: &mut Output, bytes: &[u8]) -> Result<(), PortError> {
         let whole = FrameRef::new_checked(bytes).is_some();
         if !whole && output.given_up {
@@ -438,7 +449,8 @@ impl Line {
             || is(FrameType::TeachingModeEnable)
             // An upload prepares a motion, so upload frames are checked like frames that move the arm.
             || is(FrameType::Trajectory);
-        // With an older controller, a Pause during the deceleration after a Stop would change the Stop into a motion that can be resumed.
+        // While an older controller decelerates after a Stop, it accepts a Pause, and the motion could be resumed
+        // afterwards. Therefore a Pause is rejected after a Stop.
         let weakens = bytes == fixed::PAUSE && output.is_stopped();
         if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());
@@ -456,7 +468,7 @@ impl Line {
         Ok(())
     }
 
-    /// Writes a frame before the remaining bytes of the owner.
+    /// Writes a frame before the next bytes of the port owner.
     fn write_urgent(&self, frame: &[u8], has_number: bool) -> Result<(), PortError> {
         self.urgently(|output| {
             if frame == fixed::PAUSE && output.is_stopped() {
@@ -476,7 +488,7 @@ impl Line {
         })
     }
 
-    /// Calls `work` with the output before the owner writes its next piece.
+    /// Calls `work` with the output before the port owner writes its next piece of a frame.
     fn urgently(&self, work: impl FnOnce(&mut Output) -> Result<(), PortError>) -> Result<(), PortError> {
         let _counted = Counted::new(&self.urgent);
         work(&mut lock(&self.output))
@@ -526,7 +538,7 @@ impl Output {
 }
 
 impl Seen {
-    /// Records that an Execute, Pause or Stop frame is being written.
+    /// Adds an Execute, Pause or Stop frame to the list of frames that wait for a response record.
     fn write(&mut self, number: Option<u64>) {
         self.forget();
         self.written.push_back((Instant::now(), number));
@@ -555,7 +567,7 @@ impl Seen {
         }
     }
 
-    /// Removes the entries of frames whose record is overdue, and removes old records that no thread has read.
+    /// Removes the frames whose response record is overdue, and old response records that no thread has read.
     fn forget(&mut self) {
         self.written.retain(|(at, _)| at.elapsed() < RECORD_TIME);
         let excess = self.answered.len().saturating_sub(16);

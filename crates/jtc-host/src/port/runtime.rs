@@ -23,8 +23,8 @@ pub fn folders() -> Vec<PathBuf> {
     all.into_iter().filter(|folder| is_own(folder)).collect()
 }
 
-/// Returns the folders for these values of the environment variables. A program with an unusual runtime folder is isolated, and uses only
-/// this runtime folder and the folder for temporary files.
+/// Returns the folders for these values of the environment variables. If a program has an unusual runtime folder, it
+/// uses only this folder and the folder for temporary files. Therefore the program is isolated from other programs.
 fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
     let user = name.trim_start_matches("openjtc-");
     let usual = Path::new("/run/user").join(user);

@@ -20,20 +20,20 @@ pub const STANDARD_RATES: [u32; 16] = [
 
 /// Open serial port.
 pub struct SerialPort {
-    /// Door of the port, which is dropped before the line.
+    /// Door (control socket) of the port. It must be dropped before the line.
     #[cfg(unix)]
     _door: Option<Door>,
     line: Arc<Line>,
 }
 
 impl SerialPort {
-    /// Opens `path` at `baud`, and opens a door through which other programs of this user can stop the arm while this program uses the
-    /// port.
+    /// Opens `path` at `baud`. Also opens a door (control socket), through which other programs of this user can stop
+    /// the arm while this program uses the port.
     ///
     /// # Errors
     ///
-    /// Returns an error if the port does not exist, is used by another program, is not accessible for this user, or does not support the
-    /// bit rate.
+    /// Returns an error if the port does not exist, is used by another program, is not accessible for this user, or
+    /// does not support the bit rate.
     pub fn open(path: &str, baud: u32) -> Result<Self, PortError> {
         let port = Self::open_without_door(path, baud)?;
         #[cfg(unix)]
@@ -41,7 +41,8 @@ impl SerialPort {
         Ok(port)
     }
 
-    /// Like `open`, but without a door. The function is for programs that other programs can stop by another method, for example the agent.
+    /// Like `open`, but without a door (control socket). The function is for programs that other programs can stop by
+    /// another method, for example the agent.
     ///
     /// # Errors
     ///

@@ -81,15 +81,15 @@ impl Port for SimPort {
     }
 }
 
-/// Maximum delay of the simulated time that the port simulates at once. A longer delay, for example after the computer was suspended, is
-/// skipped completely.
+/// Longest lag behind real time that the simulation catches up. A longer lag, for example after the computer was
+/// suspended, is skipped completely.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
 /// Port to a simulated world that runs in real time, like a real controller.
 pub struct LivePort {
     world: World,
     start: Instant,
-    /// Duration of the real time that the simulation has skipped.
+    /// Real time that the simulation has skipped.
     left_out: Duration,
 }
 
@@ -106,7 +106,8 @@ impl LivePort {
         if behind > CATCH_UP {
             self.left_out += behind;
         }
-        // The clock is read before the loop and not in the loop, so that the loop also ends on a slow computer.
+        // The clock is read only once, before the loop. Otherwise the loop would never end on a computer that
+        // simulates more slowly than real time.
         let now = self.now();
         while Duration::from_micros(self.world.now_us()) < now {
             self.world.step();

@@ -28,8 +28,8 @@ pub(super) fn has_torque(status: &Status) -> bool {
     status.state.is_in(&[HoldPos, Operate, Teaching])
 }
 
-/// Evaluation of status frames until the arm is at rest. An arm that falls without torque is not at rest, although a Stop cannot hold the
-/// arm.
+/// Detector of an arm at rest, which evaluates status frames after a Stop or Pause. An arm that falls without torque
+/// is not at rest, although a Stop cannot hold the arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Standstill {
     halt: Halt,
@@ -54,7 +54,7 @@ impl Standstill {
         self.reached = now.saturating_sub(since) >= STILL;
     }
 
-    /// Returns `true` if the arm does not move, but a Stop has not yet taken full effect. After a Stop, the arm must hold its position, and
+    /// Returns `true` if a Stop has not yet taken full effect. After a Stop, the arm must hold its position, and
     /// there must be no motion that can be resumed.
     fn is_incomplete(&self, status: &Status) -> bool {
         self.halt == Halt::Stop && (status.state == ControllerState::Teaching || is_paused(status))
@@ -88,7 +88,7 @@ mod tests {
         status
     }
 
-    /// Evaluates one status every 50 ms for one second.
+    /// Evaluates one status every 50 ms for one second. Returns `true` if the arm is at rest at the end.
     fn stands_after(halt: Halt, statuses: impl Fn(u32) -> Status) -> bool {
         let mut standstill = Standstill::after(halt);
         (0..20).for_each(|i| standstill.see(Duration::from_millis(50) * i, &statuses(i)));
@@ -104,13 +104,15 @@ mod tests {
                 let reached = stands_after(Halt::Stop, |_| status(state, velocity));
                 assert_eq!(reached, stands, "{state:?} {velocity}");
             }
-            // In this test, the arm is at rest only for short moments.
+            // The joint swings: its speed is 0.1 rad/s in every fourth status, and 0 in the others. The arm is not
+            // considered at rest.
             let swings = |i: u32| status(state, if i % 4 == 3 { 0.1 } else { 0.0 });
             assert!(!stands_after(Halt::Stop, swings), "{state:?}");
         }
     }
 
-    /// A Stop ends both teaching and a pause. After a Pause the trajectory stays paused.
+    /// After a Stop, the arm is considered at rest only if teaching has ended and no motion is paused. After a Pause,
+    /// the motion stays paused.
     #[test]
     fn a_stop_leaves_nothing_that_is_taught_or_can_be_resumed() {
         let paused = |state| Status { trajectory: TrajectoryState::Pause.into(), ..status(state, 0.0) };
@@ -119,7 +121,7 @@ mod tests {
             assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state:?}");
             assert!(stands_after(Halt::Pause, |_| paused(state)), "{state:?}");
         }
-        // A paused motion cannot be resumed without torque.
+        // Without torque, a paused motion cannot be resumed, so the arm is considered at rest.
         assert!(stands_after(Halt::Stop, |_| paused(Error)));
     }
 }

@@ -67,8 +67,9 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// Writes the message with the transforms of a sample, unless a message was already written in the same interval ([`EVERY_NS`]) or all
-    /// positions are unknown. The message does not contain joints whose position is unknown.
+    /// Writes the message with the transforms of a sample. Writes nothing if all positions are unknown, or if a
+    /// message was already written in the same interval ([`EVERY_NS`]). The message does not contain joints whose
+    /// position is unknown.
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,

@@ -137,7 +137,7 @@ impl RecordingInfo {
             flange: origin(6),
             description: Some(arm.to_urdf().into()),
             gains: arm.pid,
-            // If the arm has no image, its hash is unknown.
+            // Without gains or friction, the arm has no binary image and no hash.
             hash: arm.hash().ok().flatten(),
             ..Self::default()
         }

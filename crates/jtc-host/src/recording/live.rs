@@ -121,7 +121,8 @@ mod tests {
         }
     }
 
-    /// The test never ends the recording. The file contains only the data that were passed to the operating system, as after `kill -9`.
+    /// The test does not complete the recording. As after `kill -9`, the file contains only the data that were passed
+    /// to the operating system.
     #[test]
     fn what_was_recorded_is_readable_while_it_goes_on() {
         let dir = tempfile::tempdir().unwrap();

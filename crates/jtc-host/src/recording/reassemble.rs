@@ -28,7 +28,7 @@ pub(super) struct Reassembler {
     spare: Option<Box<Reassembled>>,
 }
 
-/// Error for a message whose sample, or a later sample, has already been released.
+/// Error for a message that arrives after its sample, or a later sample, was released.
 #[derive(Debug)]
 pub(super) struct Late;
 
@@ -103,8 +103,9 @@ mod tests {
 
     use super::*;
 
-    /// The messages of a sample are matched if their distance is at most `room` samples. The samples are in time order, and no sample is
-    /// lost.
+    /// Reassembles samples from messages, with a buffer of `room` samples. Each message is a time and the bit of its
+    /// topic. Checks that each sample has both messages, and returns the times of the samples in the order of their
+    /// release.
     fn gathered(messages: &[(u64, u8)], room: usize) -> Result<Vec<u64>, Late> {
         let mut gatherer = Reassembler::new(room);
         let mut given = Vec::new();

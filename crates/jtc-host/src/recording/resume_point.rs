@@ -17,7 +17,7 @@ const AT_REST: f64 = 0.01;
 /// Maximum distance between the commanded positions in a recording and the trajectory of the recording, rad.
 const SAME: f64 = 2e-3;
 
-/// Progress of a run along its path that the recording proves.
+/// Position on the path that the arm has certainly reached, according to the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResumePoint {
     /// Path time of the last position that the recording shows, ms; 0 if the motion had not begun.
@@ -37,11 +37,13 @@ pub struct Resumption {
 }
 
 impl ResumePoint {
-    /// Returns the point at which the run on `trajectory` can be resumed without skipping a part of the path. The point is the last
-    /// position that the recording shows. The function returns a later point if `status` shows that the motion continued to this point and
-    /// that the arm is at this point. The position of the arm alone does not prove progress, because a user may have moved the arm along
-    /// the path. A controller that was restarted or that received another motion does not report a point of this motion. After a Stop, a
-    /// controller counts the point index from the start of the trajectory again.
+    /// Returns the point at which the run on `trajectory` can be resumed without skipping a part of the path. This is
+    /// the last position that the recording shows, or a later point. The function uses a later point only if `status`
+    /// shows that the motion continued to this point and that the arm is at this point.
+    ///
+    /// The position of the arm alone does not prove progress, because a user may have moved the arm along the path. A
+    /// controller that was restarted or that received another motion does not report a point of this motion. After a
+    /// Stop, a controller counts the point index from the start of the trajectory again.
     ///
     /// `tolerance` is the maximum distance (rad) at which the arm is considered to be at a point.
     ///
@@ -251,7 +253,8 @@ mod tests {
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
         let at = |last_ms| Ok(ResumePoint { last_ms });
-        // The link may have been lost, the program may have been killed, or the controller may have ended the run.
+        // With both outcomes, the run was interrupted: the link was lost, the program was killed, or the controller
+        // ended the run.
         for outcome in ["", "fault"] {
             assert_eq!(of(&way, outcome), at(4_000));
         }
@@ -335,8 +338,9 @@ mod tests {
             let found = stood(3_400, ms).resume_point(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
-        // The path has reversed its direction before the Stop, so the arm is at an earlier position. The resumed run therefore repeats the
-        // reversal instead of skipping it.
+        // The path reverses its direction at 5 s, so it has the same position at 4.9 s and at 5.1 s. The recorded
+        // motion ends at 4.9 s, and the arm is at rest at this position. The function returns the earlier time, so
+        // the resumed run repeats the reversal instead of skipping it.
         assert!(stood(4_900, 5_100).resume_point(&path).unwrap().last_ms < 4_920);
         // If the arm is elsewhere on the path, away from the path, or without torque, its position does not prove the progress.
         let elsewhere = stood(3_400, 12_000);
@@ -369,8 +373,9 @@ mod tests {
         let (path, broken) = (back_and_forth(), ResumePoint { last_ms: 3_400 });
         let at = |status: &Status| broken.resumption(&path, status, 0.02);
         let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
-        // The next statuses come from a controller that was restarted or stopped, or from an arm that a user moved. At 0 rad, the arm is at
-        // the path position of the time 15 s. At −0.5 rad, the arm is at the end of the path.
+        // These statuses prove no progress: the controller was restarted or stopped, or a user moved the arm. The
+        // path reaches 0 rad at 15 s, and −0.5 rad at its end. Only at 0.84 rad the arm is at the recorded point
+        // (3.4 s).
         for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
             for (trajectory, point) in
                 [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
@@ -388,7 +393,8 @@ mod tests {
             assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));
         }
         assert_eq!(at(&status(Finish, 20_000, -0.5)), Err(NothingLeft::Finished));
-        // On a closed path, an arm at the end of the path is also at the start.
+        // On a closed path, the end is also the start. Therefore an arm at the end of the path does not prove that
+        // the run has finished.
         assert_eq!(at(&status(Null, 0, -0.5)), recorded(false));
     }
 

@@ -129,7 +129,7 @@ impl Curves {
 
     pub(super) fn push(&mut self, sample: &Sample) {
         if self.buckets.is_empty() || self.filled == self.width {
-            // A bucket of several samples is drawn as two points.
+            // A bucket of several samples is drawn as two points, so only half as many buckets are allowed.
             while self.buckets.len() >= if self.width == 1 { POINTS_MAX } else { POINTS_MAX / 2 } {
                 self.double();
             }
@@ -208,7 +208,8 @@ impl Curves {
     }
 }
 
-/// Number of pieces after the reduction of a sequence of states. The reduction begins when the sequence has twice as many pieces.
+/// Number of pieces to which a long sequence of states is reduced. The reduction begins when the sequence has twice
+/// as many pieces.
 const RUNS_MAX: usize = 8_192;
 
 /// Rule for the value of a piece that is joined from two pieces.

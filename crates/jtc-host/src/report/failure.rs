@@ -98,8 +98,8 @@ impl RunFailure {
         Self { in_log: true, ..Self::at(info, &around, causes, joint) }
     }
 
-    /// Returns the failure of a run whose samples do not contain an error. The time of the failure is the last sample, and the cause is
-    /// `reason`.
+    /// Returns the failure of a run whose samples do not contain an error. The time of the failure is the time of the
+    /// last sample, and the cause is `reason`.
     pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
         Self::at(info, &Around::of(samples, samples.len().saturating_sub(1)), vec![reason], None)
     }

@@ -203,8 +203,9 @@ fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     (low - margin, high + margin)
 }
 
-/// Returns the values and labels of the grid lines between `low` and `high`. [`TICKS`] limits the number of grid lines. About four steps
-/// fit into the fraction `share` of the axis. If an axis has space for more labels, the caller passes a smaller fraction.
+/// Returns the values and labels of the grid lines between `low` and `high`. [`TICKS`] limits the number of grid
+/// lines. The distance between grid lines is about `share` / 4 of the axis. If an axis has space for more labels, the
+/// caller passes a smaller `share`.
 fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     let rough = share * (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {

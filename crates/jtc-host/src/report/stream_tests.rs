@@ -143,9 +143,9 @@ fn noise(i: usize) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// The number of points of a curve is bounded, independent of the length of the recording. Each point represents a piece of equal length,
-/// and the lowest and highest values of the piece are stored in the order of their times. For a short recording, the curve contains every
-/// sample.
+/// The number of points of a curve is bounded for a recording of any length. Each point represents a piece of equal
+/// length. The lowest and the highest value of a piece are stored in the order of their times. For a short recording,
+/// the curve contains every sample.
 #[test]
 fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     for n in [1, 2, 15_999, POINTS_MAX, POINTS_MAX + 1, 31_999, 32_000, 32_001, 100_003] {

@@ -229,7 +229,8 @@ fn a_recording_without_its_end_is_no_success() {
     assert_eq!(of(&samples, "stopped", ""), None);
 }
 
-/// The page of a plan shows the limits that determine the speed and the commanded values. The measured values are unknown.
+/// The page of a plan shows the commanded values and the limits that determine the speed. The measured values are
+/// unknown.
 #[test]
 fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let arm = Arm::avena();

@@ -35,7 +35,7 @@ pub struct Planned {
 }
 
 impl Course {
-    /// Returns the message for an error that [`Course::planned`] returned.
+    /// Returns the message for an error of [`Course::planned`].
     pub fn message(&self, error: &PlanError) -> String {
         match self {
             Self::Along(_) => error.to_string(),

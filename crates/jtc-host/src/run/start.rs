@@ -95,8 +95,9 @@ impl Diagnose for OpenPath {
 }
 
 impl Order<'_> {
-    /// Returns the first motion of run `n` (from 1) for an arm at `here` (rad). Before the first run, the function checks the trajectories
-    /// and the approaches of all runs, with the limits, the payload and the settings of the controller.
+    /// Returns the first motion of run `n` (from 1) for an arm at `here` (rad). Before the first run, the function
+    /// also checks the trajectories and the approaches of all later runs. The checks use the limits, the payload and
+    /// the settings of the controller.
     ///
     /// # Errors
     ///
@@ -121,7 +122,8 @@ impl Order<'_> {
         }
     }
 
-    /// Checks all runs after the first run. Also checks that each run ends at the start of the next run.
+    /// Checks all runs after the first run. Also checks that each run ends at the start of the next run, or that an
+    /// approach leads from its end to this start.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {
@@ -239,7 +241,8 @@ mod tests {
         let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
         assert!(twice.is_ok(), "{twice:?}");
         assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
-        // If an approach cannot solve a problem, the function reports this problem first.
+        // With two runs, there are two problems: the arm is not at the first point, and the path is not closed. The
+        // function reports the open path. With one run, only the position of the arm is a problem.
         assert!(matches!(start(&course(2), THERE, |_| ()), Err(StartError::Open(_))));
         assert!(matches!(start(&course(1), THERE, |_| ()), Err(StartError::Elsewhere(_))));
     }

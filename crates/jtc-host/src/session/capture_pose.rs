@@ -11,7 +11,8 @@ use crate::{labels, sample};
 
 /// Maximum movement during [`WATCHED`] of an arm that is considered at rest, rad. At the slowest jog, the arm moves twice this distance.
 const STILL: f64 = 1.2e-3;
-/// Time for which the arm is observed. A slow jog does not appear in any field of the status.
+/// Time for which the arm is observed. A slow jog does not appear in any field of a single status, but it changes the
+/// positions during this time.
 const WATCHED: Duration = Duration::from_millis(250);
 
 impl<P: Port> Session<P> {
@@ -82,7 +83,7 @@ mod tests {
         }
         let executing = Status { trajectory: TrajectoryState::Execute.into(), ..at(0.5) };
         assert_eq!(stands(&executing, &executing).unwrap_err().diagnosis().kind, ErrorKind::Refused);
-        // An arm may be at rest while it is guided by hand or paused.
+        // A pose can also be saved while a motion is paused, if the arm is at rest.
         stands(&at(0.5), &Status { trajectory: TrajectoryState::Pause.into(), ..at(0.5) }).unwrap();
     }
 }

@@ -10,9 +10,10 @@ const DELAY_S: f64 = 0.1;
 /// different times.
 const APART_S: f64 = 1e-6;
 
-/// Clock for statuses. While the arm moves along the path, the clock uses the millisecond count of the controller, which has no
-/// transmission jitter. At all other times, the clock uses the arrival time of the status. At a reduced speed the path time runs slower
-/// (J-57). Therefore the time of the clock differs from the arrival time by at most 0.1 s.
+/// Clock for statuses. While the arm moves along the path, the clock uses the millisecond count of the controller,
+/// which has no transmission jitter. At all other times, the clock uses the arrival time of the status. At a reduced
+/// speed, the path time runs slower than real time (J-57). Therefore the difference between the clock and the arrival
+/// time is limited to 0.1 s.
 pub struct StatusClock {
     start: Duration,
     arrived: Duration,
@@ -58,7 +59,7 @@ mod tests {
 
     #[test]
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
-        // Different transmission delays have no effect.
+        // The statuses arrive with different delays. The times of the clock are still exactly the path times.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
         // The arm moves at half of the full speed, and is then at rest.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();

@@ -86,7 +86,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Clears current and occurred errors.
+    /// Clears the current errors and the errors that occurred earlier.
     ///
     /// # Errors
     ///
@@ -95,7 +95,7 @@ impl<P: Port> Session<P> {
         self.command(&fixed::CLEAR_OCCURRED_ERRORS)
     }
 
-    /// Clears the current errors of the controller and of all nodes, and the occurred errors.
+    /// Clears the current errors of the controller and of all nodes, and the errors that occurred earlier.
     ///
     /// # Errors
     ///
@@ -281,7 +281,7 @@ impl<P: Port> Session<P> {
     /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because the arm may then be moving.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
-        // The session sends no other frame before a Stop or a Pause.
+        // A Stop or a Pause must not be delayed by another frame.
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;
@@ -290,15 +290,15 @@ impl<P: Port> Session<P> {
         let retries = self.statistics.retries;
         let mut record = match self.request(&fixed::exec(command)) {
             Ok(record) => record,
-            // The command took effect, and only the record of the command was lost.
+            // The status shows that the command took effect, so only its response record was lost.
             Err(LinkError::NotConfirmed { .. }) if !stopping && self.last.is_some_and(|s| reached(&s)) => {
                 return Ok(());
             }
             Err(error) => return Err(self.link_lost(error, command == ExecCommand::Stop)),
         };
         if stopping && record.data == DataStatus::IncorrectValue {
-            // Without an earlier extension request, the controller reports only a general code (J-51). The controller's state is the only
-            // reason why it rejects a Stop or a Pause.
+            // Without an earlier extension request, the controller reports only the general code "incorrect value"
+            // (J-51). The controller rejects a Stop or a Pause only because of its state, so the code is replaced.
             record.data = DataStatus::NotAllowed;
         }
         if accepted(&record) {

@@ -21,7 +21,7 @@ pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Maximum time that a device needs to store an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);
 
-/// State of the session's knowledge about the extensions of the device.
+/// Knowledge of the session about the extensions of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Extensions {
     /// The session has not sent an extension request yet.
@@ -83,7 +83,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.info() {
-            // The error is ignored. Statuses still arrive, so the next command may succeed.
+            // The missing answer is not treated as an error. Statuses still arrive, so the next command may succeed.
             Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
@@ -127,7 +127,7 @@ impl<P: Port> Session<P> {
         for _ in 0..self.timeouts.tries {
             self.answers.clear();
             self.extension(frame)?;
-            // The answer arrives after the record of the request.
+            // The answer arrives after the response record of the request.
             let mut limit = Limit::new(self.confirmation_time(jtc_wire::ANSWER_MAX));
             loop {
                 while let Some(bytes) = self.answers.pop_front() {
@@ -335,8 +335,8 @@ impl<P: Port> Session<P> {
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
         let halts = self.port.halts();
         match self.extension(&frame) {
-            // A Stop of another program was executed before this frame (J-04). The session sends the frame again only to get the reason.
-            // The port blocks the frame, and the error of the port contains the program that stopped the arm.
+            // The controller executed another program's Stop before this frame (J-04). The session sends the frame
+            // again only to get the reason: the port rejects it with an error that names the other program.
             Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
             done => Ok(done?),
         }

@@ -95,7 +95,8 @@ impl<P: Port> Session<P> {
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
                 (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
-                // The controller has deleted the trajectory, or has returned to Start or Init.
+                // The controller has deleted the trajectory, or has returned to Start or Init. Therefore the run has
+                // failed.
                 (Some(TrajectoryState::Null), _)
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>
@@ -104,7 +105,8 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
-            // After a requested Stop, the motion must not continue, even if the user presses a key or another client pauses the motion.
+            // After a Stop was requested, the motion must not continue. A Pause or Resume from the user is ignored.
+            // If another client pauses the motion, the session sends the Stop again.
             let again = stopping && status.trajectory == TrajectoryState::Pause;
             let flow = match flow {
                 _ if again => Flow::Stop,
@@ -156,7 +158,8 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the occurred errors of the joints. These errors include errors to which the controller itself reacts (J-66).
+/// Returns the errors of the joints that have occurred since the errors were last cleared. These errors include
+/// errors to which the controller itself reacts (J-66).
 fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }

@@ -33,7 +33,7 @@ impl Limit {
 mod tests {
     use super::*;
 
-    /// Returns the total time of all waits until the limit ends. Each wait takes `share` of its planned length.
+    /// Returns the total time of all waits until the limit ends. Each wait lasts `share` times its planned length.
     fn waited(limit_ms: u64, share: f64) -> Duration {
         let mut limit = Limit::new(Duration::from_millis(limit_ms));
         let mut all = Duration::ZERO;

@@ -108,7 +108,8 @@ impl<P: Port> Session<P> {
         let under_torque = state.is_in(&[ControllerState::HoldPos, ControllerState::Teaching]);
         let Some(reactions) = self.reactions().filter(|_| under_torque) else { return Ok(false) };
         begun();
-        // Age of an earlier held stop, if there is one. A held stop because of the trial has a smaller age.
+        // Age of the last held stop before the trial, if there is one. A held stop that the trial causes is more
+        // recent, so its age is smaller.
         let before = age(reactions).unwrap_or(u32::MAX);
         let end = self.port.now() + TRIAL;
         while self.port.now() < end {

@@ -31,7 +31,8 @@ impl<P: Port> Session<P> {
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
         let values: Vec<_> = settings::payload_values(payload).collect();
-        // Every controller rejects this payload.
+        // The payload is checked with the default settings. A value that is out of range here is out of range for
+        // every controller.
         let alone = settings::with_values(&Config::avena(), values.iter().copied());
         if let Err(settings::SettingError::Value { .. }) = alone.as_ref() {
             return Err(

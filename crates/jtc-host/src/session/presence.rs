@@ -66,7 +66,7 @@ impl Presence {
         }
     }
 
-    /// Returns `true` if the arm moves because of a command of this session.
+    /// Returns `true` if the arm moves, or teaching is about to begin, because of a command of this session.
     fn is_shown(&self) -> bool {
         self.commanded.is_some() && (self.moves || self.waits)
     }
@@ -79,7 +79,7 @@ impl Presence {
         }
     }
 
-    /// Evaluates an answer. If the record answers a GetInfo, returns the time at which that GetInfo was sent.
+    /// Evaluates an answer. If the answer belongs to a GetInfo, returns the time at which that GetInfo was sent.
     pub(super) fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
         match answer {
             Answer::Info(_) => {

@@ -51,14 +51,17 @@ impl<P: Port> Session<P> {
         Ok(pushed)
     }
 
-    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm. The arm has no torque
-    /// during the transfer. A controller with friction, gains and model leaves Init and holds the arm. Therefore this function withdraws
-    /// the parameters that it has already sent before it sends the last of the three parameters.
+    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm.
+    /// The arm has no torque during the transfer.
+    ///
+    /// A controller that has received friction, gains and model leaves Init and holds the arm. To prevent this, the
+    /// function first withdraws the parameters that it has already sent, and then sends the last of the three
+    /// parameters.
     ///
     /// # Errors
     ///
-    /// Returns [`ExtensionError::Powered`], before a frame is sent, if the controller is neither in Init nor in Error. Also returns the
-    /// errors of [`Session::push_arm`] and [`Session::store_arm`].
+    /// Returns [`ExtensionError::Powered`], before a frame is sent, if the controller is neither in Init nor in
+    /// Error. Also returns the errors of [`Session::push_arm`] and [`Session::store_arm`].
     pub fn push_and_store_arm(
         &mut self,
         arm: &Arm,

@@ -26,7 +26,7 @@ const START_TIME: Duration = Duration::from_secs(3);
 const STOP_TIME: Duration = Duration::from_secs(5);
 /// Time from the reset of a node until it answers.
 const BOOT: Duration = Duration::from_secs(1);
-/// Maximum time from the confirmation of a parameter until a status shows it.
+/// Maximum time from the confirmation of a parameter until a status shows that the controller has the parameter.
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
@@ -185,7 +185,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,
-                // This program does not know the state of the controller, so the recovery ends.
+                // The controller is in a state that this program does not know, so the recovery ends.
                 None => break,
             }
             status = self.session.fresh_status()?;
@@ -287,7 +287,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 }
 
-/// Returns the nodes that themselves report a fault.
+/// Returns the nodes that report a fault of their own.
 fn faulty(s: &Status) -> u8 {
     let joints = s
         .joints

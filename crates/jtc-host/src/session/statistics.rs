@@ -13,7 +13,7 @@ pub struct LinkStatistics {
     pub statuses: u64,
     /// Bytes from the controller that are not part of a status.
     pub bad_bytes: u64,
-    /// Records of frames that the controller received damaged.
+    /// Number of frames that the controller reported as damaged.
     pub bad_frames: u64,
     /// Frames that were repeated.
     pub retries: u64,

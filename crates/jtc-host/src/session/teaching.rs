@@ -9,16 +9,17 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Records the positions of the joints in Teaching until `ended` returns `true` for the time since the start of the recording, or
-    /// `sample` returns [`ControlFlow::Break`].
+    /// Records the positions of the joints in Teaching until `ended` returns `true` or `sample` returns
+    /// [`ControlFlow::Break`].
     ///
-    /// `sample` receives the positions (rad) of each status, and the time since the start of the recording. This function does not begin
-    /// or end Teaching.
+    /// `ended` receives the time since the start of the recording. `sample` receives the positions (rad) of each
+    /// status, and the time since the start of the recording. This function does not begin or end Teaching.
     ///
     /// # Errors
     ///
-    /// [`LinkError`](crate::LinkError) if no status arrives; [`StateError::TeachingFault`] if the controller reports errors;
-    /// [`StateError::TeachingEnded`] if Teaching ends, for example because of a Stop of another program.
+    /// Returns [`LinkError`](crate::LinkError) if no status arrives, and [`StateError::TeachingFault`] if the
+    /// controller reports errors. Returns [`StateError::TeachingEnded`] if Teaching ends, for example because of a
+    /// Stop of another program.
     pub fn record_teaching(
         &mut self,
         ended: impl Fn(Duration) -> bool,

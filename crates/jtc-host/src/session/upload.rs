@@ -20,7 +20,7 @@ use crate::trajectory::UploadOptions;
 const SEGMENT_TRIES: u32 = 16;
 /// Maximum number of restarts of the complete upload.
 const RESTARTS: u32 = 3;
-/// Maximum number of segments in flight. The controller can queue one more record than this number.
+/// Maximum number of segments in flight. The controller can queue one response record more than this number.
 const WINDOW_MAX: usize = 7;
 
 /// Progress of an upload.
@@ -82,7 +82,7 @@ struct Upload {
     confirmed: usize,
     next: usize,
     in_flight: VecDeque<InFlight>,
-    /// Bytes of the current frame that are not yet written.
+    /// Frame that is being written: index of the frame, and number of its bytes that are already written.
     writing: Option<(usize, usize)>,
     line_done: Duration,
     /// `true` while segments are sent one at a time, because the state of the controller is unknown.
@@ -286,7 +286,7 @@ impl<P: Port> Session<P> {
         Ok(false)
     }
 
-    /// Writes the next part of a frame or waits for a record. Returns `true` if a segment was confirmed.
+    /// Writes the next part of a frame or waits for a response record. Returns `true` if a segment was confirmed.
     fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
         if up.writing.is_none() && up.may_send() {
             if up.next == 0 {
@@ -367,7 +367,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Handles a record that did not arrive in time.
+    /// Handles a response record that did not arrive in time.
     fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
         if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
@@ -386,7 +386,8 @@ impl<P: Port> Session<P> {
         self.start_over(up)
     }
 
-    /// Waits for the records of the frames in flight. Then returns to the first segment that is not confirmed.
+    /// Waits for the response records of the frames in flight. Then returns to the first segment that is not
+    /// confirmed.
     fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
         if up.tries >= SEGMENT_TRIES {
             return Err(self.upload_failed(up).into());
@@ -396,7 +397,8 @@ impl<P: Port> Session<P> {
             self.statistics.bytes_sent += (up.frames[index].len() - at) as u64;
         }
         let quiet = up.line_done.max(self.port.now()) + line_time(2 * STATUS_LEN, self.port.baud());
-        // The controller sends a record directly after it receives the frame. A late record may take one more status period.
+        // The controller sends a response record directly after it receives the frame. A late response record may
+        // take one more status period.
         let end = quiet + Duration::from_millis(60);
         loop {
             let now = self.port.now();

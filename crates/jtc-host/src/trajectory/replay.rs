@@ -15,8 +15,8 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Minimum spacing of the points of a path, ms. If two consecutive points of a path are this far apart or farther, all points of the path
-/// are kept.
+/// Spacing to which the points of a dense path are reduced, ms. If two consecutive points are this far apart or
+/// farther, the path is not dense, and all its points are kept.
 const GRID_MS: u32 = 10;
 
 /// Spacing of measured positions, s. With a smaller spacing, encoder noise would look like motion.
@@ -79,7 +79,7 @@ fn held(recording: &Recording) -> Option<Loaded> {
 fn read(path: &Path) -> Result<Recording, FileError> {
     Recording::read(path).map_err(|e| match e {
         RecordingError::Io { path, source } => FileError::Io { path, source },
-        // The error message begins with the name of the file.
+        // The error message may begin with the name of the file, which is removed here.
         other => {
             let words = other.to_string();
             let name = path.display().to_string();
@@ -173,8 +173,9 @@ struct Seen {
 }
 
 impl Seen {
-    /// Returns the path with a point every 10 ms, and both ends of the path. A path with a point at each millisecond may have more points
-    /// than the controller can store.
+    /// Reduces a dense path to a point every 10 ms and both ends. Otherwise a path with a point at each millisecond
+    /// could have more points than the controller can store. A path with a gap of 10 ms or more is returned
+    /// unchanged.
     fn thinned(self) -> Self {
         let last = self.ms.len().saturating_sub(1);
         if self.ms.iter().zip(self.ms.iter().skip(1)).any(|(a, b)| b - a >= GRID_MS) {
@@ -262,7 +263,7 @@ mod tests {
         let s = f64::from(point) / 2_000.0;
         let q = 0.3 * s * s * (3.0 - 2.0 * s);
         let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
-        // The host times have no meaning in virtual time.
+        // The host times have no meaning in virtual time, so the sample contains no time.
         Sample { trajectory: trajectory.into(), point, joints: [joint; JOINTS], ..Sample::default() }
     }
 
@@ -278,7 +279,8 @@ mod tests {
         let loaded = executed(&samples).unwrap();
         assert_eq!(loaded.form, Form::Recording);
         assert!((loaded.trajectory.duration_s() - 2.0).abs() < 1e-9);
-        // The last 40 ms of the path are not in the recording.
+        // Some samples are missing in the recording, among them the last 40 ms of the path. The extracted path
+        // deviates from the real path by less than 2 mrad.
         for (i, point) in loaded.trajectory.points.iter().enumerate() {
             let s = i as f64 * f64::from(loaded.trajectory.step_ms) / 2_000.0;
             let q = 0.3 * s * s * (3.0 - 2.0 * s);

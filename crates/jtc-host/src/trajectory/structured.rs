@@ -79,7 +79,8 @@ pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<
 }
 
 pub(super) fn read_yaml(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    // A trajectory of 12,000 points has about 300,000 YAML nodes.
+    // A trajectory of 12,000 points has about 300,000 YAML nodes, so the reader must accept more nodes than by
+    // default.
     let options = serde_saphyr::options! {
         budget: serde_saphyr::budget! { max_nodes: 2_000_000, max_events: 4_000_000 },
         with_snippet: false,

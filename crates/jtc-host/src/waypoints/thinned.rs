@@ -1,11 +1,11 @@
-//! Reduction of the number of positions of a recorded motion. Every removed position is close to a straight leg between two remaining
-//! positions.
+//! Reduction of the number of positions of a recorded motion. Every removed position is close to the straight segment
+//! between two remaining positions.
 
 use jtc_core::JOINTS;
 
-/// Returns the indices of the `positions` (rad) that remain after the reduction. For every removed position, the distance from the straight
-/// leg between its remaining neighbours is at most `tolerance` (rad) in every joint. The first and the last position always remain (Ramer
-/// 1972; Douglas & Peucker 1973).
+/// Returns the indices of the `positions` (rad) that remain after the reduction. For every removed position, the
+/// distance from the straight segment between its remaining neighbours is at most `tolerance` (rad) in every joint.
+/// The first and the last position always remain (Ramer 1972; Douglas & Peucker 1973).
 pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     let last = positions.len().saturating_sub(1);
     let mut keep = vec![false; positions.len()];
@@ -27,7 +27,8 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     (0..positions.len()).filter(|i| keep[*i]).collect()
 }
 
-/// Returns the distance from `p` to the nearest point of the leg between `a` and `b`. The distance is the largest distance of a joint, rad.
+/// Returns the distance from `p` to the nearest point of the segment between `a` and `b`. The distance is the largest
+/// distance of a joint, rad.
 fn distance(p: &[f64; JOINTS], a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
     let dot =
         |u: &dyn Fn(usize) -> f64, v: &dyn Fn(usize) -> f64| (0..JOINTS).map(|j| u(j) * v(j)).sum::<f64>();
@@ -44,7 +45,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// After thinning a random path, every removed position is near a leg between two remaining positions.
+        /// After thinning a random path, every removed position is near a segment between two remaining positions.
         #[test]
         fn what_is_left_out_is_within_the_tolerance(
             steps in prop::collection::vec(prop::array::uniform6(-0.1..0.1f64), 2..80),
@@ -63,7 +64,7 @@ mod tests {
             for leg in kept.windows(2) {
                 let (a, b) = (&positions[leg[0]], &positions[leg[1]]);
                 for p in &positions[leg[0]..=leg[1]] {
-                    // The test compares the formula with a search over many points of the leg.
+                    // The test compares the formula with a search over many points of the segment.
                     let near = (0..=1000)
                         .map(|k| {
                             let u = f64::from(k) / 1000.0;

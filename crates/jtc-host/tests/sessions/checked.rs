@@ -115,7 +115,8 @@ fn only_what_was_uploaded_is_executed() {
     };
     refused(&mut s, &first);
     s.upload(&first, |_| Flow::Continue).unwrap();
-    // The points are equal, but they belong to another check, which may have used another arm.
+    // The points are equal, but they belong to another check. The other check may have used another arm, so the
+    // session refuses to execute them.
     refused(&mut s, &second);
     s.upload(&second, |_| Flow::Continue).unwrap();
     refused(&mut s, &first);

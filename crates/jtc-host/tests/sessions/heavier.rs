@@ -9,7 +9,8 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session};
 use jtc_sim::{ModelError, SimConfig, World};
 
-/// Returns the joint positions for this number. Different numbers give different positions.
+/// Returns the pose that belongs to this number, within the limits of the arm. Different numbers give different
+/// poses.
 fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     let config = arm.config();
     std::array::from_fn(|j| {

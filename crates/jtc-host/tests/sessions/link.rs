@@ -50,7 +50,7 @@ fn parameters_go_over_and_the_controller_becomes_ready() {
     let arm = Arm::avena();
     let file = ParameterFile { polynomial: arm.polynomial, table: arm.table, ..ParameterFile::default() };
     let table = s.push(&file.parameter_set(FrictionChoice::Table), |_| {}).unwrap();
-    // The client sends the long frame twice, and the controller confirms both transmissions.
+    // The client sends the frame of the friction table twice, and the controller confirms both transmissions.
     assert_eq!((table[0].times, table[0].bytes), (2, 10_566));
     assert_eq!(s.fresh_status().unwrap().friction_type, 1);
     let pushed = s.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
@@ -105,8 +105,8 @@ impl Port for Noisy {
     }
 }
 
-/// J-04: the controller sends each record only once. If a record is lost on the way to the host, an upload or a command
-/// must not fail.
+/// J-04: the controller sends each response record only once. If a response record is lost on the way to the host, an
+/// upload or a command must not fail.
 #[test]
 fn j04_lost_confirmations_are_survived() {
     for seed in 1..6 {
@@ -225,7 +225,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     let diagnosis = error.diagnosis();
     assert_eq!((diagnosis.kind, diagnosis.code), (ErrorKind::NoLink, "no-link"));
     assert_eq!(silent.clear(true, 0).unwrap_err().diagnosis().kind, ErrorKind::NoLink);
-    // The port is a regular file.
+    // `Cargo.toml` is a regular file, so it cannot be opened as a port.
     let error = jtc_host::port::SerialPort::open("Cargo.toml", 115_200).map(drop).unwrap_err();
     assert_eq!(error.to_string(), "Cargo.toml is no serial port");
     let mut s = ready(Some(921_600));

@@ -69,7 +69,7 @@ fn j59_a_session_that_watches_its_teaching_keeps_it_going() {
     }
 }
 
-/// The controller answers the other requests of a session that also sends presence requests.
+/// The controller also answers the other requests of a session that repeats GetInfo during a motion.
 #[test]
 fn j50_requests_wait_for_the_answer_that_is_on_its_way() {
     let mut s = supervised(100, Some(115_200));
@@ -87,7 +87,7 @@ fn j59_a_motion_whose_session_has_gone_is_paused() {
         begin(&mut s);
         s.pass(Duration::from_millis(500)).unwrap();
         assert_eq!(s.last().unwrap().trajectory, TrajectoryState::Execute);
-        // A second session on this port sends nothing.
+        // A second session on this port only observes and sends nothing. Therefore the controller pauses the motion.
         let mut watching: Session<SimPort> = Session::new(s.into_port());
         watching.pass(Duration::from_millis(u64::from(ms) + 1000)).unwrap();
         let status = watching.last().copied().unwrap();

@@ -150,8 +150,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // The controller holds the weight of the arm with the present parameters, so the recovery sends no other parameters. A step of the
-    // recovery reports that the recovery sends no parameters.
+    // The controller holds the weight of the arm with the present parameters, so the recovery sends no other
+    // parameters. The recovery reports this as a step.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -171,8 +171,7 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
-    // If the user selects no arm, the controller keeps its parameters. A step of the recovery reports that the recovery sends no
-    // parameters.
+    // If the user selects no arm, the controller keeps its parameters. The recovery reports this as a step.
     fail(&mut s, FaultKind::SafetyInput, 500);
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();

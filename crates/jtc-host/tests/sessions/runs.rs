@@ -16,12 +16,12 @@ use super::{Sim, motion, ready};
 struct Diary {
     steps: Vec<String>,
     samples: Rc<RefCell<usize>>,
-    /// After this number of calls, `is_cancelled` returns `true`.
+    /// Number of calls after which `is_cancelled` returns `true`.
     cancels_at: Option<usize>,
     asked: usize,
     /// Point of the motion at which the front end requests a stop, ms.
     stops_at: Option<u32>,
-    /// If `true`, the front end requests full speed at each status during the motion.
+    /// `true` if the front end requests full speed at each status during the motion.
     speeds: bool,
     /// Number of statuses during the motion, and number of requested actions that were applied.
     statuses: usize,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_host::session::Flow;
 use jtc_host::{Diagnose, Error, ErrorKind, MotionError};
 
-/// Bytes that the session wrote. The scripted controller sends nothing or repeats one status.
+/// Scripted controller that answers the session and records the bytes that the session writes.
 mod answers {
     use std::cell::RefCell;
     use std::rc::Rc;
@@ -19,8 +19,8 @@ mod answers {
 
     pub(super) type Written = Rc<RefCell<Vec<u8>>>;
 
-    /// Simulates a controller that answers each frame with `status` and the frame's record, and sends a status every 40
-    /// ms. After the time `end`, the controller sends nothing.
+    /// Simulates a controller that answers each frame with `status` and the response record of the frame. The
+    /// controller also sends a status every 40 ms. After the time `end`, the controller sends nothing.
     pub(super) fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
         let written = Written::default();
         let taken = Rc::clone(&written);
@@ -69,7 +69,8 @@ fn j34_resume_only_after_a_pause() {
             "{error}"
         );
         assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
-        // A repeated command can succeed only if the motion may still be decelerating.
+        // The error suggests to repeat Resume only if the motion may still be decelerating (trajectory state
+        // Execute).
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
     let (mut s, written) = answers::session(
@@ -128,8 +129,8 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!(written.borrow().len(), 0);
 }
 
-/// A frame without a record may have arrived, and a Stop from another line may then have stopped the arm. Therefore a frame that moves or
-/// releases the arm is sent again only if the record of the frame reports damage.
+/// A frame without a response record may have arrived, and a Stop from another line may then have stopped the arm.
+/// Therefore a frame that moves or releases the arm is sent again only if its response record reports damage.
 #[test]
 fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
@@ -138,8 +139,8 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // `records` contains the records for this frame, in order. Later frames receive no record. `done` is `true` if the controller executes
-    // the frame.
+    // `records` contains the results in the response records for this frame, in order. Later frames receive no
+    // response record. `done` is `true` if the controller executes the frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);

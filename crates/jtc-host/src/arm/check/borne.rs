@@ -11,8 +11,8 @@ use crate::arm::statics::{POSES, pose};
 
 /// Heaviest payload for the check of the damping, kg.
 const PAYLOAD_MAX: f64 = 5.0;
-/// Average delay of a torque that stays constant for one tick, s. The check adds this delay to the delay in the controller's settings.
-/// `TICK` is the duration of one controller tick, s.
+/// Mean delay of a torque that stays constant for one tick, s. The check adds this mean delay to the delay in the
+/// controller's settings. `TICK` is the duration of one controller tick, s.
 const HALF_A_TICK: f64 = 0.5e-3;
 const TICK: f64 = 1e-3;
 
@@ -73,7 +73,8 @@ impl Arm {
             "{}: Kd {kd} N·m·s/rad does not damp the joint{with}, expected at least {needed:.1}",
             self.titled(joint)
         );
-        // The delay of Kp reduces the effective Kd. The advised integral gain is small enough for the remaining damping.
+        // A part of Kd only compensates the delay of Kp. The advised Ki is so small that the remaining part of Kd
+        // still damps the joint.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(

@@ -8,7 +8,8 @@ use super::{ArmFinding, Holding};
 use crate::arm::Arm;
 use crate::arm::statics::{Worst, worst_gravity};
 
-/// Share of the torque limit that gravity may use. Above this share, the remaining torque is low for motions.
+/// Share of the torque limit above which the check warns about the gravity torque, because little torque is left for
+/// motions.
 const LITTLE_LEFT: f64 = 0.8;
 /// If the greatest torque limit exceeds the greatest gravity torque by this factor, the unit of the limits is probably
 /// wrong.

@@ -11,7 +11,8 @@ use crate::arm::statics::{Inertia, inertia};
 use crate::arm::{Arm, RotorMargin, Source};
 use crate::error::ParametersError;
 
-/// Ranges of the rotor inertias in which the gains are stable, as factors of the values in the file.
+/// Ranges of the rotor inertias in which the gains are stable. Each range is given as factors of the values in the
+/// file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RotorMargins {
     /// Allowed factors if all rotor inertias change by the same factor.

@@ -1,4 +1,4 @@
-//! Tests that each fault of an arm causes exactly the finding about this fault.
+//! Tests that each fault of an arm causes exactly one finding, which is about this fault.
 
 use proptest::prelude::*;
 
@@ -91,7 +91,8 @@ fn an_arm_that_its_drives_cannot_hold_is_named_with_joint_pose_and_share() {
     assert!(f.finding.what.contains("N·m of 100 N·m (132 %) at q = ("), "{}", f.finding.what);
     let tight = found(&of("torque_max_nm = 180.0", "torque_max_nm = 150.0"));
     assert_eq!(tight, [("holding", Severity::Warning, Some(2))]);
-    // The narrower position ranges do not contain the poses with the greatest gravity torque.
+    // With these narrower position ranges, the arm cannot reach the poses with the greatest gravity torque. Therefore
+    // a torque limit of 100 N·m is enough to hold the arm.
     let narrow = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
     let mut narrow = Arm { ..narrow };
     (narrow.joints[1].position_min, narrow.joints[1].position_max) = (-0.3, 0.3);

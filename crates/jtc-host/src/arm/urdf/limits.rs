@@ -77,8 +77,8 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
 }
 
 impl Chain<'_> {
-    /// Returns the limits of all six joints. If a limit is missing, the limit of the default arm or of the drives is used, and the value is
-    /// marked as a default.
+    /// Returns the limits of all six joints. A missing limit is replaced by the limit of the default arm or of the
+    /// drives, and is marked as a default.
     pub(super) fn limits(&mut self) -> Result<[JointConfig; JOINTS], FileError> {
         let mut all = Arm::avena().joints;
         for (number, joint) in Number::ALL.into_iter().zip(self.rotary) {

@@ -142,7 +142,7 @@ fn any_part() -> impl Strategy<Value = Part> {
 }
 
 proptest! {
-    /// Gravity torques are the gradient of the potential energy of the description.
+    /// The gravity torques of the imported arm equal the gradient of the potential energy in the description.
     #[test]
     fn j40_any_axis_and_any_origin_are_the_same_arm(
         parts in prop::collection::vec(any_part(), 6),
@@ -150,7 +150,8 @@ proptest! {
     ) {
         let gravity = [0.7, -1.3, -9.6];
         let arm = Arm::from_urdf(&robot(&parts, "")).unwrap();
-        // If an angle is within 2 µrad of a multiple of π/2, the arm dynamics use the multiple of π/2.
+        // The arm dynamics round an angle within 2 µrad of a multiple of π/2 to this multiple. The test skips arms
+        // with such angles.
         let off = |angle: f64| (angle - FRAC_PI_2 * (angle / FRAC_PI_2).round()).abs();
         let angles = arm.model.joints.iter().flat_map(|origin| origin.rpy);
         prop_assume!(angles.map(off).all(|off| !(1e-9..3e-6).contains(&off)));
@@ -201,8 +202,8 @@ fn j40_fingers_and_what_follows_them_are_left_out() {
     let finger = joint("left", "prismatic", ("b6", "l"), LIMIT) + &body("l", 0.1, &[0.0; 3]);
     let mimic = joint("right", "prismatic", ("b6", "r"), &format!("<mimic joint=\"left\"/>{LIMIT}"))
         + &body("r", 0.1, &[0.0; 3]);
-    // For a joint that mimics another joint, the user does not need to select the joints. For an additional joint that moves independently,
-    // the user must select the joints.
+    // The joint `right` follows a joint of the arm, so the user does not need to select the six joints. In the second
+    // description, a finger moves independently. Therefore the user must select the six joints.
     let follower = mimic.replace("\"left\"", "\"a1\"");
     let arm = Arm::from_urdf(&robot(&parts(), &follower)).unwrap();
     assert_eq!(
@@ -326,8 +327,8 @@ fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
     }
 }
 
-/// The reader keeps a position limit that is narrower than the limit of the drives. The reader marks a missing position limit. The reader
-/// reduces and marks a position limit of more than one turn.
+/// The reader keeps a position limit that is narrower than the limit of the drives. A missing limit is marked as a
+/// default. A limit of more than one turn is reduced and marked.
 #[test]
 fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     let second = |limits: &str| {

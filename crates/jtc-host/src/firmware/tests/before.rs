@@ -43,8 +43,8 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     for before in [asked(&board, Some(false)), asked(&board, None), Preflight::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
-    // A report on the line of another board does not count as a report of the drive's board. If the line of the drive's board is also
-    // queried, a report on another line has no effect.
+    // A report of another board does not replace the missing report of the drive's board. If the drive's board itself
+    // reports, the report of another board has no effect.
     board.hold(true);
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });
@@ -194,10 +194,11 @@ fn an_image_goes_onto_its_own_board_only() {
         ask_over("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), Some(false), none),
         Err("unnamed-board")
     );
-    // If the controller on the serial line runs on a board that does not match the image, flashing is refused, even if the operator
-    // confirms it.
+    // The controller on the serial line runs on a board that does not match the image. Flashing is refused, even with
+    // the confirmation of the operator.
     assert_eq!(ask(H745, &h745, Some("simulator"), all), Err("other-controller"));
-    // Software cannot detect the core supply of the board. A program that already runs on this board matches the core supply.
+    // Software cannot detect the core supply of the board. If a program already runs on this board, the core supply
+    // matches this program.
     let ldo = "nucleo-h745zi-q-ldo";
     for (board, other) in [(ldo, H745), (H745, ldo)] {
         assert_eq!(ask(board, &h745, None, none), Err("other-supply"));
@@ -211,8 +212,8 @@ fn an_image_goes_onto_its_own_board_only() {
     }
 }
 
-/// A controller with an unreadable report may run on any board, so its core supply is unknown. A device that never sends reports is a
-/// different case.
+/// The controller sends status frames, but its identity cannot be read. Therefore its board and its core supply are
+/// unknown, and flashing is refused until the operator confirms the supply.
 #[test]
 fn a_controller_that_does_not_report_its_board_has_an_unknown_supply() {
     let link = StLink::new("NOD_H745ZIQ", &Board::running(H745, None), Behaviour::Ignores);

@@ -1,5 +1,5 @@
-//! Describes frames as text. The decoder tracks answers that consist of several frames, because packages of strings and first frames of
-//! answers look alike.
+//! Describes frames as text. The decoder remembers the previous frames of an answer, because a later package of the
+//! answer can look like its first frame.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use ucom::{
 
 /// Description of a frame as text and JSON.
 pub struct Described {
-    /// Function of the frame, or the reason why the frame is foreign.
+    /// Function of the frame, or the reason why the frame is not a frame of this protocol.
     pub name: String,
     /// Sender of the frame: `PC`, `board 3`, or both if the identifier does not show the sender.
     pub who: String,
@@ -27,7 +27,7 @@ pub struct Decoder {
     answers: BTreeMap<(Function, Sequence), Answer>,
 }
 
-/// Parts of an answer that were received so far; the answer consists of several frames.
+/// Received frames of an answer that consists of several frames.
 struct Answer {
     strings: Box<StringAssembler>,
     /// Number of strings of the answer that are still missing; `None` before the first frame.

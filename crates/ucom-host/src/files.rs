@@ -1,4 +1,4 @@
-//! Files of the PC side: images, recordings, inventories, signal tables, parameters, DBC files.
+//! File formats of the PC tools: images, recordings, inventories, signal tables, parameters, DBC files.
 
 pub mod dbc;
 mod flash_record;

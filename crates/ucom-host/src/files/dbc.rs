@@ -20,7 +20,7 @@ use ucom::{Endian, Function, Sender, Sequence, Status};
 pub struct NamedSignal {
     /// Name of the signal. In the DBC file, the name is converted to an identifier.
     pub name: String,
-    /// Meaning of the word that carries this signal (D-11).
+    /// Type, scale, offset and unit of the 16-bit word that carries this signal (D-11).
     pub signal: Signal,
 }
 
@@ -223,7 +223,8 @@ fn message(text: &mut String, function: Function, number: Sequence, signals: Vec
     };
     let (sender, receiver) = match function.sender() {
         Sender::Board => (board.as_str(), "PC"),
-        // The sender of a broadcast is the PC. A board sends most other frames that contain its number.
+        // If both sides can send a function, the DBC file names the board as the sender. A frame with board number 0
+        // is a broadcast, which the PC sends.
         Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
         _ => ("PC", board.as_str()),
     };

@@ -33,7 +33,8 @@ pub fn image(data: &[u8]) {
 
 /// Reads recordings in every format. If the target reads a recording and writes it again in the same format, the recording is unchanged.
 pub fn recording(data: &[u8]) {
-    // Text formats store times in whole microseconds, and a recording that this program writes is complete.
+    // Prepares a recording for the comparison: text formats store times in whole microseconds, and a file that this
+    // program writes is complete.
     let as_written = |recording: &mut Recording| {
         recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
         recording.broken_off = None;
@@ -71,7 +72,8 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Reads signal tables. For every signal, the displayed text of a word must be read as this word again, unless a limit forbids the word.
+/// Reads signal tables. For every signal, a word is displayed as text, and this text must convert back to the same
+/// word unless a limit forbids the word.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -85,7 +87,8 @@ pub fn edges(data: &[u8]) {
                         signal.text_with_unit(word).parse().expect("what is shown can be given");
                     let (again, text) = (signal.word(&given), signal.text(word));
                     let limited = signal.min.is_some() || signal.max.is_some();
-                    // If the offset is far larger than the scale, a displayed value has too few digits to distinguish words.
+                    // If the offset is more than 1e9 times the scale, the displayed values of neighbouring words can
+                    // be equal.
                     let coarse = signal.offset.abs() > signal.scale.abs() * 1e9;
                     // A scaled signal without a unit accepts only raw words.
                     let no_unit = signal.unit.is_empty() && (signal.scale != 1.0 || signal.offset != 0.0);

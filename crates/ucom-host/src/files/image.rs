@@ -23,9 +23,9 @@ use segments::Segments;
 /// Largest size of an image, in bytes, unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// Minimum number of consecutive records that show the unit of the addresses: fewer records can follow one another by coincidence. A single
-/// gap as long as the record before the gap may be intended. In a table of interrupt vectors, a gap may follow every entry, but the records
-/// of such tables are short.
+/// Minimum number of consecutive records that show the unit of the addresses. Fewer records can follow one another by
+/// coincidence: a file may contain an intended gap that is as long as a record. In a table of interrupt vectors, such
+/// a gap may follow every entry, but the records of these tables are short (see `EVIDENCE_BYTES`).
 const EVIDENCE: usize = 3;
 /// Minimum average length, in bytes, of the records that show the unit of the addresses. Linkers write records of 16 bytes and more.
 const EVIDENCE_BYTES: usize = 12;
@@ -138,7 +138,7 @@ pub enum ImageNote {
     },
     /// The last word had only one byte, so the reader added a byte 0xFF.
     LastWordPadded,
-    /// The file has no end record, but it ends with a count record whose number of data records is correct.
+    /// The file has no end record. Its last record is a count record, and the number in this count record is correct.
     EndedByCount {
         /// Number of data records in the file.
         records: u32,

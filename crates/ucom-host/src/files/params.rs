@@ -35,7 +35,7 @@ pub struct ParamsBoard {
     pub flash_number: Option<u16>,
     /// Name in the inventory that the board at this position must have. Each board in the file has a flash number, a name, or both.
     pub name: Option<String>,
-    /// Program ID to which the names of the signals apply; `None` for `any` in the file.
+    /// Program ID to which the names of the signals apply; `None` if the file contains `any`.
     pub program_id: Option<u16>,
     /// Parameters of the board.
     pub par: Vec<ParamsEntry>,

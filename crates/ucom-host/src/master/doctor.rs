@@ -220,7 +220,8 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         f.problem(shared.to_string(), SHARED_CAUSE, shared_remedy());
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // The PC read the other values of these boards in the wrong byte order, so the doctor derives no findings from these values.
+        // The PC has read the other values of these boards in the wrong byte order too. Therefore the doctor derives
+        // no findings from these values.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }

@@ -1,8 +1,8 @@
-//! Base on which all procedures of the master run. This module contains the clock, the queued frames, the mailboxes, the last known states
-//! of the boards, and the supervision of the boards.
+//! Foundation on which all procedures of the master run. This module contains the clock, the queued frames, the
+//! mailboxes, the last known states of the boards, and the supervision of the boards.
 //!
-//! Each file imports only files that come before it in this list: times, statistics, boards, holders, event, mailbox, shared, inputs,
-//! supervise, link.
+//! Each file imports only files that come before it in this list: times, statistics, boards, holders, event, mailbox,
+//! shared, inputs, supervise, link.
 mod boards;
 mod event;
 mod holders;

@@ -1,5 +1,5 @@
-//! Code of the fuzz targets: it runs a procedure, and random frames arrive at any time. A panic or an endless wait in the procedure is an
-//! error.
+//! Code of the fuzz targets: the target runs a procedure while random frames arrive at any time. A panic or an
+//! endless wait in the procedure is an error.
 use crate::master::engine::Event;
 use crate::master::interface::Master;
 use crate::master::reports::update::{UpdateImage, UpdateOptions, UpdateTarget};

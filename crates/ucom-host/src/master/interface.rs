@@ -79,8 +79,8 @@ impl Master {
         self.poll_behind(now, now)
     }
 
-    /// Like `poll`, for a driver that has delivered the frames received before the time `received`, but not the later frames. The master
-    /// ends waits only up to the time `received`, but sends heartbeats up to `now`.
+    /// Like `poll`, for a driver that has not delivered the frames received after the time `received` yet. Waits
+    /// of procedures end only up to the time `received`, but heartbeats are sent up to `now`.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -144,7 +144,8 @@ impl Master {
         lock(&self.core).competing_master
     }
 
-    /// Ends the heartbeats and the repeated inputs. Running boards then become safe by themselves (D-50).
+    /// Ends the heartbeats and the repeated inputs. Running boards then become safe by themselves, because the
+    /// heartbeats are missing (D-50).
     pub fn end_session(&mut self) {
         let mut core = lock(&self.core);
         core.session = Session::Quiet;
@@ -156,7 +157,8 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards share. Each number is returned as the error that ends a procedure.
+    /// Returns an error for each board number that two boards share. The same error ends a procedure that uses the
+    /// number.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
@@ -181,8 +183,8 @@ impl Master {
         Ok(index)
     }
 
-    /// Writes a parameter of a board whose description is known. The board does not answer, so the shadow stores the value as assumed
-    /// (D-35).
+    /// Writes a parameter of a board whose description is known. The board does not answer, so the PC's copy of the
+    /// parameters marks the value as assumed (D-35).
     pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Par, name)?;
         lock(&self.core).send_parameter(board, index, value);
@@ -228,8 +230,8 @@ impl Master {
         lock(&self.core).data.get(&board).map(|d| d.par.values().to_vec()).unwrap_or_default()
     }
 
-    /// Starts or stops reporting the sensor outputs of a board as [`Event::Snapshot`]. The caller must give `dimension` if the board's
-    /// description is not known.
+    /// Starts or stops reporting the sensor outputs of a board as [`Event::Snapshot`]. If the board's description is
+    /// not known, the caller must pass the number of outputs in `dimension`.
     pub fn watch(&mut self, board: u8, dimension: Option<u16>, on: bool) {
         let mut core = lock(&self.core);
         let data = core.data.entry(board & 31).or_default();

@@ -17,8 +17,8 @@ pub struct BusOff {
 }
 
 impl BusOff {
-    /// Returns the message for a new bus-off. The function returns `None` without a new bus-off, or if a bus-off was reported in the last 5
-    /// s.
+    /// Returns the message about a new bus-off. Returns `None` if there is no new bus-off, or if a bus-off was
+    /// reported in the last 5 s.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
         let new = times.saturating_sub(self.reported);
         if new == 0 || self.reported_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {

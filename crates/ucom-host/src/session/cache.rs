@@ -108,7 +108,7 @@ mod tests {
         let on_disk = Cache::new(Some(dir.path().join("new")), false);
         on_disk.write("a.json".into(), "1".into());
         let cache = on_disk.clone().in_memory();
-        // From this point on, the cache in memory does not read from the disk.
+        // The cache in memory has read all files already, so this change on the disk has no effect on it.
         on_disk.write("a.json".into(), "2".into());
         assert_eq!(cache.read("a.json").as_deref(), Some("1"));
         cache.write("b.json".into(), "3".into());

@@ -96,7 +96,7 @@ impl Driver {
         Ok(all)
     }
 
-    /// For several boards, checks that each board answers before the first board is changed.
+    /// Checks, for more than one board, that each board answers before the first board is changed.
     fn all_there(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let mut several = boards.iter().filter(|_| boards.len() > 1);
         several.try_for_each(|board| self.seen(*board).map(drop))

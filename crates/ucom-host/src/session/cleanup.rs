@@ -166,7 +166,7 @@ mod tests {
         Request::Stop { board, level: StopLevel::Application, force: true }
     }
 
-    /// An action stays on the list until it ends, even while another action runs inside it.
+    /// Boards that a finished run has started stay on the list until they are stopped.
     #[test]
     fn what_is_left_undone() {
         let cleanup = CleanupList::default();

@@ -189,7 +189,7 @@ impl Driver {
         }
     }
 
-    /// Records that all started boards have been stopped.
+    /// Removes all boards from the list of unfinished work, because all started boards have been stopped.
     pub fn nothing_is_left(&self) {
         self.cleanup.forget();
     }
@@ -250,7 +250,8 @@ impl Driver {
                 }));
                 numbers.sort_unstable();
                 if !numbers.is_empty() {
-                    // Reports boards on the bus that are not among these numbers, so that the user notices them.
+                    // Shows the other findings of the scan, for example boards without a number, so that the user
+                    // notices them.
                     let more = report.findings.iter().filter(|finding| finding.error().is_none());
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);

@@ -137,7 +137,7 @@ pub enum ValuesError {
         board: u8,
         /// Reason why the board may not have received the values.
         why: String,
-        /// Boards that were written before this board; `None` if the list does not apply.
+        /// Boards that were written before this board; `None` if only one board is concerned.
         written: Option<Vec<u8>>,
     },
     /// A parameter file cannot be read, or contains no value.
@@ -167,7 +167,7 @@ impl SessionError {
         matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
     }
 
-    /// Returns `true` if the board could answer after its application is started.
+    /// Returns `true` if the cause of the error is an application that exists but is not started.
     fn is_not_started(&self) -> bool {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }

@@ -17,7 +17,7 @@ use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, S
 const OLD_US: u64 = 500_000;
 /// Minimum time in µs between queries to a board that sends heartbeats but no outputs.
 const ASK_US: u64 = 1_000_000;
-/// Time in µs after which a run has ended if no board has been in its control loop.
+/// Time in µs without any board in its control loop after which a run has ended.
 const OVER_US: u64 = 3_000_000;
 
 /// Change of a board's state during a run.
@@ -96,7 +96,7 @@ impl Notice {
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// Start of the time in which no board has been in its control loop.
+    /// Time since which no board has been in its control loop, µs.
     nobody_since: Option<u64>,
 }
 
@@ -247,7 +247,8 @@ impl Followed {
     }
 }
 
-/// Returns `true` if the board's values are doubtful because heartbeats are missing.
+/// Returns `true` if the board's values are doubtful because heartbeats are missing or because the board has
+/// rebooted.
 fn in_doubt(board: &Board) -> bool {
     board.rebooted || matches!(board.life, Life::Late | Life::Lost)
 }
@@ -355,8 +356,8 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // The control loop of the board is restarted. The supervision does not consider earlier losses any more. Therefore, if the board
-        // leaves its control loop now, no loss counts as the reason.
+        // When the control loop of the board is restarted, earlier losses do not count any more. If the board then
+        // leaves its control loop, a loss is not reported as the reason.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);

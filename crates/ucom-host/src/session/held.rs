@@ -99,7 +99,7 @@ pub struct Session {
     pub driver: Driver,
     /// Cache of the signal names.
     pub cache: Cache,
-    /// Meanings of the signals' words.
+    /// Signal tables with the types, scales and units of the signals' words.
     pub signals: SignalTable,
     /// Started boards and data about them, shared with the operator of the driver.
     pub held: Rc<RefCell<Held>>,
@@ -176,9 +176,9 @@ impl Session {
         with_names(&cache, |cache| act(self, cache))
     }
 
-    /// Runs an action that starts or moves these boards. The boards are listed as started before any frame is sent, because the user may
-    /// end the action at any time. If the action fails, a board is removed from the list if no frame was sent to it or if it answers that
-    /// it is stopped.
+    /// Runs an action that starts or moves these boards. The boards are listed as started before any frame is sent,
+    /// because the user may end the action at any time. If the action fails, the function removes boards from the
+    /// list if no frame was sent to them or if they answer that they are stopped.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],
@@ -193,7 +193,7 @@ impl Session {
         let done = act(self);
         if done.is_err() {
             for board in boards.iter().filter(|board| !counted.contains(board)) {
-                // If this session is not the master, it has sent only queries.
+                // If this session is not the master, it has sent only queries, so the board was not started.
                 if !self.driver.master.is_master() || self.is_stopped(*board) {
                     self.runs_no_more(Some(*board));
                 }
@@ -257,8 +257,8 @@ impl Session {
         not_stopped
     }
 
-    /// Updates the state of the session after an update of boards. Boards that were written no longer run, unless the update has restarted
-    /// them.
+    /// Updates the state of the session after an update of boards. A board whose program was written does not run any
+    /// more, unless the update has restarted it.
     pub fn updated(&mut self, report: &UpdateReport, start: bool) {
         for result in report.boards.iter().filter(|_| !report.dry_run) {
             match result.outcome {

@@ -106,9 +106,11 @@ fn file(key: DescriptionKey) -> String {
 }
 
 impl Known {
-    /// Returns a word in the form that the master uses: by name, or by index if the name belongs to another signal.
+    /// Returns a word in the form that the master uses. The form contains the name of the signal, or the index if the
+    /// name also belongs to another signal.
     pub fn setting(&self, kind: Kind, word: &ParamsWord) -> Setting {
-        // The text of a signal may be the name of another signal, and so may its index.
+        // The name of a signal may also match the name or the index of another signal. In this case, the index is
+        // used instead of the name.
         let by_name = self.names.find(self.board, kind, &word.name) == Ok(word.index);
         let name = if by_name { word.name.clone() } else { format!("##{}", word.index) };
         Setting { name, value: word.word }

@@ -14,8 +14,8 @@ use crate::files::recording::{FrameKind, RecordedFrame};
 const COARSE: Duration = Duration::from_millis(12);
 /// Interval at which the bus is polled during a wait that is timed precisely.
 const LOOK: Duration = Duration::from_micros(100);
-/// Largest delay at the end of a sleep of the thread. The thread does not sleep during the last part of a wait,
-/// which has this length.
+/// Largest delay with which a sleep of the thread may end. The thread does not sleep during the last part of a wait,
+/// which has this length, but polls the bus.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// Open CAN bus with its clock.

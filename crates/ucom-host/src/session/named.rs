@@ -1,4 +1,4 @@
-//! Returns the values of boards as JSON, with the names of the signals.
+//! JSON form of the values of boards, with the names of the signals.
 
 use serde_json::{Map, Value, json};
 

@@ -1,5 +1,5 @@
-//! Bus with a short timeout for received frames. With the short timeout, the owner of the bus can check for requests often, so that a stop
-//! does not need to wait for a frame.
+//! Bus with a short timeout for received frames. The short timeout lets the owner of the bus check for requests
+//! often. A stop therefore does not need to wait for a frame.
 
 use std::time::Duration;
 

@@ -10,13 +10,14 @@ use crate::master::Master;
 
 /// Longest wait for a frame. The loop checks for Ctrl-C at this interval.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Limit of the frames that are delivered to the master before the due frames are sent. The time of the delivery is limited too. With these
-/// limits, the PC continues to send heartbeats on a flooded bus.
+/// Limit of the frames that are delivered to the master before the due frames are sent. The next constant limits the
+/// time of the delivery, µs. With these limits, the PC continues to send heartbeats on a flooded bus.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Limit of the frames that the PC sends before it handles received frames.
 const MOST_SENT: usize = 64;
-/// Age in µs above which frames are assumed to be delivered, if the bus is flooded permanently.
+/// Age in µs above which the loop assumes that frames were delivered to the master. The age is used only if the bus is
+/// flooded permanently.
 const BEHIND_US: u64 = 1_000_000;
 
 /// Interface to a bus with a clock.
@@ -74,7 +75,7 @@ impl Pump {
                         break;
                     }
                 }
-                // No further frame had arrived at the time `asked`.
+                // No frame was waiting, so all frames that arrived before the time `asked` have been delivered.
                 None if wait.is_zero() => {
                     self.received_us = asked;
                     return Ok(());
@@ -225,7 +226,7 @@ mod tests {
     #[test]
     fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);
-        // In this test each frame takes 5 µs.
+        // A frame arrives every 4 µs, but the PC needs 5 µs to receive a frame.
         bench.flood_us = Some(4);
         let mut master = Master::new(Profile::default());
         master.begin_session(0);

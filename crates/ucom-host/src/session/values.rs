@@ -42,7 +42,8 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     Ok(all)
 }
 
-/// Shows a note about values that lie between two words, because the nearer word is sent instead.
+/// Shows a note about values that no word can represent exactly, because the word with the nearest value is sent
+/// instead.
 pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     for word in words {
         if let Some(rounded) = &word.rounded {
@@ -105,8 +106,9 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops the applications that were started only to read signal names. If the action is refused, the boards are then in their previous
-    /// state. A second call of this function has no effect. Failures of a stop are shown to the operator.
+    /// Stops the applications that were started only to read signal names. A caller whose action is refused can use
+    /// this function to return the boards to their previous state. A second call of this function has no effect.
+    /// Failures of a stop are shown to the operator.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

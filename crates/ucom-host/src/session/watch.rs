@@ -184,7 +184,8 @@ impl Picture<'_> {
             next.push("ucom doctor".into());
         }
         let all = findings(&seen).into_iter();
-        // The view reports the silence of boards below, because the text depends on whether it has sent queries to the boards.
+        // The finding about a silent bus is skipped. The view reports silence below, with a text that depends on
+        // whether it has sent queries.
         for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
             let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
             let text = format!("{}{why}", finding.what);
@@ -194,7 +195,7 @@ impl Picture<'_> {
                 &mut problems.warnings
             };
             list.push(text);
-            // A hint that refers to this view itself is replaced.
+            // If the hint recommends `ucom monitor`, which is this view, another command is shown.
             let helps = finding.next.to_string();
             let own = helps.is_empty() || helps.contains("ucom monitor");
             next.push(if own { "ucom doctor".into() } else { helps });

@@ -237,7 +237,8 @@ impl Bench {
         }
     }
 
-    /// Starts a procedure and waits until it ends. The function panics if the procedure takes more than `limit_s` of virtual time.
+    /// Starts a procedure and waits until it ends. The function panics if the procedure takes more than `limit_s`
+    /// seconds of virtual time.
     pub(super) fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
         let id = self.master.start(self.now, request).expect("nothing else is under way");
         self.wait(id, limit_s)
@@ -295,7 +296,8 @@ impl Bench {
     }
 }
 
-/// Returns the frame with one wrong bit. A gateway that computes a new checksum forwards a frame with a wrong bit.
+/// Returns the frame with one wrong bit. On a real bus, such a frame can come from a gateway that computes a new
+/// checksum.
 fn corrupted(frame: &Frame, bit: u8) -> Frame {
     if frame.dlc() == 0 {
         return Frame::new(frame.id() ^ 1 << (bit % 11), &[]).unwrap();

@@ -13,7 +13,8 @@ pub(super) fn initialised(flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// P-2: the test numbers chains of 1, 3 and 31 boards. In a chain of 31 boards, PC_INIT(32) is not possible.
+/// P-2: the test numbers chains of 1, 3 and 31 boards. After the last board, the master sends PC_INIT with the next
+/// number, except after board 31, because number 32 does not exist.
 #[test]
 fn p2_init_of_real_boards() {
     for count in [1_u16, 3, 31] {

@@ -36,9 +36,9 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: this PC is the master, and another PC sends heartbeats with the number of a board that is not started. The master reports
-/// these heartbeats and does not expect further heartbeats of the board. If this PC has started a board, the master does not attribute the
-/// heartbeats of that board to another PC.
+/// D-08, D-51: this PC is the master, and another PC sends a heartbeat with the number of a board that is not
+/// started. The master reports the other PC and does not expect further heartbeats of this board. Heartbeats of a
+/// board that this PC has started are not reported.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -55,8 +55,8 @@ fn d08_d51_heartbeats_of_another_pc() {
     assert!(!bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { .. })), "{:?}", bench.events);
 }
 
-/// D-25: a board that starts its application by itself is not reported as a competing master. A board that is stopped and started again is
-/// also not reported as a competing master.
+/// D-25: the heartbeats of a board are not mistaken for the heartbeats of another PC. The test uses a board that
+/// starts its application by itself, and a board that is stopped and started again.
 #[test]
 fn d08_d25_no_board_is_mistaken_for_a_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -92,7 +92,8 @@ fn a_single_reset_is_checked() {
     assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
-    // If any single frame is lost, either the reset is done, or the board still has its number and the error reports this number.
+    // The test loses each frame of a reset in turn. Either the reset is done, or an error reports that the board
+    // still has its number.
     let mut whole = initialised(&[0x21, 0x42, 0x63]);
     let from = whole.log.len();
     whole.go(reset(2), 10).unwrap();
@@ -122,8 +123,8 @@ fn a_single_reset_is_checked() {
     );
 }
 
-/// D-50: the driver delivers frames to the master late. A frame that is still in the driver does not count as silence, and the master still
-/// sends heartbeats.
+/// D-50: the driver delivers frames to the master late. The master does not interpret a frame that is not delivered
+/// yet as silence, and still sends heartbeats.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());
@@ -139,7 +140,7 @@ fn d50_a_driver_that_is_behind() {
     assert_eq!((alive, asked), (6, 1), "the question is not repeated");
     master.handle(3_000 * MS, Ok(frame("141#2100011B34126E38")));
     master.handle(3_000 * MS, Ok(frame("141#0000")));
-    // The master does not repeat the query before its timeout.
+    // The answer is complete now, so the master does not repeat the query.
     for ms in 3_000..3_200 {
         while let Some(sent) = master.poll(ms * MS) {
             assert_ne!(sent, frame("201#"), "the question is not repeated");

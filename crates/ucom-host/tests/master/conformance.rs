@@ -1,5 +1,5 @@
-//! Tests of the conformance tests. Boards of the crate `ucom` pass all conformance tests, and each faulty board fails the conformance test
-//! for its fault.
+//! Tests that check the conformance tests themselves. Boards of the crate `ucom` pass all conformance tests, and each
+//! faulty board fails the conformance test for its fault.
 
 use super::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -53,7 +53,8 @@ fn boards_of_this_crate_pass_every_test() {
         assert!(failed(&report).is_empty(), "{endian}: {:?}", failed(&report));
         let skipped: Vec<&str> =
             report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Skipped(_))).map(|t| t.id).collect();
-        // No application runs at this point, so the conformance tests that need an application are skipped.
+        // D-T10 and D-T11 are skipped because no application runs at this point. D-T19 to D-T21 are skipped because
+        // they need a special bus.
         assert_eq!(
             skipped,
             ["D-T10", "D-T11", "D-T10", "D-T11", "D-T10", "D-T11", "D-T19", "D-T20", "D-T21"]
@@ -84,7 +85,7 @@ fn without_options_only_harmless_frames_leave() {
         // master also sends heartbeats, because the start of the application has begun them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
-            // PC_INIT is sent only to a board that has just reported this number.
+            // The master sends PC_INIT(n) only directly after a PC_INFO to number n.
             assert_eq!(last, u16::from(Function::Info.number()) << 6 | frame.id() & 31, "{frame}");
         }
         if function != 26 {
@@ -206,14 +207,15 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T4",
             receives(|_, f| {
-                // The chain must be numbered first, so only the second request is lost.
+                // The PC first switches on the pin when it numbers the chain. The fault loses only the second such
+                // command, which the test sends.
                 static RECEIVED: AtomicUsize = AtomicUsize::new(0);
                 let raised = f.to_string() == "1C1#0202";
                 if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
             }),
         ),
         ("D-T5", receives(|b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] })),
-        // The faulty board masks the value in PC_SETSTATUS.
+        // The faulty board ignores value bits of PC_SETSTATUS that are outside the mask.
         ("D-T6", receives(|_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] })),
         // If PC_SETSTATUS clears EXLRUN, the faulty board sets ASTART.
         (
@@ -229,7 +231,7 @@ fn each_mistake_is_found_by_its_test() {
             sends(|_, f, _| if f.id() == 0x6C1 { vec![frame("6C1#000007000900FF00")] } else { vec![*f] }),
         ),
         ("D-T12", sends(|_, f, _| if f.to_string() == "081#05" { vec![] } else { vec![*f] })),
-        // For the faulty board, a heartbeat is enough to start the control loop again.
+        // The faulty board starts its control loop as soon as it receives a heartbeat.
         (
             "D-T13",
             receives(|b, f| {

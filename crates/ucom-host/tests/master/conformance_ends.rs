@@ -105,7 +105,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let named = report.left.iter().any(|l| l.starts_with("board 1 has no program now"));
         assert_eq!(named, programless, "moment {moment}: {:?}", report.left);
         assert_eq!(report.left.len(), usize::from(named), "moment {moment}: {:?}", report.left);
-        // After this time, the application of the board that starts by itself runs.
+        // Waits until the third board has started its application by itself.
         bench.run(4_000);
         assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment} {:?}", report.tests.last());
     }

@@ -91,8 +91,8 @@ fn every_frame_of_a_scan_disturbed() {
     }
 }
 
-/// The test applies a fault to every frame of a run, from the exloader to enabled outputs. The master either receives the correct
-/// description or rejects the description.
+/// The test applies a fault to each frame of a run in turn, from the exloader to enabled outputs. Unless the frame is
+/// corrupted, every description that the master accepts is correct. The outputs of other boards are never enabled.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

@@ -16,8 +16,9 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show that a board has accepted
-/// the number. Without this conclusion, boards that switch on their outgoing pin by themselves would get the same number twice.
+/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show
+/// that a board has accepted the number. If the master ignored them, two boards that switch on their outgoing pin by
+/// themselves would get the same number.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     let profile = Profile { chain_auto_opinit: true, ..Profile::default() };
@@ -53,7 +54,7 @@ fn a_stop_does_not_depend_on_answers() {
     }
 }
 
-/// D-51: the stop of all boards is a single frame, and this frame may also be lost.
+/// D-51: the stop of all boards is a single frame. If this frame is lost, a repetition stops the boards.
 #[test]
 fn d51_a_lost_stop_is_repeated() {
     let mut bench = running(&[1, 2], &[0x21, 0x42]);

@@ -47,8 +47,8 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     }
 }
 
-/// D-50: between the master and the bus there are other queues, for example the queue of a socket. The master puts only as many inputs into
-/// the queues of the driver as the bus can carry. With more inputs, heartbeats would wait in these queues after the inputs.
+/// D-50: between the master and the bus there are other queues, for example the queue of a socket. The master sends
+/// no more inputs than the bus can carry. Otherwise, heartbeats would wait behind the inputs in these queues.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();
@@ -64,7 +64,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
         while let Some(frame) = master.poll(now) {
             queue.push_back((now, frame));
         }
-        // The bus carries 1 Mbit/s. The test does not add the time in which the bus is idle to the later bus time.
+        // The bus carries 1 Mbit/s. Unused bus time cannot be used later, so `spare` is reset when the queue is
+        // empty.
         spare += MS;
         while let Some((since, next)) = queue.front()
             && spare >= frame_bits(next.dlc())
@@ -85,8 +86,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
     assert!(longest <= 200 * MS, "a heartbeat waited {longest} µs");
 }
 
-/// D-34: the driver sends only one frame every 20 ms. Then at most one package of each board's inputs waits in the queue, and this package
-/// has the latest values.
+/// D-34: the driver takes only one frame every 20 ms. The queue then contains at most one package of each board's
+/// inputs, with the latest values.
 #[test]
 fn d34_a_slow_driver_has_a_short_queue() {
     let mut bench = overloaded();

@@ -14,7 +14,8 @@ use super::bench::{Bench, image};
 use super::chain::initialised;
 use super::update::options;
 
-/// P-20: the answers of boards show that the boards use other profiles, and the probe derives the correct profile.
+/// P-20: the probe derives the profile of the boards from their answers, also if this profile is not the default
+/// profile.
 #[test]
 fn p20_probe_finds_the_profile() {
     let others = [
@@ -74,8 +75,8 @@ fn d10_a_wrong_byte_order_is_named() {
             problems[0].what.contains("byte order") && problems[0].next.to_string().contains("ucom probe"),
             "{problems:?}"
         );
-        // The master refuses `update` while the board has its old program. `info` shows the numbers of the board and reports that these
-        // numbers are wrong.
+        // The master refuses `update` because of the byte order, before it changes the board. `info` still succeeds,
+        // and a note reports the wrong byte order.
         let before = bench.log.len();
         let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
         let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
@@ -88,12 +89,13 @@ fn d10_a_wrong_byte_order_is_named() {
         bench.go(Request::Info { board: 1 }, 60).unwrap();
         let noted = |(_, event): &(_, Event)| matches!(event, Event::Note { text, .. } if text.contains("wrong byte order"));
         assert!(bench.events[received..].iter().any(noted));
-        // The test of `io` starts the application, because a board sends its description only if an application runs.
+        // The application must run, because a board sends its description only while an application runs. The request
+        // for the description also fails because of the byte order.
         bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
         assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
     }
-    // If a flash number happens to equal its swapped form, the byte order is not reported as wrong.
+    // A flash number that equals its byte-swapped form must not cause a report about the byte order.
     let mut bench = Bench::chain(&[0x2121, 0x42]);
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 60), Ok(Outcome::Init(r)) if r.is_ok()));
 }

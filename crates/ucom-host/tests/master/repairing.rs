@@ -1,4 +1,5 @@
-//! Tests of the repair of one board's number (5.4). For any lost frames, the repair never succeeds while two boards have the same number.
+//! Tests of the repair of one board's number (5.4). Whichever frames are lost, the repair never succeeds while two
+//! boards have the same number.
 
 use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
@@ -38,8 +39,8 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // The board did not receive the number, or the outgoing pin of its neighbour is still on. An error of this kind does not say which
-        // boards have numbers.
+        // In this case, the board did not receive the number, or the outgoing pin of its neighbour is still on. Such
+        // an error does not say which boards have numbers.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
@@ -51,7 +52,8 @@ fn d21_a_number_goes_to_one_board_only() {
     let result = repair(&mut bench, 2);
     assert!(matches!(&result, Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42), "{result:?}");
     is_sound(&mut bench, &result, "nothing lost");
-    // The outgoing pins are on again, so the other board gets its number. In a repair, a board that has its number gets only queries.
+    // The outgoing pins are on again, so board 4 also gets its number. The repair of board 1, which has its number,
+    // sends no PC_INIT and does not switch off a pin.
     assert!(repair(&mut bench, 4).is_ok());
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
     let before = (bench.count("281#"), bench.count("1C1#0200"));
@@ -72,7 +74,8 @@ fn d21_the_first_board_takes_any_number() {
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
 }
 
-/// The test loses or doubles every single frame of a repair.
+/// The test loses or doubles each frame of a repair in turn. The repair always succeeds, and only the selected board
+/// gets the number.
 #[test]
 fn d21_no_single_fault_gives_a_number_twice() {
     let (from, to) = {
@@ -92,8 +95,8 @@ fn d21_no_single_fault_gives_a_number_twice() {
     }
 }
 
-/// Several frames are lost together: frames that switch off the pin before another board, the answers of that board, and the answers of the
-/// selected board.
+/// Several frames are lost together: commands that switch off the pin before board 4, answers of board 3, and answers
+/// of board 2. The repair never succeeds while two boards have the same number.
 #[test]
 fn d21_no_losses_give_a_number_twice() {
     let mut shared = 0;
@@ -128,7 +131,7 @@ fn u4_an_update_gives_a_number_to_one_board_only() {
     let mut bench = rebooted(&[4]);
     let id = bench.master.start(bench.now, Request::Update(options(&[2], 128))).unwrap();
     bench.until(|b| b.count("042#") > 0);
-    // The other board without a number reboots when XRESET is sent.
+    // Board 2 reboots when XRESET is sent. Boards 2 and 4 then have no number.
     let reset = super::bench::frame("002#");
     let now = bench.now;
     bench.members[1].receive(now, &reset);

@@ -23,7 +23,7 @@ fn running(flash_ids: &[u16], boards: &[u8]) -> Bench {
     bench
 }
 
-/// Vector 13.2: the master starts board 1 without other boards; the test compares each frame.
+/// Vector 13.2: the master starts only board 1. The test compares each frame.
 #[test]
 fn start_order() {
     let mut bench = initialised(&[0x21]);
@@ -57,8 +57,8 @@ fn start_order() {
     assert_eq!((board.application.latched_ci.as_slice(), board.application.par[0]), (&[1500, 9][..], 120));
 }
 
-/// D-34: the master sends a changed input at once. D-35: the shadow contains values that the master assumes. After a restart of the
-/// application, the values are unknown.
+/// D-34: the master sends a changed input at once. D-35: the master stores a written parameter as an assumed value.
+/// After a restart of the application, the value is unknown.
 #[test]
 fn d34_d35_inputs_and_parameters() {
     let mut bench = running(&[0x21], &[1]);
@@ -126,7 +126,7 @@ fn d36_kept_names_of_another_application_start_nothing() {
     let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::StaleNames { board: 1 }));
     assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
-    // At this point, the stored names belong to the board.
+    // During the failed run, the master has read the correct names from the board.
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
@@ -160,7 +160,8 @@ fn d14_dump_is_accepted_only_if_the_totals_fit() {
     assert!(matches!(read(&[]), (Err(Error::Exchange(ExchangeError::NoAnswer { tries: 3, .. })), 3)));
 }
 
-/// P-6: board 2 sends a dump. While board 2 sends the dump, ten other boards send SO at full rate, and board 3 sends DSP_INFO.
+/// P-6: while board 2 sends a dump, other boards send SO at full rate, and board 3 sends DSP_INFO. The master does
+/// not mix the frames.
 #[test]
 fn p6_nothing_is_mixed_up() {
     let dump = [
@@ -174,7 +175,8 @@ fn p6_nothing_is_mixed_up() {
         "8:582#706F73",
     ];
     let mut bytes: Vec<String> = dump.iter().map(|t| t.to_string()).collect();
-    // All packages of a string except the last have 8 bytes.
+    // Every package of a string except the last must have 8 bytes, so the first package of this string gets an eighth
+    // byte.
     bytes[2] = "3:582#6865616420706120".into();
     let dump: Vec<&str> = bytes.iter().map(String::as_str).collect();
     let mut script = Script::default()
@@ -268,7 +270,7 @@ fn p15_d51_lost_boards() {
             assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
-        // The master no longer repeats inputs of the lost board.
+        // The master does not repeat the inputs of a lost board.
         let repeated = bench.log.iter().rfind(|(.., f)| f.id() == 0x342).unwrap().0;
         assert!(repeated <= lost + MS, "{on_lost:?}");
         assert_eq!(bench.board(0).application.running, on_lost != OnLost::StopAll);
@@ -316,7 +318,7 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
-    // The session starts at the time of a heartbeat.
+    // The session ends at the time of a heartbeat, so the time without heartbeats is known exactly.
     let alive = bench.count("680#");
     bench.until(|b| b.count("680#") != alive);
     bench.master.end_session();

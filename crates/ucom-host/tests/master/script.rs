@@ -1,4 +1,4 @@
-//! Simulated bus member that answers by a table of frames.
+//! Simulated bus member that answers each request with the frames in a table.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +26,8 @@ struct Rule {
 }
 
 impl Script {
-    /// Each of `answers` is `"ms:frame"` or `"frame"`, for example `["441#21", "5:482#42"]`.
+    /// Adds a rule: the member answers each frame `ask` with `answers`. Each answer is `"ms:frame"` or `"frame"`, for
+    /// example `["441#21", "5:482#42"]`.
     pub(super) fn on(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, u32::MAX, answers)
     }

@@ -13,7 +13,8 @@ fn golden(boards: usize) -> Script {
     let mut script = Script::default().on("000#", reports).on("240#", reports);
     for (i, flash) in [0x21, 0x42, 0x63].into_iter().enumerate().take(boards) {
         let n = i + 1;
-        // The status of the board is 0x19 first, and 0x1B after OPINIT has been set.
+        // The first answer to PC_INFO contains the status 0x19. Later answers contain 0x1B, because the PC has set
+        // OPINIT.
         let answer = |status: &str| {
             let numbers = format!("14{n}#{flash:02X}000{n}{status}34126E38");
             [numbers, format!("14{n}#0200"), format!("14{n}#55436F4D32206865"), format!("14{n}#61642070616E")]
@@ -68,7 +69,7 @@ fn p2_init_of_the_golden_chain() {
     assert!(end <= 1_000_000, "{end} us");
 }
 
-/// P-2: an init on a bus without boards.
+/// P-2: on a bus without boards, an init sends one reset and reports that there are no boards.
 #[test]
 fn p2_init_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -91,7 +92,7 @@ fn p3_lost_ack_asks_info_first() {
     let report = init(&mut bench);
     assert!(report.is_ok(), "{:?}", report.findings);
     assert_eq!(bench.count("281#"), 1, "{:?}", bench.sent());
-    // No board answers to any frame. The master always sends a PC_INFO between two PC_INIT.
+    // No board answers to number 2. The master always sends a PC_INFO between two PC_INIT.
     let sent: Vec<String> = bench.sent().into_iter().filter(|t| t == "282#" || t == "202#").collect();
     assert_eq!(sent, ["282#", "202#", "282#", "202#", "282#", "202#"]);
 }
@@ -172,7 +173,8 @@ fn p18_unknown_error_code() {
     assert_eq!(code.number(), 0x2A);
 }
 
-/// D-T21: two boards send equal reports. The scan counts more boards than different reports.
+/// D-T21: two boards have the same flash number, so their reports are equal. The init finds more boards than
+/// different reports.
 #[test]
 fn dt21_two_boards_with_one_flash_id() {
     let info = |n: u8, status: &str| vec![format!("14{n}#21000{n}{status}34126E38"), format!("14{n}#0000")];
@@ -191,7 +193,8 @@ fn dt21_two_boards_with_one_flash_id() {
     assert!(report.findings.contains(&same), "{:?}", report.findings);
 }
 
-/// A board has sent a report but does not answer to any number, because the init wire after the last board is broken.
+/// The init wire after board 1 is broken: a second board has sent a report but gets no number. The init reports the
+/// UCoM id of this board and the position of the fault.
 #[test]
 fn init_names_a_broken_wire() {
     let script = Script::default()

@@ -1,5 +1,5 @@
-//! Tests with two boards that have the same number (D-24). Every request to a shared number fails with a specific error before any board is
-//! changed.
+//! Tests with two boards that have the same number (D-24). A stop stops both boards. Every other request to a shared
+//! number fails with a specific error before any board is changed.
 
 use super::bench::Exit;
 use ucom::{Profile, Status};
@@ -114,7 +114,8 @@ fn d24_nothing_is_done_to_two_boards_that_cannot_be_told_apart() {
     refuses([0x21, 0x21]);
 }
 
-/// The answer of the second board arrives late, after the answer of the first board has ended.
+/// The answer of the second board arrives late, after the answer of the first board has ended. The request still
+/// fails because of the shared number.
 #[test]
 fn d24_the_second_answer_may_come_late() {
     let answers = |ms: u64| {
@@ -135,8 +136,8 @@ fn d24_the_second_answer_may_come_late() {
     }
 }
 
-/// The second board answers only when the PC reads the board back. The error still reports the shared number, and the started application
-/// is stopped.
+/// The second board does not answer the first PC_INFO, but answers when the PC reads the board back after the start.
+/// The error still reports the shared number, and the started application is stopped.
 #[test]
 fn d24_it_is_named_when_it_shows_on_the_way() {
     let one = |flash: &str, status: &str| {
@@ -158,9 +159,9 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
     assert_eq!((bench.count("541#"), bench.count("1C1#8000") > 0), (0, true), "{:?}", bench.sent());
 }
 
-/// A second board takes the number at any step while the first board is programmed. The second board either sends an error about program
-/// data, or is written together with the first board. In both cases, the report contains the reason and no success, and no board stays in
-/// programming mode.
+/// A second board takes the same number at any step while the first board is programmed. The second board either
+/// sends an error about program data, or is written together with the first board. In both cases, the update fails
+/// because of the shared number, and no board stays in programming mode.
 #[test]
 fn d24_it_is_named_when_it_shows_in_an_update() {
     let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
@@ -242,7 +243,8 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
         Error::Identity(IdentityError::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true });
     assert_eq!(error, wanted);
     assert!((0..2).all(|i| bench.board(i).number().is_none()));
-    // The chain was numbered wrongly before the test, and the master detects the shared number.
+    // Board 2 is replaced by a board that is wired like the first board, and another PC sends PC_INIT(1). The master
+    // detects that two boards have number 1.
     let mut bench = Bench::chain(&[0x21, 0x42]);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
     bench.members[1] = Box::new(node(0x42, WirePins::chain(1).remove(0), Profile::default()));
@@ -251,7 +253,8 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
     assert!(bench.go(Request::Info { board: 1 }, 10).is_err_and(|e| is_shared(&e, [0x21, 0x42])));
 }
 
-/// A scan lists the other findings. For the shared number, the scan lists both boards instead of a board without a number.
+/// A scan of two boards with the same number has one finding, which lists both boards. It does not report a board
+/// without a number.
 #[test]
 fn d24_a_scan_names_both() {
     let mut bench = sharing([0x21, 0x42], &[]);
@@ -262,7 +265,7 @@ fn d24_a_scan_names_both() {
     assert!(shared.to_string().contains("flash numbers 0x0021 and 0x0042"), "{shared}");
 }
 
-/// The master does not mistake a frame that a gateway doubles, or one frame that it corrupts, for a second board.
+/// A frame that a gateway doubles or corrupts is not mistaken for a second board.
 #[test]
 fn d24_a_doubled_frame_is_no_board() {
     let whole = {

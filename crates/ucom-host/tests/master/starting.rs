@@ -45,7 +45,8 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
     assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
-    // All boards have the same program, and the master knows its description.
+    // All boards have the same program, and the master already knows its description. Therefore the master can refuse
+    // the run before it starts a board.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
 
     let mut bench = initialised(&IDS);
@@ -58,7 +59,7 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
         assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
-        // Board 4 has the same names as board 1. The names of board 4 are known after board 1 has been read.
+        // All boards have the same names. If the master does not know the names, it starts only board 1 to read them.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
     }
 }
@@ -79,14 +80,15 @@ fn a_run_that_fails_is_undone() {
             for board in (0..4).filter(|board| *board != silent) {
                 assert_eq!(after[board], FOUND[board], "board {} {what} of {} lost", board + 1, silent + 1);
             }
-            // The master could not read the state of the silent board. The outputs of the silent board are never left active if they were
-            // safe before.
+            // The master cannot read the state of the silent board. If the outputs of this board were safe before the
+            // run, they are safe afterwards.
             assert!(!after[silent].1 || FOUND[silent].1, "{what}: {after:?}");
         }
     }
 }
 
-/// The user presses Ctrl-C at any moment during the start of a run.
+/// The user presses Ctrl-C at any moment during the start of a run. Afterwards, either all boards run, or all boards
+/// are in their previous state.
 #[test]
 fn a_run_that_is_cancelled_is_undone() {
     let mut bench = found(Profile::default());

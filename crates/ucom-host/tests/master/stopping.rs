@@ -82,19 +82,20 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     }
 }
 
-/// The user presses Ctrl-C while a board starts and its status does not show the start yet. The master must not report this board as
-/// stopped.
+/// The user presses Ctrl-C while a board starts and its status does not show the start yet. The master must not
+/// report this board as stopped, and sends the stop command again after the start timeout.
 #[test]
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // The status of the board shows the start one second after the start command. Therefore the board must receive a stop command after
-        // that time.
+        // The status of the board shows the start only after the third query. Therefore the board must receive
+        // another stop command after the start timeout.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();
         let was_run = matches!(request, Request::Run(_));
-        // The master sends three queries before the status changes: before the start, at the stop, and when it reads the stop back.
+        // The first three queries return the idle status: before the start, at the stop, and when the master reads
+        // the stop back.
         let script = Script::default().rule("201#", 0, 3, &idle).on("201#", &started);
         let mut bench = Bench::script(script.on("601#00000000", &["601#00000000"]));
         bench.run(2_000);
@@ -106,7 +107,8 @@ fn a_board_that_is_still_starting_is_stopped() {
         let result = bench.wait(id, 60);
         assert_eq!(result, Err(Error::Master(MasterError::Cancelled)));
         if !was_run {
-            // After the start request was cancelled, the caller must stop the board.
+            // A cancelled start request does not stop the board, so the caller must stop it. The stop fails here,
+            // because the simulated board never leaves the started state.
             bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: true }, 60).unwrap_err();
         }
         let stops = bench.times_of("1C1#8000");
@@ -157,7 +159,7 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     bench.run(100);
     assert_eq!([0, 1, 2].map(|i| bench.board(i).application.running), [false, true, false]);
     assert_eq!(["601#00000000", "603#00000000", "600#00000000"].map(|f| bench.count(f)), [3, 3, 0]);
-    // A stop performs the steps of the start in reverse order.
+    // The boards are stopped in the reverse order of their numbers.
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 

@@ -109,7 +109,7 @@ fn an_abandoned_update_sends_nothing() {
         assert!(bench.sent()[sent..].iter().all(|t| t == "680#"), "{:?}", &bench.sent()[sent..]);
         assert!(!bench.master.is_busy());
     }
-    // A procedure other than an update or conformance tests ends with this error.
+    // A procedure of any other kind, here a scan, ends with the error of the bus.
     let mut bench = initialised(&[0x21]);
     let id = bench.master.start(bench.now, Request::Scan).unwrap();
     bench.master.abandon(id, "the adapter is gone");
@@ -174,7 +174,7 @@ fn a_board_that_is_up_to_date_is_started() {
     let report = update(&mut bench, start.clone());
     assert_eq!((outcomes(&report), report.exit()), (vec!["running", "running"], 0), "{report:?}");
     assert_eq!(bench.beginning("2C1#"), blocks);
-    // All boards are up to date and run, so the update does not need to send program data.
+    // All boards are up to date and already run, so the update does not send PC_START again.
     let sent = bench.beginning("301#");
     let mut all = recorded(start.clone(), &report);
     all.records.extend(start.records);

@@ -106,11 +106,12 @@ fn a_silent_board_that_may_listen_ends_the_broadcast() {
     assert_eq!(check_program(&mut bench, 2, 128), OLD);
 }
 
-/// A board whose DSP_READY is lost is removed from the group. The master then reads the board to determine if the board accepted the later
-/// blocks.
+/// A board whose DSP_READY is lost is removed from the group. The master then reads the board to determine whether it
+/// accepted the later blocks.
 #[test]
 fn a_board_that_fell_behind_is_asked() {
-    // In cycles 1 and 2, the board accepted the blocks like the other boards, so its update is done and no block is sent again.
+    // `block` is the number of DSP_READY frames of board 2 before the loss, in cycle 1 or 2. The board still accepts
+    // all blocks, so it needs no second attempt.
     for block in [0, 2, 3, 5] {
         let mut bench = initialised(&[0x21, 0x42]);
         let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
@@ -137,8 +138,8 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     assert!(matches!(failure, UpdateFailure::MayBeErased(_)), "{failure}");
     assert!(failure.to_string().contains("may be erased"));
     assert_ne!(check_program(&mut bench, 1, 128), OLD, "it was");
-    // The board was removed from the group before the erase and received no further block. The board reports its old program, so its memory
-    // was not erased.
+    // The board is disconnected before the erase and receives no further block. Later it reports its old program,
+    // which shows that its memory was not erased.
     let mut bench = initialised(&[0x21, 0x42]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
     bench.until(|b| broadcasts(b) >= 4);
@@ -174,8 +175,8 @@ fn d43_not_every_error_ends_a_transfer() {
     }
 }
 
-/// U-3 with `force`: a board that was removed from the group already had this program before. Therefore the answer of this board does not
-/// prove that the update wrote the program.
+/// U-3 with `force`: a board that was removed from the group already had this program before. Its answer does not
+/// prove that the update wrote the program, so the board is updated again alone.
 #[test]
 fn u3_what_was_there_before_proves_nothing() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -203,8 +204,8 @@ fn p12_a_cancel_reaches_every_board_of_the_group() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     let id = bench.master.start(bench.now, Request::Update(group(&[1, 2, 3]))).unwrap();
     bench.until(|b| b.count("043#") > 0);
-    // Board 3 accepts blocks, but its answers to PC_INFO do not arrive. Therefore the master sends no broadcast and updates the boards one
-    // by one. Board 2 waits for its update with PROG = 1.
+    // Board 3 is in its exloader, but its answers to PC_INFO do not arrive. Therefore the master sends no broadcast
+    // and updates the boards one by one. Board 2 waits for its update with PROG = 1.
     bench.lose = vec![("> 143#", u32::MAX)];
     bench.until(|b| b.beginning("2C1#") >= 4);
     assert!(bench.board(1).status().has(ucom::Status::PROG));

@@ -1,5 +1,5 @@
-//! Tests of the conditions under which a board is up to date (D-62, U-3). These conditions depend on the board's answer together with the
-//! flash record. Some tests cover cases for which the answer and the record are not enough.
+//! Tests of the conditions under which a board is up to date (D-62, U-3). A board is up to date if its answer and its
+//! flash record match the image. Some tests cover cases in which both are not enough.
 
 use super::bench::{Bench, Exit};
 use super::chain::initialised;
@@ -84,7 +84,7 @@ fn d62_an_accepted_program_is_not_verified() {
     let unknown = UpdateOptions { records: Default::default(), ..options };
     let accepted = UpdateOptions { accept_unverified: true, ..unknown.clone() };
     assert_eq!(again(&mut bench, accepted.clone()), (both("program-up-to-date", false), 0, false));
-    // The master starts the application only if the user accepts the program.
+    // Without a flash record, the master starts the application only if the user accepts the unverified program.
     let start = UpdateOptions { start: true, ..unknown };
     assert_eq!(again(&mut bench, start), (both("program-up-to-date", false), 4, false));
     assert!(!bench.board(0).status().has(Status::MSTART));

@@ -100,7 +100,8 @@ fn u10_what_cannot_be_verified_says_so() {
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
     let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
     assert_eq!(shown, [Some(OLD), Some((0x4B3F, 0x3AC1))]);
-    // The final message of the board is not enough if the board has no application, or if an application runs.
+    // DSP_PROGFINISHED does not prove success if the board then reports no application, or if an application already
+    // runs.
     for (after, status) in [("FFFFFFFF", 0x1B), ("3F4BC13A", 0x8B)] {
         let report = raw(after, status, None);
         let failure = report.boards[0].failure.clone();
@@ -122,7 +123,8 @@ fn u10_a_named_program_id_is_verified() {
         Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
     ));
     assert_eq!(report.exit(), 5);
-    // The board already has the program of the image (U-3). Only the answer of the board shows this (D-62).
+    // The board already reports the requested Program ID (U-3). No flash record confirms the image, so the outcome is
+    // not `up-to-date` (D-62).
     let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::ProgramUpToDate, 0));
     // If the Program ID of an image is known, it must equal the Program ID that the user gives.
@@ -135,8 +137,8 @@ fn u10_a_named_program_id_is_verified() {
     assert_eq!(update(&mut bench, same).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-9: a lost DSP_PROGFINISHED can be replaced only if the expected Program ID is known. Without an expected Program ID, an update with a
-/// lost DSP_PROGFINISHED is not reported as a success.
+/// U-9: if DSP_PROGFINISHED is lost, PC_INFO can show the success of the update only if the expected Program ID is
+/// known. Without an expected Program ID, the update fails.
 #[test]
 fn u9_not_where_nothing_is_expected() {
     let board = Loader { special: |_, block| (block == 31).then_some(""), ..Loader::new(32) };

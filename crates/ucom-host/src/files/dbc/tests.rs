@@ -108,7 +108,8 @@ fn d11_signals_carry_scale_offset_and_unit() {
     assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
-/// The file contains limits without the digits that floating-point arithmetic adds.
+/// The limits in the file have no additional digits from floating-point arithmetic: the file contains 3276.7 and not
+/// 3276.7000000000003.
 #[test]
 fn d11_ranges_of_signals_are_short() {
     let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\

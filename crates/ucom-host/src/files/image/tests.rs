@@ -75,8 +75,8 @@ fn s_records_as_published_count_words_here() {
     );
 }
 
-/// Records that follow one another in only one unit show which unit the addresses have. A file with only one or two records does not show
-/// the unit of its addresses.
+/// Records show the unit of their addresses if they follow one another without gaps in only one of the two units. A
+/// file with only one or two records does not show the unit.
 #[test]
 fn the_unit_of_addresses_is_taken_from_the_records() {
     let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
@@ -226,8 +226,9 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// The test uses damaged Intel HEX and S-record files. The reader refuses each of these files because of its content, with and without the
-/// option for raw bytes, and with any name. The remedy of the error never bypasses a check.
+/// The test uses damaged Intel HEX and S-record files. The reader refuses each of these files because of its content,
+/// with and without the option for raw bytes, and with any name. The error never recommends an option that bypasses a
+/// check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();

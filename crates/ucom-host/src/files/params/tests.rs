@@ -150,7 +150,7 @@ fn saved() -> SavedBoard {
     }
 }
 
-/// D-35: in a saved file, a signal without a requested value is a comment.
+/// D-35: a saved file contains a signal without a requested value only as a comment.
 #[test]
 fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     let text = params_text(&[saved()]);
@@ -165,8 +165,8 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: if a saved file is read with another signal table, or without a table, each value results in the saved word or is refused.
-/// The saved file never results in another word.
+/// D-11, D-35: a saved file is read with another signal table, or without a table. Each value then gives the saved
+/// word or is refused, but never gives another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };

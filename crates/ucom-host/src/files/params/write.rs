@@ -27,7 +27,7 @@ pub struct SavedBoard {
 /// Signal of a board whose values are saved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedSignal {
-    /// Meaning of the signal's word.
+    /// Type, scale, offset and unit of the signal's word.
     pub signal: Signal,
     /// Requested word; `None` if the signal is written as a comment.
     pub word: Option<u16>,
@@ -90,9 +90,9 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// Returns the text that a parameter file contains for a word. A parameter file may be read again with another signal table, or without
-/// one. A number without a unit would then result in another word. Therefore each number gets a unit, which a reader without the table
-/// refuses, or the file contains the raw word.
+/// Returns the text that a parameter file contains for a 16-bit word. A parameter file may be read again with another
+/// signal table, or without one. A number without a unit could then give another word. Therefore the text is a number
+/// with a unit, which a reader without the table refuses, or the raw word.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
     let text = match signal.kind {
@@ -102,7 +102,8 @@ fn value(signal: &Signal, word: u16) -> String {
         }
         _ => return raw,
     };
-    // Writes the raw word if rounding removed a digit or if the value of the word is beyond a limit.
+    // Writes the raw word if the text of the value does not convert back to this word, because of rounding or a
+    // limit.
     if text.parse::<SignalValue>().map(|given| signal.word(&given)) != Ok(Ok(word)) {
         return raw;
     }
@@ -126,7 +127,8 @@ const KEY_MAX: usize = 1024;
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
-    // A board may have another signal whose name is "#1". Additional `#` characters distinguish the index from every name.
+    // Another signal may have the name `#1`, which is also the form of an index. Additional `#` characters
+    // distinguish the index from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
     let fits = |name: &str| quoted(name).chars().count() <= KEY_MAX;

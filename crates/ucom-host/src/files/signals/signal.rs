@@ -28,7 +28,7 @@ pub struct Signal {
     pub kind: SignalType,
     /// Change of the value, in the signal's unit, for one step of the word.
     pub scale: f64,
-    /// Value of the word 0, in the signal's unit.
+    /// Value that the word 0 represents, in the signal's unit.
     pub offset: f64,
     /// Unit such as `deg`; empty if the signal has no unit.
     pub unit: String,
@@ -140,7 +140,7 @@ impl Signal {
         }
         let text = |limit: f64, own: Option<f64>| {
             let text = self.written(limit);
-            // A limit of the signal table that lies between two words is displayed unchanged.
+            // A limit of the signal table that no word can represent exactly is displayed as in the table.
             let odd = own == Some(limit) && text.parse() != Ok(limit);
             if odd { limit.to_string() } else { text }
         };
@@ -168,7 +168,8 @@ impl Signal {
         !below && !above
     }
 
-    /// Returns the value that is really sent, with its unit, if the requested value lies between two words; returns `None` otherwise.
+    /// Returns the value that is really sent, with its unit, if no word can represent the requested value exactly;
+    /// returns `None` otherwise.
     pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
         let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
@@ -176,11 +177,12 @@ impl Signal {
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// Returns the word that is sent for a value. If the signal has a scale, a value between two words gives the nearer word, but never a
-    /// word beyond the limits.
+    /// Returns the word that is sent for a value. If the signal has a scale, the function returns the word with the
+    /// nearest value, but never a word beyond the limits.
     ///
     /// # Errors
-    /// Returns an error if the value is out of the limits, has another unit or type, or lies between two words of a signal without a scale.
+    /// Returns an error if the value is out of the limits or has another unit or type. A fraction is also an error if
+    /// the signal has no scale.
     pub fn word(&self, given: &SignalValue) -> Result<u16, ValueError> {
         let text = || given.to_string();
         let number = match (given, self.kind) {
@@ -202,7 +204,8 @@ impl Signal {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
-                // Without this check, the meaning of a number without a unit would depend on the signal table in the directory.
+                // A number without a unit is refused here. Its meaning would depend on a file: it is a scaled value
+                // with a signal table, and a raw word without one.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }

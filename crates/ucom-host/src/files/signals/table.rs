@@ -149,8 +149,8 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Skips a key that the table already contains. For example, two signals share a name, and a third signal has the name
-                    // `#2`, which is the index of one of the two.
+                    // Skips a key that the table already contains. For example, two signals share a name, so the key
+                    // of one of them is its index, such as `#2`. A third signal may have the name `#2`.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }
@@ -196,8 +196,9 @@ impl ProgramSignals {
         }
     }
 
-    /// Finds a signal by its complete name, by its name without the unit in brackets, or by its index. The letter case is ignored if the
-    /// names still differ without it. This rule also applies to names that the user gives.
+    /// Finds a signal by its complete name, by its name without the unit in brackets, or by its index. The letter
+    /// case is ignored unless two names differ only by letter case. The same rule applies to names that the user
+    /// gives.
     pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
         let like = |wanted: &str| {
@@ -294,7 +295,8 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 
-    /// D-11: the letter case of names in the signal table does not matter, as for values that the user gives.
+    /// D-11: the letter case of names in the signal table does not matter. The same rule applies to names that the
+    /// user gives.
     #[test]
     fn d11_names_of_the_table_are_found_in_any_case() {
         let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\

@@ -64,8 +64,8 @@ impl FromStr for SignalValue {
         if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
-        // The texts 0o10 and -0x10 are numbers in other languages. The reader refuses such texts, so that it does not read them as 0 with a
-        // unit.
+        // In some programming languages, 0o10 and -0x10 are numbers. The reader refuses such texts, so that it does
+        // not read them as 0 with a unit.
         let mut letters = unit.chars();
         let joined = !text.contains(char::is_whitespace);
         if joined
@@ -136,7 +136,7 @@ mod tests {
             assert!(given(wrong).is_err(), "{wrong}");
         }
         assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
-        // The displayed form of an accepted text is also accepted, although it contains an additional blank.
+        // The unit of this text is longer than the limit of 32 bytes: the character µ has two bytes.
         assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
         for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
             assert_eq!(given(text).unwrap().to_string(), short);

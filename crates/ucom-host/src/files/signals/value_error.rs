@@ -34,7 +34,7 @@ pub enum ValueError {
         /// Unit of the signal. The unit is empty if the table scales the signal but has no unit for it.
         unit: String,
     },
-    /// The value lies between two words.
+    /// The signal cannot represent the value, because the value lies between two words.
     #[error("{given}: the signal has whole numbers only")]
     Fraction {
         /// Text that the user wrote.

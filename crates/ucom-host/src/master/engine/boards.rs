@@ -35,7 +35,7 @@ pub struct Board {
     pub alive_at: Option<u64>,
     /// Time (µs) and function of the last frame from the board.
     pub last: Option<(u64, Function)>,
-    /// Time of the last sensor outputs, µs. The control loop of the board was running at that time.
+    /// Time of the last sensor outputs, µs. Sensor outputs show that the control loop was running at that time.
     pub so_at: Option<u64>,
     /// `true` if the board has rebooted since it got its number.
     pub rebooted: bool,
@@ -47,7 +47,7 @@ pub struct Board {
     pub bad_strings: u64,
     /// Number of MCA_DSP_READY frames from the board, including frames without a request.
     pub ready_count: u64,
-    /// Time since which the application is known to be stopped and no automatic start is pending.
+    /// Start of the time in which the application is known to be stopped and no automatic start is pending.
     pub(crate) stopped_at: Option<u64>,
     /// Time of the last start command to the board. The time is cleared when the board reports that it has started.
     pub(crate) starting_since: Option<u64>,

@@ -120,7 +120,8 @@ pub enum Event {
 pub enum Supervision {
     /// A heartbeat of the board is missing.
     Late,
-    /// Three heartbeats of the board are missing. The master immediately sends the frames that the policy requires.
+    /// Three heartbeats of the board are missing. The master immediately sends the stop commands that the profile key
+    /// `on_lost` requires.
     Lost,
     /// The board sends heartbeats again.
     Back,

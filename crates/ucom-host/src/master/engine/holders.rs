@@ -1,8 +1,9 @@
-//! Detection of numbers that two boards share. The master checks every answer to PC_INFO, for each procedure.
+//! Detection of board numbers that two boards share. The master checks every answer to PC_INFO, for each procedure.
 //!
-//! If two boards have the same number, both boards carry out every command to this number: an update writes both boards, and both boards
-//! move. A board cannot detect a shared number, but the PC can, because two boards answer one PC_INFO. The master compares all answers
-//! ([`Holders::received`]). Before a procedure changes a board, the procedure waits until no other board can answer (`one_board_each`).
+//! If two boards have the same number, both boards carry out every command to this number: an update writes both
+//! boards, and both boards move. A board cannot detect a shared number, but the PC can, because two boards answer one
+//! PC_INFO. The master compares all answers ([`Holders::received`]). Before a procedure changes a board, the
+//! procedure waits until no other board can answer (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
@@ -15,8 +16,9 @@ const TWICE: u32 = 3;
 /// number.
 const MOST: usize = 8;
 
-/// Returns the contents of a first frame of DSP_INFO; `None` for other frames. At these positions, a package of the description does not
-/// contain the board's number or a possible status.
+/// Returns the contents of a payload if it is the first frame of a DSP_INFO answer; returns `None` otherwise. The
+/// check compares the board number and the status, because a package of the description has other bytes at these
+/// positions.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
     let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
@@ -29,24 +31,24 @@ pub(crate) struct Holders {
     numbers: BTreeMap<u8, Holder>,
 }
 
-/// Boards that have answered to a number since it was assigned.
+/// Boards that have answered to one board number since this number was assigned.
 #[derive(Debug, Default)]
 struct Holder {
-    /// Time of the last PC_INFO to the number, µs.
+    /// Time of the last PC_INFO to the board number, µs.
     asked_at: Option<u64>,
-    /// Counts of the frames that answered the last PC_INFO: first frames of each flash number, other frames, and other frames of one
-    /// complete answer.
+    /// Number of first frames in the answers to the last PC_INFO, by flash number. The next field is the number of
+    /// all other frames in these answers, and `of_one` is the number of other frames in one complete answer.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
-    /// Number of consecutive earlier PC_INFO requests that one flash number answered twice.
+    /// Number of consecutive earlier PC_INFO requests to which one flash number sent two answers.
     twice: u32,
-    /// Number of PC_INFO requests that each flash number answered, the flash number that answered last, and the number of changes of this
-    /// flash number.
+    /// Number of PC_INFO requests that each flash number answered. The next fields are the flash number that answered
+    /// last, and the number of times that it changed.
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
-    /// Flash numbers of the boards that share the number; empty until it is certain that boards share it.
+    /// Flash numbers of the boards that share the board number; empty unless a shared number is certain.
     shared: Vec<u16>,
 }
 
@@ -90,11 +92,12 @@ impl Holder {
         }
     }
 
-    /// Returns the flash numbers of the boards that share the number, according to the answers received so far. The list is empty if the
-    /// answers do not show that boards share the number.
+    /// Returns the flash numbers of the boards that share the board number, according to the answers received so far.
+    /// The list is empty if the answers do not show a shared number.
     ///
-    /// A single damaged answer is not mistaken for a shared number. A board that has replaced another board is not mistaken for one either.
-    /// If flash numbers answer different PC_INFO requests, each flash number must answer repeatedly, and the flash numbers must alternate.
+    /// Neither a single damaged answer nor the replacement of a board is mistaken for a shared number. If different
+    /// flash numbers answer different PC_INFO requests, each flash number must answer repeatedly, and the flash
+    /// numbers must alternate.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();
@@ -111,25 +114,25 @@ impl Holder {
     }
 }
 
-/// Next step after which the PC can be sure that a number belongs to one board.
+/// Next step of the check that a board number belongs to only one board.
 pub(crate) enum Open {
     Nothing,
     /// Another board may still answer until this time.
     Wait(u64),
-    /// No board has answered a recent PC_INFO to the number.
+    /// No board has answered a recent PC_INFO to the board number.
     Ask,
-    /// A flash number answered twice, so one more PC_INFO is needed.
+    /// One flash number answered twice, so one more PC_INFO is needed.
     AskAgain,
 }
 
 impl Holders {
-    /// Records that PC_INFO was sent to a number.
+    /// Records that PC_INFO was sent to a board number.
     fn asked(&mut self, number: Sequence, now: u64) {
         self.numbers.entry(number.number()).or_default().ask(now);
     }
 
-    /// Handles a frame of DSP_INFO for a number. If this frame shows that boards share the number, the function returns their flash
-    /// numbers.
+    /// Handles a frame of DSP_INFO for a board number. If this frame shows that boards share the number, the function
+    /// returns their flash numbers.
     pub(crate) fn received(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
         let holder = self.numbers.entry(number).or_default();
         holder.answer(number, payload, profile);
@@ -140,7 +143,7 @@ impl Holders {
         (!holder.shared.is_empty()).then(|| holder.shared.clone())
     }
 
-    /// Handles a frame of this PC, or of another PC, that may change which board has a number.
+    /// Handles a frame of this PC, or of another PC, that may change which board has a board number.
     pub(crate) fn may_change(
         &mut self,
         function: Function,
@@ -159,7 +162,7 @@ impl Holders {
             _ => false,
         };
         match (forgets, function) {
-            // For any `addr.broadcast`, a reset that is sent to the number for boards without a number reaches all boards.
+            // A reset to the number of unnumbered boards reaches all boards, with every value of `addr.broadcast`.
             (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
             (true, _) => self.forget(to.number()),
             (false, Function::Info) if broadcast => {
@@ -176,8 +179,8 @@ impl Holders {
         mine.filter_map(|(_, holder)| holder.asked_at).max()
     }
 
-    /// Removes the recorded answers of a number that another board may have now: the number was assigned or withdrawn, or its board has
-    /// rebooted.
+    /// Removes the recorded answers of a board number that another board may have now: the number was assigned or
+    /// withdrawn, or its board has rebooted.
     pub(crate) fn forget(&mut self, number: u8) {
         self.numbers.remove(&number);
     }
@@ -187,7 +190,7 @@ impl Holders {
         self.numbers.clear();
     }
 
-    /// Returns the lowest number in `numbers` that boards share. Each bit of `numbers` is a number.
+    /// Returns the lowest of the given board numbers that boards share. Each bit of `numbers` is a board number.
     pub(crate) fn shared(&self, numbers: u32) -> Option<IdentityError> {
         let mine =
             |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
@@ -195,19 +198,20 @@ impl Holders {
         Some(IdentityError::NumberShared { board: *board, found: holder.shared.clone(), given_back: false })
     }
 
-    /// Returns all numbers that boards share.
+    /// Returns all board numbers that boards share.
     pub(crate) fn all_shared(&self) -> Vec<IdentityError> {
         self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
     }
 
-    /// Returns the numbers to which one flash number has answered twice, but not often enough to be certain.
+    /// Returns the board numbers to which one flash number has answered twice, but not often enough to be certain.
     pub(crate) fn doubtful(&self) -> Vec<u8> {
         let doubtful = |holder: &Holder| holder.shared.is_empty() && holder.answered_twice();
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// Returns the next step that is needed to be sure that a number belongs to one board. The driver has delivered all frames up to the
-    /// time `received`. A PC_INFO that was sent more than `oldest` µs ago does not count.
+    /// Returns the next step that is needed to be sure that a board number belongs to one board. The driver has
+    /// delivered all frames up to the time `received`. The function ignores a PC_INFO that was sent more than
+    /// `oldest` µs ago.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {
@@ -224,7 +228,7 @@ impl Holders {
 mod tests {
     use super::*;
 
-    /// For each set of answers, sends one PC_INFO and delivers the answers.
+    /// Simulates one PC_INFO to board 1 for each list of flash numbers that answer.
     fn question(holders: &mut Holders, answers: &[&[u16]]) -> Option<Vec<u16>> {
         let profile = Profile::default();
         let mut news = None;

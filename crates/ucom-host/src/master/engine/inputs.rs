@@ -7,7 +7,7 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percentage of the bus time that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
-/// Longest delay of the repeated inputs, in µs, for which the master later compensates.
+/// Longest delay of the repeated inputs, in µs, that the master may make up by sending them at shorter intervals.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
@@ -24,11 +24,12 @@ impl Core {
         all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
-    /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The master sends the
-    /// inputs of the board that has waited longest first.
+    /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34).
+    /// The master sends the inputs of the board that has waited longest first.
     ///
-    /// The repeated inputs use only a part of the bus time, even if boards were started with `force`. On the bus, answers and heartbeats
-    /// have a lower priority than inputs. A socket accepts more frames than the bus can carry.
+    /// The repeated inputs use only a part of the bus time, even if boards were started with `force`. Without this
+    /// limit, inputs would delay answers and heartbeats, which have a lower priority on the bus. A socket does not
+    /// limit the inputs, because it accepts more frames than the bus can carry.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -81,15 +82,16 @@ impl Core {
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
             data.ci_known.clear();
-            // The board may run another application now, so its stored description no longer counts as sent.
+            // The board may run another application now, so it must send its description again.
             data.sent = false;
         }
     }
 
-    /// Writes one parameter of a board. The PC cannot read the value back, so the shadow stores it as assumed (D-35).
+    /// Writes one parameter of a board. The PC cannot read the value back, so its copy of the parameters marks the
+    /// value as assumed (D-35).
     ///
-    /// The package contains only the word of this parameter (DLC 4, which every receiver accepts). The other words of the buffer may be
-    /// unknown and must not change.
+    /// The package contains only the word of this parameter (DLC 4, which every receiver accepts). The other words of
+    /// the buffer may be unknown and must not change.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };
         let Some(data) = self.data.get_mut(&board) else { return false };

@@ -67,8 +67,9 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but keeps error frames that were received before the frame left the queue. `feed` is for program data, because a
-    /// board may report an error in the middle of a block. The function returns the time at which the frame left the queue.
+    /// Like [`Link::ask`], but keeps error frames that were received before the frame left the queue. Procedures send
+    /// program data with `feed`, because a board may report an error in the middle of a block. The function returns
+    /// the time at which the frame left the queue.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
@@ -173,10 +174,13 @@ impl Link {
         }
     }
 
-    /// Runs `work`, and ends `work` early with one of three errors. [`MasterError::Cancelled`]: the caller cancels the procedure.
-    /// [`MasterError::Bus`]: the caller reports that the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared): two
-    /// boards with the same number appear, and the procedure does not tolerate shared numbers. `NumberShared` is reported only once. In
-    /// each case, the queued frames of the procedure are discarded.
+    /// Runs `work`. One of three errors can end `work` early:
+    /// - [`MasterError::Cancelled`]: the caller cancels the procedure.
+    /// - [`MasterError::Bus`]: the caller reports that the bus is lost.
+    /// - [`NumberShared`](crate::master::IdentityError::NumberShared): two boards with the same number appear, and
+    ///   the procedure does not tolerate shared numbers. This error is reported only once.
+    ///
+    /// In each case, the queued frames of the procedure are discarded.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -191,8 +195,8 @@ impl Link {
                 let mut ended = gone.or(cancelled);
                 if ended.is_none() && !mailbox.bears_shared_numbers {
                     ended = core.holders.shared(mailbox.claims).map(Error::from);
-                    // After this error, the procedure undoes its changes. A shared number that ended the procedure must not also end this
-                    // clean-up.
+                    // If a shared number ends the procedure, the procedure undoes its changes. The shared number must
+                    // not also end this clean-up.
                     mailbox.bears_shared_numbers = ended.is_some();
                 }
                 if ended.is_some() {

@@ -9,7 +9,8 @@ pub(crate) const MAX_RECEIVED: usize = 16_384;
 /// A frame of a board that a procedure receives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Received {
-    /// Time of reception in µs, measured as the time that has certainly passed between frames since the start.
+    /// Time of reception in µs, on the clock that counts only the time that has certainly passed between frames
+    /// (`Core::passed`).
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,

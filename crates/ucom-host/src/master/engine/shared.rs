@@ -48,12 +48,13 @@ pub(crate) struct Core {
     pub times: Times,
     /// Time of the last call of the master.
     pub now: u64,
-    /// Time at which the waits of procedures end: the time of the last `poll`. At that time, the caller has delivered all frames that were
-    /// received before. If the caller is late, it has not delivered the frames between this time and `now` yet.
+    /// Time up to which waits of procedures can end: the time of the last `poll`. The caller has delivered all frames
+    /// that were received before this time. If the caller is late, frames that were received between this time and
+    /// `now` are not delivered yet.
     pub fired: u64,
-    /// Time that has certainly passed between received frames: the sum of the times from the delivery of a frame to the last `poll` before
-    /// the next frame. Frames that were received at the same time and delivered late do not increase this time. Such frames therefore do
-    /// not cause a gap in a string.
+    /// Sum of the times that have certainly passed between received frames, µs. For each frame, the sum increases by
+    /// the time from the delivery of the frame to the last `poll` before the next frame. Frames that were received
+    /// together and delivered late do not increase the sum, so they do not look like a gap in a string.
     pub passed: u64,
     /// Time at which the caller delivered the last frame.
     handed_over: u64,
@@ -62,10 +63,10 @@ pub(crate) struct Core {
     pub session: Session,
     /// Time, function and destination number of the last frame of another PC.
     pub competing_master: Option<(u64, Function, u8)>,
-    /// Until this time, a report of a board is considered to be an answer and not the sign of a reboot.
+    /// Time until which a report of a board is considered to be an answer, and not the sign of a reboot.
     pub report_until: u64,
-    /// Times at which stop commands of the policy will be repeated, with the boards. The master repeats the stops because a frame can be
-    /// lost.
+    /// Times at which stop commands that `on_lost` requires will be repeated, with the boards. The master repeats the
+    /// stops because a frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
     /// Earliest time at which the inputs may be repeated.
     pub inputs_from: u64,
@@ -128,7 +129,7 @@ impl Core {
     }
 
     pub(crate) fn event(&mut self, event: Event) {
-        // The queue always accepts the end of a procedure, even if it discards other events.
+        // If the queue is full, all events except `Event::Done` are discarded.
         if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
             self.dropped += 1;
         } else {
@@ -213,7 +214,7 @@ impl Core {
                 What::Frame(frame) => Some(frame),
                 What::Inputs { board, offset } => self.inputs_frame(board, offset),
             };
-            // A package whose inputs no longer exist is skipped.
+            // Continues with the next frame if the inputs of this package no longer exist.
             if frame.is_some() {
                 return frame;
             }
@@ -265,8 +266,8 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure may wait for a removed frame that was queued before the first remaining frame. These removed frames count as sent, so
-        // that the procedure does not wait endlessly.
+        // A procedure may wait until one of the removed frames leaves the queue. Removed frames before the first
+        // remaining frame count as sent, so that the procedure does not wait endlessly.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }
@@ -333,7 +334,7 @@ impl Core {
             // The reports that follow are answers to the other PC. These reports do not mean that a board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
-        // A competing master is reported as an event only after a pause of at least 1 s.
+        // A competing master is reported as an event only after at least 1 s without frames of another PC.
         let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.competing_master = Some((self.now, function, to));
         if news {

@@ -46,7 +46,7 @@ pub struct Statistics {
     pub received: u64,
     /// Number of frames that this PC sent.
     pub sent: u64,
-    /// Number of foreign frames of each kind.
+    /// Number of frames that are not of this protocol, by kind.
     pub foreign: Vec<(Foreign, u64)>,
     /// Number of received frames that only a PC sends.
     pub competing_master: u64,
@@ -71,7 +71,8 @@ impl Statistics {
         self.boards.entry(number).or_default().add(now, 1);
     }
 
-    /// Counts a foreign frame. The function returns `true` if the frame is the first foreign frame of its kind.
+    /// Counts a frame that is not of this protocol. The function returns `true` if the frame is the first of its
+    /// kind.
     pub(crate) fn foreign(&mut self, now: u64, foreign: Foreign) -> bool {
         self.bits.add(now, frame_bits(8));
         if let Some((_, count)) = self.foreign.iter_mut().find(|(kind, _)| *kind == foreign) {

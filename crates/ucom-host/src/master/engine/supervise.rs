@@ -1,4 +1,5 @@
-//! Background tasks of the master: receiving and sending heartbeats, policies, and repeated inputs.
+//! Background tasks of the master: receiving and sending heartbeats, reactions to lost boards (`on_lost`), and
+//! repeated inputs.
 use crate::master::engine::boards::Life;
 use crate::master::engine::event::{Event, Supervision};
 use crate::master::engine::shared::{Core, Session};
@@ -33,7 +34,8 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // The age is not computed up to `now`: the caller may have received a heartbeat that it has not delivered yet.
+            // The age is computed up to the last `poll` and not up to `now`, because a received heartbeat may not be
+            // delivered yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -71,7 +73,8 @@ impl Core {
         }
     }
 
-    /// Applies the policy to boards whose heartbeats have stopped. The PC stops boards only if it is the master.
+    /// Performs the action of the profile key `on_lost` for boards whose heartbeats have stopped. The PC stops boards
+    /// only if it is the master.
     fn on_lost(&mut self, lost: &[u8]) {
         lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
@@ -200,7 +203,8 @@ impl Core {
         } else {
             self.statistics.undecodable += 1;
         }
-        // The frame is delivered because a probe must detect boards that answer to the number for boards without a number.
+        // The frame is also delivered to procedures, because a probe must detect boards that answer to the number for
+        // boards without a number.
         self.deliver(from, message);
     }
 

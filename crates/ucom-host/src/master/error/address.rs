@@ -17,7 +17,8 @@ pub enum AddressError {
         /// Board number in the data.
         data: u8,
     },
-    /// The first board of the chain does not answer. This board could take the number of another board.
+    /// The first board of the chain does not answer. If this board has no number, it would take the number that is
+    /// meant for another board.
     #[error("board {other} does not answer; if it has no number, it would take number {board}")]
     MayTakeNumber {
         /// Number that the PC wanted to assign.

@@ -45,7 +45,7 @@ pub enum IdentityError {
         /// Flash numbers of the boards that answered to this number. The list contains one number twice if the boards
         /// cannot be distinguished.
         found: Vec<u16>,
-        /// `true` if the PC has withdrawn the number and no board answers to this number any more.
+        /// `true` if the PC has withdrawn the number and no board answers to it.
         given_back: bool,
     },
 }

@@ -23,7 +23,7 @@ pub enum Error {
     Address(#[from] AddressError),
     /// A board did not reach the requested state.
     Status(#[from] StatusError),
-    /// Running control loops prevent the procedure, or control loops cannot run.
+    /// Control loops are running although the procedure does not allow this, or control loops cannot run.
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
@@ -85,7 +85,8 @@ impl Diagnose for Error {
     }
 }
 
-/// Returns the facts of a diagnosis about some boards. If there is exactly one board, the facts contain its number.
+/// Returns the facts for a diagnosis of some boards. The facts contain the board number if there is exactly one
+/// board.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

@@ -13,8 +13,8 @@ pub enum RunningError {
         /// Numbers of the boards.
         boards: Vec<u8>,
     },
-    /// Control loops are running, so the PC refuses the request. The request could stop the boards in any position, or could have a worse
-    /// effect.
+    /// Control loops are running, so the PC refuses the request. The request could stop the axes of the boards in any
+    /// position, or could have a worse effect.
     #[error("{} running its control loop", Boards(boards))]
     LoopRuns {
         /// Numbers of the boards.

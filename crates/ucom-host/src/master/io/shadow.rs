@@ -1,4 +1,5 @@
-//! Parameters that this PC assumes for a board. The protocol has no function that reads parameters back (D-35).
+//! Values of parameters that this PC assumes for a board. The protocol has no function that reads parameters back
+//! (D-35).
 /// Value of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ParValue {

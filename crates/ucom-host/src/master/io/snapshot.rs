@@ -64,7 +64,7 @@ impl SnapshotAssembler {
             return Some(Snapshot { time_us: now, words: self.words.clone(), incomplete_before });
         }
         if package.count < 3 {
-            // Only the last package may have fewer than three words.
+            // Only the last package may have fewer than three words, so this snapshot is incomplete.
             self.next = None;
             self.gap();
             return None;

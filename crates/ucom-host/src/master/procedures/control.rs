@@ -35,7 +35,8 @@ pub(crate) async fn set_status_procedure(
         return forget_number(&link, board, mask, value).await;
     }
     if mask.has(Status::MSTART) && value.has(Status::MSTART) {
-        // The application needs time to start, as it does after PC_START.
+        // The change starts the application, which needs as much time as after PC_START. Therefore the PC waits for
+        // MSTART before it reads the status back.
         let before = numbers(&link, board).await?;
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         if !before.status.has(Status::MSTART) {
@@ -270,7 +271,8 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // The start is recorded before PC_START leaves the queue, so that a cancel considers the start.
+        // The start is recorded before PC_START leaves the queue. If the procedure is cancelled now, the PC therefore
+        // still stops the board.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
@@ -328,7 +330,8 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
-    // The frame with the last flags of the board may have been lost. The status byte of the board shows if the control loop runs.
+    // The control loop bit is taken from the status byte, because the frame with the last flags of the board may have
+    // been lost.
     Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
         active: flags.active && run,

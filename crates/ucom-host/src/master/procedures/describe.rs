@@ -103,7 +103,7 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
                 if let Err(problem) = collector.push(received.at, &payload, link) {
                     return Ok(Some(Err(collector.problem(problem))));
                 }
-                // After a complete description, a surplus frame would follow immediately.
+                // A surplus frame would follow a complete description immediately, so a short wait is enough.
                 until = link.now() + if collector.done() { times.quiet } else { times.gap };
             }
             message => {
@@ -186,7 +186,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // The attempts are evaluated independently of one another, because a board may change its values between two attempts.
+        // Each attempt is evaluated alone, because a board may change its values between two attempts.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;

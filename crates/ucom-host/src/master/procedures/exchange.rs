@@ -78,8 +78,8 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     }
     let answer = collector.answer();
     if let Answer::Info(info, text) = &answer {
-        // The collector could mistake a package of a string for the first frame. A package of a string does not contain the board's number
-        // or a possible status.
+        // A string package can look like the first frame of an answer, but it does not contain the board's number and
+        // a possible status.
         if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }

@@ -29,7 +29,7 @@ impl Link {
         if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
-            // The time in which this PC has listened to the bus before this command counts as well.
+            // The time in which this PC has already listened to the bus is part of the required listening time.
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }

@@ -6,19 +6,20 @@ use crate::master::error::IdentityError;
 use crate::master::procedures::exchange::TRIES;
 use ucom::{Function, ToBoard};
 
-/// Maximum age of an answer to PC_INFO that still shows which board has a number, µs.
+/// Maximum age of a PC_INFO whose answers still show which board has a number, µs.
 const FRESH: u64 = 2_000 * MS;
 /// Time between two PC_INFO requests in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
 const SPACING: u64 = 2 * MS;
 
-/// Checks that each of the given numbers belongs to only one board: no other board answers PC_INFO within the allowed time. A number to
-/// which no board answers is not an error.
+/// Checks that each of the given board numbers belongs to only one board: no other board answers PC_INFO within the
+/// allowed time. A number to which no board answers is not an error.
 pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // After the first wait, an answer of any age is accepted, because an old answer then only means that the driver is late.
+        // In later rounds, answers of any age are accepted. The PC has just sent PC_INFO, so an answer can look old
+        // only because the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();
@@ -81,7 +82,7 @@ pub(crate) async fn last_answers(link: &Link, boards: u32) {
     }
 }
 
-/// Waits until the time `until`, and then until an answer that is being received has ended.
+/// Waits until the time `until`, and then until the boards have finished an answer that is still being received.
 async fn out_of_words(link: &Link, mut until: u64) {
     let (gap, limit) = (link.times().gap, until + 20 * link.times().gap);
     while link.next(until).await.is_some() && link.now() < limit {

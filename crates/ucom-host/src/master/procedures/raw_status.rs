@@ -1,4 +1,5 @@
-//! Sends PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask (D-22). This procedure is for experts.
+//! Sends PC_SETSTATUS exactly as the formula `new = (old & ~mask) | value` defines it, including value bits outside
+//! the mask (D-22). This procedure is for experts.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, RunningError};
 use crate::master::procedures::exchange::numbers;

@@ -174,7 +174,8 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board with this flash number answers. Only the outgoing pin of the board may be off, so the repair only switches on this pin.
+        // The right board already has the number. At most its outgoing pin is off, so the repair only switches on
+        // this pin.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

@@ -35,7 +35,7 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
     result.map(Outcome::Running)
 }
 
-/// Record of a board that a run has started. If the run fails, the procedure undoes the start of this board.
+/// Board that a run has started, with the data that are needed to undo the start if the run fails.
 struct Begun {
     board: u8,
     /// Stop level that returns the board to its previous state; `None` if the procedure does not need to undo anything.
@@ -59,7 +59,8 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // Checks that can refuse the command (names, load) are performed first, if their data are known before a board is started.
+    // Checks that can refuse the run (names, bus load) are made before a board is started, if the required data are
+    // already known.
     let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
@@ -82,7 +83,8 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
-        // The user selected the values by the names in the description that was known before.
+        // The user chose the values by the names in the known description. If the board has other names, the values
+        // could go to the wrong signals.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
             return Err(SignalError::StaleNames { board: plan.board }.into());
         }

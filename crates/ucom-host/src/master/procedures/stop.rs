@@ -69,7 +69,7 @@ async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Err
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
     let run = flags.run && level == StopLevel::Outputs;
     link.with(|core| core.stop_inputs(board));
-    // The function does not expect an answer to this command.
+    // The board may be silent, so the result of this command is ignored.
     let _ = admin(link, board, Admin { run, active: false, ..flags }).await;
     for _ in 0..TRIES {
         link.send(to, ToBoard::Admin(Admin { run, active: false, ..flags })).await;

@@ -10,7 +10,7 @@ use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 /// Time between two PC_INFO requests of a round in µs. Because of this pause, the answers of 31 boards do not arrive as one burst.
 const SPACING: u64 = 2_000;
 
-/// Answers to PC_INFO that were sent to one number.
+/// Answers to the PC_INFO requests that were sent to one board number.
 #[derive(Default)]
 pub(crate) struct Slot {
     /// Answers so far, which may differ in flash number, Program ID or date.

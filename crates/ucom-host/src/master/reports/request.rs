@@ -49,8 +49,8 @@ pub enum Request {
         /// Permission to continue although a check would refuse the request, see [`Request`].
         force: bool,
     },
-    /// Sends one PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask. The master never repeats this
-    /// command.
+    /// Sends one PC_SETSTATUS exactly as the formula `new = (old & ~mask) | value` defines it, including value bits
+    /// outside the mask. The master never repeats this command.
     RawStatus {
         /// Number of the board that gets the command; `None` for a broadcast to all boards.
         board: Option<u8>,

@@ -29,7 +29,8 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
     assert!(word(&unsigned, "-1").is_err() && word(&unsigned, "65536").is_err());
 }
 
-/// If the signal table has no entry for the program, only raw words are accepted, because numbers have no meaning.
+/// If the signal table has no entry for the program, only raw words are accepted, because the unit of a number is not
+/// known.
 #[test]
 fn d11_without_meaning_only_the_word_itself_is_taken() {
     let signal = Signal { raw_only: true, ..Signal::bare(&Profile::default()) };
@@ -67,7 +68,7 @@ fn d11_scale_offset_and_unit() {
         "{message}"
     );
     assert_eq!(word(&down, "0x0002"), Ok(2));
-    // A number that the table does not scale results in one word, with and without the table.
+    // The table does not scale this signal, so a number gives the same word with and without the table.
     assert_eq!(word(&signal(SignalType::Int16, 1.0, 0.0, ""), "2"), Ok(2));
 }
 

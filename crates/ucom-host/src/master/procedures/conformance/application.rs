@@ -88,7 +88,7 @@ pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
         return Ok(Verdict::Fail(format!("at the dimension {}: {}", d.ci, list(&came))));
     }
     if let Some(last) = d.ci.checked_sub(1) {
-        // Inputs of zero are harmless: the control loop does not run, and it begins with the initial inputs.
+        // Input words of 0 are harmless: the control loop does not run, and its next start uses the initial inputs.
         bench.send(Function::Ci, board, &package(last)).await;
         let came = bench.receive(100 * MS).await;
         if !came.is_empty() {
@@ -130,7 +130,8 @@ async fn judge_alone(
         return Verdict::Fail("the board sent no flags: it continues to run without a PC".into());
     };
     let after = (at - start) / MS;
-    // The tolerance of the time is 20 %, as for all times in the acceptance tests.
+    // The measured time may differ from the expected time by 20 %, which is the tolerance for all times in the
+    // acceptance tests.
     if flags.data().get(..2) != Some(&[0, 0]) || after * MS < lost * 4 / 5 || after * MS > lost * 6 / 5 {
         return Verdict::Fail(format!("the board sent {flags} after {after} ms"));
     }

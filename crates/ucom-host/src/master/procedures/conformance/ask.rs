@@ -41,7 +41,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
     if first != second {
         return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
     }
-    // The boards may send more reports than expected, because a board of the chain may be excluded from the test.
+    // Additional reports are not an error: a board of the chain that is excluded from the test also sends a report.
     if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {
@@ -67,7 +67,8 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
         }
         other => other?,
     }
-    // If a board has rebooted since the previous step, the board would accept any number.
+    // A board that has rebooted has no number and would accept any PC_INIT. Therefore the test first checks that the
+    // board still has its number.
     if bench.info(board).await.is_none() {
         return Ok(Verdict::Fail(
             "the board does not answer PC_INFO; it may have rebooted: `ucom scan`".into(),
@@ -180,7 +181,8 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
             continue;
         };
         wrong |= usize::from(profile.endian.word([*a, *b])) != first;
-        // With `pd.short_last`, a package may end with the last word of the buffer.
+        // Number of bytes that contain words of the buffer. With `pd.short_last`, the last package may end after
+        // these bytes. Any further bytes must be 0.
         let surplus = 2 * usize::from(dimensions.ci).saturating_sub(first).min(3);
         wrong |= words.len() < surplus || words.iter().skip(surplus).any(|byte| *byte != 0);
     }

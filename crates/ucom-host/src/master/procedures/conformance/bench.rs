@@ -42,7 +42,7 @@ impl<'a> Bench<'a> {
         (self.sent, self.came)
     }
 
-    /// Sends a frame of the test. `send` discards the frames that were received earlier.
+    /// Sends a frame of the test, and discards the frames that were received earlier.
     pub(super) async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
@@ -142,7 +142,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Skips the test if the board's application cannot start.
+/// Returns a skipped verdict if the board's application cannot start; returns any other error unchanged.
 fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     match e {
         Error::Exchange(ExchangeError::Device { .. }) | Error::Signal(SignalError::NoApplication { .. }) => {

@@ -50,7 +50,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
             return Ok(Verdict::Fail(format!("the board answers {}: {}", function.name(), list(&came))));
         }
     }
-    // The test also sends the request by broadcast, which a board without a number ignores (D-04, D-06).
+    // Also sends the request by broadcast. A board without a number must ignore this request (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.receive(150 * MS).await;
     Ok(verdict(came.is_empty(), &came))
@@ -70,7 +70,8 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
         if !pass {
             return Ok(Verdict::Fail(format!("PC_INIT({n}): {}", list(&came))));
         }
-        // At this point, no board after the numbered board in the chain may take a number.
+        // The outgoing pin of the numbered board is still off. Therefore no board after it in the chain may take a
+        // number.
         if let Some(next) = numbers.get(i + 1) {
             for function in [Function::Init, Function::Info] {
                 bench.send(function, *next, &[]).await;

@@ -68,7 +68,7 @@ pub(super) async fn put_back(
     if now.status.has(Status::MSTART) {
         halt(link, n).await?;
     }
-    // The board may start its application soon, either by itself or because PC_START was the last command that it received.
+    // An application may start soon: by itself (ASTART), or because the test ended just after PC_START was sent.
     let coming = now.status.has(Status::ASTART) || in_work;
     if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
         now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;
@@ -144,7 +144,7 @@ async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     Ok(())
 }
 
-/// Waits until the application has started, if the application should not run but may be starting.
+/// Waits until the application has started, if it may be starting but did not run before the tests.
 async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Result<BoardInfo, Error> {
     if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
         return Ok(now);

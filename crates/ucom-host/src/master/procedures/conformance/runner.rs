@@ -107,7 +107,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Restores ASTART of a board if a test has set it.
+    /// Restores the ASTART bit of a board to its value before the tests.
     async fn autostart_as_found(&self, board: Option<u8>) -> Result<(), Error> {
         if let Some(before) = self.found.boards.iter().find(|b| Some(b.number) == board) {
             let kept = before.info.status & Status::ASTART;
@@ -119,7 +119,7 @@ impl<'a> Runner<'a> {
     /// Assigns numbers again, so that every board has the number that it had before the tests.
     async fn numbered(&mut self) -> Result<(), Error> {
         if self.unnumbered {
-            // The flag `unnumbered` stays set until all boards have their numbers.
+            // If the assignment fails, the flag `unnumbered` stays set, so that the assignment is repeated later.
             renumber(self.link, self.found).await?;
             self.unnumbered = false;
         }

@@ -54,7 +54,7 @@ pub(super) type Talk =
 pub(super) enum Run {
     /// The test exchanges frames with a board.
     Talk(Talk),
-    /// The test cannot be run on this bus, for the given reason.
+    /// The test cannot be run on this bus; the text is the reason.
     Elsewhere(&'static str),
 }
 

@@ -132,7 +132,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     let broadcast = match (zero, top) {
         (1.., _) => Some(Broadcast::Zero),
         (0, 1..) => Some(Broadcast::ThirtyOne),
-        // Silence on the broadcast number is evidence only if there are boards that could have answered.
+        // Silence on the broadcast number is evidence only if boards have answered on their own numbers.
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
@@ -171,7 +171,8 @@ fn strings(rows: &mut Rows, seen: &Seen) {
         let n = fits(*e, *i);
         n > 0 && readings.iter().filter(|(oe, oi)| fits(*oe, *oi) == n).count() == 1
     });
-    // The second package of an MCA_DUMP_CI answer must have offset 3.
+    // The second package of an MCA_DUMP_CI answer has offset 3. If the PC reads 0x0300, the board uses the other byte
+    // order.
     let second = |offsets: &Vec<u16>| offsets.get(1).copied();
     let read = seen.before.endian;
     let other = if read == Endian::Little { Endian::Big } else { Endian::Little };

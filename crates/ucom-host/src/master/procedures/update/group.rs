@@ -113,8 +113,9 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Starts the exloaders of the selected boards. The function returns the boards whose exloaders run, and `true` if a board failed and did
-/// not confirm that its programming mode has ended. Frames to the group would then erase that board without any report.
+/// Starts the exloaders of the selected boards. The function returns the boards whose exloaders run. The second value
+/// is `true` if a board failed and did not confirm the end of its programming mode. Frames to the group would then
+/// erase that board without any report.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

@@ -195,7 +195,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
 /// Starts the boards that already reported the program before the update.
 async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.to_start.first().copied() {
-        // The answer to PC_INFO has already shown the program.
+        // The board has already reported the program in its answer to PC_INFO.
         session.reach(board, Stage::Verified);
         session.begin(board);
         session.to_start.retain(|b| *b != board);

@@ -29,7 +29,7 @@ pub(super) struct UpdateSession {
     pub results: Vec<UpdateResult>,
     /// Boards to which an XRESET was sent and whose update has not ended.
     pub active: Vec<u8>,
-    /// Board to which the update sends the command to start its application.
+    /// Board whose application the update is starting.
     pub starting: Option<u8>,
     /// Boards that already report the program and will be started at the end.
     pub to_start: Vec<u8>,
@@ -139,7 +139,7 @@ impl UpdateSession {
         }
     }
 
-    /// Cancels the start of each board whose update is done except for the start.
+    /// Cancels the start of each board whose update only lacks the start of the application.
     pub(super) fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);

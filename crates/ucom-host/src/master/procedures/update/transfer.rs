@@ -97,8 +97,8 @@ impl Attempt<'_> {
         }
     }
 
-    /// Waits until all boards have answered the block. A board that reports an error or stays silent does not take part in the attempt any
-    /// more.
+    /// Waits until all boards have answered the block. A board that reports an error or stays silent is removed from
+    /// the attempt.
     async fn wait(&mut self, cycle: u32, block: usize, slow: bool, last: bool, out: &mut Transferred) {
         let times = self.link.times();
         let timeout = if slow { times.erase } else { times.ready };

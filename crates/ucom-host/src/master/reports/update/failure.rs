@@ -107,7 +107,8 @@ impl Diagnose for UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Returns the kind of failure of the update. If memory of the board may have been erased, every failure or cancel is a fault.
+    /// Returns the kind of failure of the update. If memory of the board may have been erased, the kind is always a
+    /// fault.
     fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {

@@ -48,8 +48,9 @@ pub struct UpdateOptions {
     /// Second image, which is sent in the other cycle. With the plan `exloader-app`, this image is sent in the first cycle. With the plans
     /// `pmem-xmem` and `raw`, this image is sent in the second cycle.
     pub second: Option<UpdateImage>,
-    /// Program ID that the user expects. If the image does not determine the Program ID (plan `raw`, `prog.header` or `prog.checksum`
-    /// `none`), the board must report this ID at the end. If the image determines the Program ID, the image must have this ID.
+    /// Program ID that the user expects. If the image determines its Program ID, both IDs must be equal. If the image
+    /// does not determine it (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must report the
+    /// expected ID at the end.
     pub expect_program_id: Option<u16>,
     /// Flash date as a 16-bit word, see [`DateForm`](ucom::DateForm).
     pub date: u16,

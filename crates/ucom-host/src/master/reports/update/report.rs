@@ -80,7 +80,7 @@ impl UpdateReport {
         kinds.chain(unproven).max()
     }
 
-    /// Returns the final message and the remedy for an update without failures in which a program is not verified.
+    /// Returns the final message and the remedy for an update that had no failure but did not verify a program.
     pub fn unproven(&self) -> (String, &'static str) {
         let is_shown = |b: &&UpdateResult| b.outcome == UpdateOutcome::ProgramUpToDate;
         let boards: Vec<String> = self.boards.iter().filter(is_shown).map(|b| b.board.to_string()).collect();

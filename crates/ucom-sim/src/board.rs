@@ -1,4 +1,4 @@
-//! Board of the simulated chain: the same node that real boards run, with simulated hardware parts and faults around it.
+//! Board of the simulated chain: the protocol code (node) of real boards, with simulated hardware and faults.
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
@@ -13,8 +13,8 @@ use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard
 
 /// Time step of the board while one of its frames waits for the bus, µs.
 const WAIT_US: u64 = 500;
-/// Delay of a board relative to another board with the same number, µs. Two boards that answer in one bit time would destroy each other's
-/// frames.
+/// Delay of a board relative to another board with the same number, µs. Two boards that answer in the same bit time
+/// would destroy each other's frames.
 const BEHIND_US: u64 = 5_000;
 
 pub(super) struct Board {
@@ -32,10 +32,10 @@ pub(super) struct Board {
     coming: VecDeque<(u64, u32, Format, Payload)>,
     /// Frame of the board that waits for the bus.
     waiting: Option<Frame>,
-    /// INITACK that the board does not send because of the fault `ack_held`.
+    /// INITACK that the board holds back because the fault `ack_held` is active.
     held: Option<Frame>,
     next_us: u64,
-    /// Contradiction in the status of the board, if the status was contradictory.
+    /// Contradictory status bits that the board has had, as text; `None` if its status was always possible.
     pub violation: Option<&'static str>,
 }
 
@@ -92,7 +92,7 @@ impl Board {
             return Some(frame);
         }
         while let Some((_, id, format, payload)) = self.coming.pop_front_if(|(at, ..)| *at <= now_us) {
-            // The node counts and ignores frames that are not of this protocol (D-02).
+            // Frames of other protocols are passed too: the node counts and ignores them (D-02).
             let _ = self.node.receive_any(now_us, id, format, payload.bytes());
         }
         let frame = self.node.poll(now_us);
@@ -104,7 +104,7 @@ impl Board {
     /// Applies the active faults to a frame that the board sends.
     fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
-            // The board's controller assumes that another node on the bus has acknowledged the frame.
+            // The frame does not reach the bus, but the board's CAN controller still reports it as sent.
             self.node.sent(now_us, &frame);
             return None;
         }
@@ -160,7 +160,7 @@ impl Board {
                 self.next_us = self.next_us.min(now_us + self.behind_us);
                 return;
             }
-            // The node counts and ignores frames that are not of this protocol (D-02).
+            // Frames of other protocols are passed too: the node counts and ignores them (D-02).
             let _ = self.node.receive_any(now_us, id, format, data);
             self.next_us = now_us;
         }

@@ -30,7 +30,7 @@ pub(super) struct Model {
     par_names: Vec<String>,
     initial_ci: Vec<u16>,
     initial_par: Vec<u16>,
-    /// `true` for each set point that is beyond its limits. Each such set point is reported only once.
+    /// `true` for each axis whose set point is beyond its limits. Such a set point is reported only once.
     limited: Vec<bool>,
 }
 
@@ -157,7 +157,7 @@ mod tests {
         assert_eq!(model.advance(1.0, true, &ci, &par), None);
         let so: Vec<i16> = model.outputs().map(|w| w as i16).collect();
         assert!((so[5] + 1500).abs() < 60 && so[0].abs() < 60, "{so:?}");
-        // The model reports a limited set point once, not in every cycle.
+        // A set point beyond its limit is reported once, not in every cycle.
         ci[3] = 9000;
         assert!(model.advance(0.01, true, &ci, &par).unwrap().contains("90.00 deg"));
         assert_eq!(model.advance(0.01, true, &ci, &par), None);

@@ -13,8 +13,8 @@ use crate::{ChainSim, Fault};
 
 /// Name of the simulated bus.
 const CHANNEL: &str = "can0";
-/// If the computer was busy for longer than this limit (µs), the virtual time pauses. Without this pause, the boards would detect the loss
-/// of their PC.
+/// Longest time, in µs, for which the computer can be busy before the virtual time pauses. Without this pause, the
+/// boards would detect the loss of their PC.
 const CATCH_UP_US: u64 = 200_000;
 
 /// Server that connects socketcand clients with the boards of the chain, over a simulated bus and in real time.
@@ -178,7 +178,7 @@ impl<'a> ChainServer<'a> {
                 }
                 // Frames of several members that are equal bit for bit are one frame on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // For frames of clients, the faults were already applied.
+                    // The faults were already applied to frames of clients when the server received them.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }

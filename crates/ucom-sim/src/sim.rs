@@ -27,7 +27,7 @@ pub struct ChainSim {
     waiting: Vec<Fault>,
     /// Active faults, each with the time at which it ends.
     holding: Vec<(u64, Fault)>,
-    /// Number of times that a frame with each identifier was on the bus, for faults that a frame triggers.
+    /// Number of frames that were on the bus, by identifier; needed for faults that a frame triggers.
     seen: BTreeMap<u16, u64>,
     /// `true` if the init wire after the board is broken.
     broken: Vec<bool>,
@@ -226,7 +226,8 @@ impl ChainSim {
         if self.foreign_at.is_some_and(|at| at <= self.now_us) {
             self.foreign_at = Some(self.now_us + FOREIGN_US);
             let beat = (self.now_us / FOREIGN_US) as u32;
-            // Alternates between an identifier with bit 5 and an identifier with function 31.
+            // Alternates between two identifiers that this protocol does not use: one with bit 5 set, and one with
+            // function 31.
             return Frame::new(if beat.is_multiple_of(2) { 0x3A5 } else { 0x7C3 }, &beat.to_le_bytes());
         }
         None

@@ -1,10 +1,10 @@
 //! Access control: tokens, and checks of the origin of a request.
 //!
 //! A web page of another site that is open in a browser can send requests to the address of this computer. The agent
-//! recognises a request of a page of another site by the `Origin` header. A web page can also point its own host name
-//! to the address of this computer (DNS rebinding). After DNS rebinding, the agent recognises a request of the page
-//! by the `Host` header, which contains the page's host name. The agent refuses a request of a page of another site,
-//! even with a valid token, unless the page's origin has read-only access.
+//! recognises such a request by its `Origin` header. The page can also point its own host name to the address of this
+//! computer (DNS rebinding). The agent recognises this by the `Host` header, which contains the page's host name. The
+//! agent refuses a request of a page of another site, even with a valid token, unless the page's origin has read-only
+//! access.
 mod paths;
 mod tokens;
 
@@ -30,7 +30,7 @@ pub enum Role {
 }
 
 /// Largest number of wrong tokens per minute from one address. `ALL_WRONG_MAX` is the limit for all addresses
-/// together. If a limit for wrong tokens is reached, the agent answers a further wrong token with "too many".
+/// together. Above a limit, the agent answers a wrong token with "too many".
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -50,8 +50,7 @@ pub enum Refusal {
     /// Request without a token.
     #[error("token missing: expected the header `Authorization: Bearer …`")]
     NoToken,
-    /// Operator's token in a URL. The agent refuses an operator's token in a URL because URLs are stored in histories
-    /// and logs.
+    /// Operator's token in a URL. The agent refuses it because URLs are stored in histories and logs.
     #[error("the operator's token is not accepted in an address (URL)")]
     InAddress,
     /// Too many wrong tokens from the address of the client.
@@ -73,10 +72,9 @@ pub struct Request<'a> {
     /// Token in the URL, for clients that cannot send a token in a header. The agent accepts only the viewer's token
     /// in a URL.
     pub address_token: Option<&'a str>,
-    /// `true` if the request cannot change anything. Pages of allowed origins may read the answer to a request that
-    /// cannot change anything.
+    /// `true` if the request is read-only. Pages of allowed origins may read the answer to a read-only request.
     pub looks: bool,
-    /// `true` for a Stop or a Pause ([`halts`]). A client on this computer needs no token for a Stop or a Pause.
+    /// `true` for a Stop or a Pause ([`halts`]), which needs no token from a client on this computer.
     pub halts: bool,
 }
 
@@ -147,8 +145,8 @@ impl Access {
     pub fn enter(&self, request: &Request<'_>) -> Result<Entry, Refusal> {
         let looks_only = self.is_foreign(request)?;
         let role = match self.role(request) {
-            // A Stop from this computer needs no token. An outdated token in a program's settings must therefore not
-            // prevent a Stop.
+            // A Stop from this computer needs no token. It is therefore accepted even if a program sends an outdated
+            // token.
             Err(_) if request.halts && request.peer.to_canonical().is_loopback() => Role::Viewer,
             role => role?,
         };
@@ -201,7 +199,8 @@ impl Access {
         }
         let Some(origin) = origin else { return Ok(()) };
         let site = origin.to_lowercase();
-        // The request comes from the agent's own page, not from a page of another agent on this computer.
+        // The origin must name the same host and port as the `Host` header. A page of another agent on this computer
+        // has another port.
         match site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) {
             Some(own) if own == host => Ok(()),
             _ => Err(Refusal::Origin(cut(origin).into_owned())),
@@ -362,7 +361,7 @@ mod tests {
             assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::WrongToken));
         }
         assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::TooManyWrong));
-        // The agent still accepts clients that send a valid token or need no token.
+        // After too many wrong tokens, the agent still accepts clients that send a valid token or need no token.
         assert_eq!(from(Some(&"o".repeat(43))), Ok(Role::Operator));
         assert_eq!(role(&access, "127.0.0.1", Some(HERE), None, None), Ok(Role::Viewer));
     }

@@ -1,4 +1,5 @@
-//! Events of an agent as numbered lists, and as a live stream together with the agent's state.
+//! Events of an agent. Clients request events by number, or receive them as a live stream together with the agent's
+//! state.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -20,8 +21,8 @@ const EVENTS_MAX: usize = 500;
 /// Number of requests that can wait for an event at the same time. Further requests wait only [`NO_PLACE_S`], so that
 /// connections remain free for other clients.
 const WAITING_MAX: usize = 64;
-/// Longest wait of a request for an event, in seconds, when the maximum number of requests already waits. The wait
-/// limits the load if clients repeat their request immediately.
+/// Longest wait of a request for an event, in seconds, if [`WAITING_MAX`] requests are already waiting. This wait
+/// limits the load from clients that repeat their requests immediately.
 const NO_PLACE_S: f64 = 0.25;
 /// Shortest interval between two messages of a stream that are not events.
 const PERIOD: Duration = Duration::from_millis(40);
@@ -42,8 +43,8 @@ pub struct EventsRequest {
     wait_s: f64,
 }
 
-/// Events, each an [`Entry`]. The description of an API must list these types and the event types by name, because they
-/// are not found automatically.
+/// Events, each an [`Entry`]. The description of an API must list this type and its event types by name, because
+/// utoipa does not find them automatically.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[schema(description = "Events.")]
 pub struct EventsObject<E> {
@@ -154,8 +155,8 @@ impl Events {
                     return;
                 }
             }
-            // The interval limits the rate of messages. During the interval between two messages, the client may only
-            // close the connection.
+            // The interval limits the rate of messages. While the server waits, the client may only close the
+            // connection.
             let next = async {
                 period.tick().await;
                 tokio::select! {

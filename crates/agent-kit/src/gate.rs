@@ -1,4 +1,4 @@
-//! Access check in front of every handler.
+//! Access check that every request passes before its handler runs.
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -53,8 +53,8 @@ impl Gate {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Writes a line to the command log about a client address that can cause many lines. The first lines about an
-    /// address are written in full; later lines are only counted.
+    /// Writes a line to the command log about a client address that can cause many lines. The first lines of an
+    /// address are written in full; its later lines are only counted.
     pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         log.write_repeated(what, &from.ip().to_string(), facts);
@@ -253,7 +253,7 @@ fn protocol_token(headers: &HeaderMap) -> Option<&str> {
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // A header that is not text counts as present, but its value is never valid.
+    // A header that is not valid text is present, but its value becomes "?", which is never a valid value.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

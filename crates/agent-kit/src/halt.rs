@@ -25,19 +25,18 @@ pub struct KnownHalt {
     pub asked_after: Option<u64>,
 }
 
-/// Number of the last Stop or Pause before a motion request. If the client sends no number, the agent uses the last
-/// Stop or Pause before the head of the request arrived. The agent reads the number of the last Stop or Pause before
-/// it reads the body, which may arrive slowly.
+/// Number of the last Stop or Pause before a motion request. If the client sends no number, the agent uses the number
+/// at the time when the head of the request arrived, because the body may arrive slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 
 impl KnownHalt {
-    /// Returns the number of the last Stop or Pause before the request; `last` is the number of the last counted Stop
-    /// or Pause.
+    /// Returns the number of the last Stop or Pause before the request; `last` is the number of the last Stop or
+    /// Pause that the agent has counted.
     ///
     /// # Errors
     ///
-    /// The client sends a number that is higher than the number of the last Stop or Pause.
+    /// The client sends a number that is higher than `last`.
     pub fn among(self, last: u64) -> Result<AskedAfter, Problem> {
         match self.asked_after {
             Some(known) if known > last => {

@@ -166,15 +166,15 @@ pub fn key_of(headers: &HeaderMap) -> Option<&str> {
 }
 
 impl<P: Clone> Leases<P> {
-    /// Registers a client, which takes the lease if it is free. If another client holds the lease and `ask` is `true`,
-    /// the new client waits for the lease. Returns the client's number, and `true` if the client holds the lease. The
-    /// first waiting client keeps its position until it receives the lease or is removed. If the waiting client is
-    /// silent for the duration of its own lease, another client can take its position.
+    /// Registers a client, which takes the lease if it is free. If another client holds the lease and `ask` is
+    /// `true`, the new client waits for the lease. Returns the client's number, and `true` if the client holds the
+    /// lease. The first waiting client keeps its position until it receives the lease or is removed. If the waiting
+    /// client is silent for the duration of its own lease, another client can take its position.
     ///
     /// # Errors
     ///
-    /// [`Denied`]: another client holds the lease or waits for it, or the maximum number of clients is registered and
-    /// none of them can be removed. If an error is returned, the client is not registered.
+    /// [`Denied`]: another client holds the lease or waits for it, or the list of clients is full and no client can
+    /// be removed. The new client is then not registered.
     pub fn admit(
         &mut self,
         key: &str,
@@ -192,8 +192,8 @@ impl<P: Clone> Leases<P> {
             other => other.is_none(),
         };
         if self.clients.len() >= CLIENTS_MAX {
-            // The agent removes the client that has been silent longest. A program that restarts repeatedly therefore
-            // does not block other clients.
+            // If the list of clients is full, the agent removes the client that has been silent longest. A program
+            // that restarts repeatedly therefore does not block other clients.
             let holder = self.held.as_ref().map(|held| held.holder.clone());
             let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
             let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
@@ -366,7 +366,8 @@ mod tests {
         assert!(leases.lapse(s(68)).is_some() && leases.lease().is_none());
     }
 
-    /// The holder of a lapsed lease is returned exactly once, for all times of the client's request and of the check.
+    /// If Bob receives the lease from Anna and this lease lapses, `lapse` returns Bob exactly once. This holds for
+    /// all times of Anna's release and of the call of `lapse`.
     #[test]
     fn who_was_given_the_lease_is_not_forgotten_while_it_has_it() {
         for let_go in 1..=70 {
@@ -376,7 +377,8 @@ mod tests {
                 leases.admit("b", ("bob", s(5), ()), true, s(0)).expect("he may wait");
                 leases.command(Some("a"), s(30)).expect("she commands");
                 leases.lapse(s(let_go - 1));
-                // A waiting client that is silent for the duration of its own lease does not receive the lease.
+                // Bob's lease lasts 5 s, and his only message is at 0 s. He receives Anna's lease only if she
+                // releases it within these 5 s.
                 let had = let_go < 5;
                 leases.release("a", s(let_go));
                 assert_eq!(leases.lapse(s(let_go + 4)), None);
@@ -391,7 +393,8 @@ mod tests {
         }
     }
 
-    /// A refused command shows that the waiting client is still present, so the client receives the lease later.
+    /// A command of a waiting client is refused, but shows that the client is still present. The client therefore
+    /// receives the lease later.
     #[test]
     fn a_waiting_client_that_sends_requests_receives_the_lease() {
         let mut leases = Leases::default();

@@ -40,15 +40,15 @@ pub struct CommandLog {
     repeats: Repeats,
 }
 
-/// Kinds of log lines about motions, Stops and leases. Log lines of other kinds use at most half of the queue. The
-/// lines of the needed kinds are therefore written even when other lines are dropped.
+/// Kinds of log lines about motions, Stops and leases. Other kinds use at most half of the queue, so lines of these
+/// kinds are written even when other lines are dropped.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
 impl CommandLog {
     /// Opens or creates the log file `path`; with `None`, no line is stored. When the file reaches half of `limit`
-    /// bytes, it is renamed to `FILE.1` and replaces the previous `FILE.1`. The writer's thread calls `failed` with the
-    /// first write error. The writer's thread calls `failed` again for the first error after each successful write.
+    /// bytes, it is renamed to `FILE.1` and replaces the previous `FILE.1`. The writer's thread calls `failed` with
+    /// the first write error, and again with the first error after each successful write.
     ///
     /// # Errors
     ///
@@ -265,8 +265,8 @@ mod tests {
         drop::<SyncSender<()>>(hangs);
     }
 
-    /// The disk can become full at any time. Each write error is reported once, and all log lines except an interrupted
-    /// line are complete. The next log line states the number of missing lines.
+    /// The disk can become full at any byte. Each write error is reported once, and all log lines except the
+    /// interrupted line are complete. The next log line states the number of missing lines.
     #[test]
     fn a_full_disk_costs_the_lines_that_it_does_not_take_and_they_are_counted() {
         for room in 0..120 {
@@ -283,8 +283,8 @@ mod tests {
             };
             (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
             done(&log);
-            // The disk may still process the last log line, so the test writes three more lines. Each of the three
-            // further lines is either refused or written after the last line.
+            // The writer's thread may still process the last of the five lines when the disk gets space again. The
+            // three further lines are written after that line.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
             log.lines = None;
@@ -365,8 +365,8 @@ mod tests {
         assert!(!Path::new("/dev/null.1").exists());
     }
 
-    /// Each of the first refused requests causes a log line of limited length. Later refused requests do not cause a
-    /// log line. The log counts each refused request.
+    /// Each of the first refused requests causes a log line of limited length. Later refused requests cause no line
+    /// of their own. The log counts every refused request.
     #[test]
     fn lines_of_those_who_are_not_let_in_are_short_and_few() {
         let dir = tempfile::tempdir().expect("a directory");

@@ -31,8 +31,8 @@ use places::{Place, Places};
 
 /// Interval at which the server checks whether it must end.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest time for receiving the head of a request. The same time limit applies to the wait of a connection for its
-/// next request.
+/// Longest time for receiving the head of a request, and longest time that an idle connection waits for its next
+/// request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 const HEAD_TIME_OF_FEW: Duration = Duration::from_secs(1);
 /// Longest head of a request, in bytes.
@@ -136,7 +136,8 @@ async fn serve_connection(
         .with_upgrades()
         .await;
     is_socket.store(true, Ordering::Relaxed);
-    // A client that has disconnected receives no answer. `Sockets` counts the WebSockets separately.
+    // An error only means that the client has disconnected, so it is ignored. The place of a WebSocket also becomes
+    // free here, because `Sockets` counts WebSockets separately.
     drop((served, place));
 }
 

@@ -18,7 +18,7 @@ const OPERATORS_MAX: usize = 32;
 pub const PROTOCOL: &str = "openjtc";
 /// Longest message of a client with read-only access, in bytes.
 pub const MESSAGE_MAX: usize = 1024;
-/// Largest number of pings that a client may send between two messages to the client.
+/// Largest number of pings that a client may send between two messages that it receives.
 const NOISE_MAX: u32 = 100;
 /// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);

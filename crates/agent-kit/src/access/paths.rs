@@ -1,5 +1,5 @@
-//! Classes of HTTP requests. The class of a request depends only on its method and its path. The agent therefore
-//! knows the class of a request before it reads the body.
+//! Classes of HTTP requests. The class depends only on the method and the path, so the agent knows it before it reads
+//! the body.
 
 /// Paths that pages of allowed origins may request. A GET request to one of these paths changes nothing.
 const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
@@ -17,8 +17,8 @@ pub fn halts(method: &str, path: &str) -> bool {
     method == "POST" && HALTS.contains(&path)
 }
 
-/// Returns `true` if a request with this method and path is served even when no other connection is free. Such
-/// requests are Stop, Pause, and each command that ends an operation of a board or a job. The WebSocket that
+/// Returns `true` if a request with this method and path is served even when only the reserved connections are free.
+/// Such requests are Stop, Pause, and each command that ends an operation of a board or a job. The WebSocket that
 /// `jtc traj stop` uses for its Stop is also such a request.
 pub fn stops(method: &str, path: &str) -> bool {
     let number = |part: &str| part.parse::<u64>().is_ok();

@@ -77,8 +77,8 @@ impl<Id: Clone + PartialEq> Lease<Id> {
         }
     }
 
-    /// Returns the lease of the waiting client, which follows this lease. A client that has become silent does not
-    /// receive the lease.
+    /// Returns the next lease, which the waiting client receives. A client that has become silent does not receive
+    /// it.
     pub fn next(&self, presence: impl Fn(&Id) -> Option<Presence>, now: Duration) -> Option<Self> {
         let next = self.first(&presence, now)?;
         Some(Self::begin(next.clone(), presence(next)?.lasts, now))

@@ -1,4 +1,4 @@
-//! Log lines that clients without a token can cause in any number. The log contains the first of these lines; further
+//! Limit for log lines that clients without a token can cause. The log contains the first of these lines; further
 //! lines are only counted.
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -57,8 +57,8 @@ impl Repeats {
         None
     }
 
-    /// Returns the log lines with counts that must be written now. Each log line with a count contains the data of the
-    /// last repetition and `times`.
+    /// Returns the lines with counts that are due at `now`. Each line contains the data of the last repetition, and
+    /// the number of repetitions in `times`.
     pub(super) fn due(&mut self, now: Instant) -> Vec<(&'static str, Value)> {
         if self.next.is_none_or(|next| now < next) {
             return Vec::new();

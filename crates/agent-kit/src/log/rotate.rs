@@ -49,8 +49,8 @@ impl Target for Rotated {
         if self.length == 0 || self.length.saturating_add(line as u64) <= self.limit / 2 {
             return Ok(false);
         }
-        // An earlier version or another program wrote a previous file that is larger than the limit. A previous log
-        // file that is larger than the limit gets another name, so that its lines are not lost.
+        // A previous log file from an earlier version or another program may be larger than the limit. Such a file
+        // gets another name, so that its lines are not lost.
         if std::fs::metadata(before).is_ok_and(|found| found.is_file() && found.len() > self.limit) {
             let mut kept = before.clone().into_os_string();
             kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));

@@ -11,9 +11,9 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// Longest time without reading for a client that has unread bytes. The total waiting time for a client may be longer
-/// by one second for each `TAKES_PER_S` bytes that the client reads. A client that reads quickly does not get a longer
-/// limit for a time without reading.
+/// Longest time for which a client may read nothing while unread bytes wait. All waits of a connection together may
+/// take this time plus one second for each `TAKES_PER_S` bytes that the client has read. Quick reading does not
+/// extend the time for which a client may read nothing.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 

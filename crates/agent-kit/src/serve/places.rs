@@ -7,21 +7,21 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
-/// Largest number of connections from this computer that serve any request. Connections from other computers have a
-/// separate limit of the same size, so that they cannot block local clients.
+/// Largest number of connections from this computer that can serve any request. Connections from other computers have
+/// a separate limit of the same size, so that they cannot block local clients.
 pub(super) const CONNECTIONS_MAX: usize = 256;
 /// Number of free connections below which each new connection serves only one request. The client of such a connection
 /// must send its request at once.
 const FEW: usize = CONNECTIONS_MAX / 2;
 /// Number of further connections from this computer that serve only Stop, Pause and the other requests of
-/// [`stops`](crate::access::stops). `KEPT_ELSEWHERE` is the number for other computers. When all reserved connections
-/// are in use, a new connection replaces the oldest connection without a Stop. Idle connections therefore never prevent
-/// a Stop. The number of all connections together stays below 1024, which is the number of files that a program may
-/// open.
+/// [`stops`](crate::access::stops). `KEPT_ELSEWHERE` is the number for other computers. If all reserved connections
+/// are in use, a new connection replaces the oldest connection that has not requested a Stop. Idle connections
+/// therefore never prevent a Stop. All connections together stay below 1024, which is the number of files that a
+/// program may open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
-/// Shortest time that a local connection has for sending its request before a new connection can replace it. A new
-/// connection waits until the older connection has had this time.
+/// Shortest time that a local connection has for sending its request. During this time, a new connection waits
+/// instead of replacing it.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
 /// Limits and state of the connections from this computer, or of those from other computers.
@@ -43,8 +43,7 @@ struct Open {
     number: u64,
     since: Instant,
     abort: AbortHandle,
-    /// `true` if the connection has requested a Stop. The server does not replace a connection that has requested a
-    /// Stop.
+    /// `true` if the connection has requested a Stop. The server does not replace such a connection.
     stops: bool,
 }
 
@@ -67,8 +66,7 @@ impl Places {
         Self::new(KEPT_HERE, ASKS_WITHIN)
     }
 
-    /// Creates the limits for connections from other computers. Connections from other computers never delay local
-    /// connections.
+    /// Creates the limits for connections from other computers, which never delay local connections.
     pub(super) fn elsewhere() -> Arc<Self> {
         Self::new(KEPT_ELSEWHERE, Duration::ZERO)
     }
@@ -181,7 +179,8 @@ mod tests {
             comes.try_recv().ok()
         };
         for number in 0..CONNECTIONS_MAX {
-            // `open` reserves this connection before it counts the other connections.
+            // `few` is computed when the new connection already occupies one of the `CONNECTIONS_MAX` places, hence
+            // `number + 1`.
             assert_eq!(open(number, false), Some((number, number + 1 > CONNECTIONS_MAX - FEW, true)));
         }
         for number in 0..10 * KEPT_ELSEWHERE {

@@ -79,8 +79,8 @@ const CHECKS_AT_ONCE: usize = 2;
 /// Longest duration of an ordinary request.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
 
-/// Longest duration of a request that plans a motion or reads the flight recorder log. Reading the flight recorder
-/// log takes about 40 s at 115,200 Bd.
+/// Longest duration of a request that plans a motion or reads the flight recorder log. Reading this log takes about
+/// 40 s at 115,200 Bd.
 const LONG_TIME: Duration = Duration::from_secs(120);
 
 /// State that every handler receives.
@@ -171,11 +171,11 @@ impl Agent {
         self.gate.lost_lines()
     }
 
-    /// Sends a Stop or a Pause of an HTTP client. The agent never treats the sender of a Stop or Pause as the
-    /// lease holder, because the holder may have sent other requests before the Stop.
+    /// Sends a Stop or a Pause of an HTTP client. It also cancels earlier requests of this client itself, even if the
+    /// client holds the lease.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
-        // The identity of the client affects only the later requests of this client.
+        // The client's identity decides only which name is reported, and that no hold-off applies to this client.
         let client = self.client(asker).ok().map(|(client, _)| client);
         let name = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
         let lost = self.line.lost();
@@ -184,7 +184,7 @@ impl Agent {
         });
         match client {
             Some(_) => self.note("halt", facts),
-            // A client without a lease can send any number of Stops and Pauses, so the log contains only the first of
+            // A client without a lease can send any number of Stops and Pauses. The log contains only the first of
             // them in full and counts the others.
             None => self.gate.note_repeated("halt", caller.peer, facts),
         }

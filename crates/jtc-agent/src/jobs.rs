@@ -1,6 +1,6 @@
-//! Jobs of the agent for clients without a connection to the serial line. The agent keeps a connection to the serial
-//! line for each such client and runs the client's jobs. The agent also writes a journal that a client can read when
-//! it reconnects.
+//! Jobs of HTTP clients, which are not connected to the serial line themselves. For each such client, the agent keeps
+//! a connection to the serial line and runs the client's jobs. The agent also writes a journal that a client can read
+//! when it reconnects.
 mod event;
 mod http_session;
 mod poses;
@@ -36,12 +36,12 @@ pub use task::{STOPPED, Task, stopped};
 
 /// Number of jobs that the agent stores.
 const KEPT: usize = 256;
-/// Largest number of clients without a connection to the serial line.
+/// Largest number of HTTP clients for which the agent keeps a connection to the serial line.
 const COMMANDERS_MAX: usize = 32;
 /// Time from the end of a silent client's lease until the agent removes the client.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Shortest interval between two events for Stops and Pauses; the event for the last Stop or Pause is always written.
-/// Repeated Stops must not remove other events from the journal.
+/// Shortest interval between two events for Stops and Pauses, so that repeated Stops do not remove other events from
+/// the journal. The event for the last Stop or Pause is always written.
 const HALTS_APART: Duration = Duration::from_millis(200);
 /// Interval at which the agent checks for changes that the serial line does not announce.
 const LOOK: Duration = Duration::from_millis(200);
@@ -146,8 +146,8 @@ impl Jobs {
         let http_session = HttpSession::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.http_sessions.len() >= COMMANDERS_MAX {
-            // A client that has no lease and no job is removed. Without the removal of idle clients, a program that
-            // restarts repeatedly would fill the list of clients.
+            // A client that has no lease and no job is removed. Otherwise, a program that restarts repeatedly would
+            // fill the list of clients.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
                 .http_sessions

@@ -46,8 +46,8 @@ use tx_queue::TxQueue;
 const RECORD_TIME: Duration = Duration::from_secs(2);
 /// Longest wait from a response record until the controller sends the requested frame.
 const RETURN_TIME: Duration = Duration::from_millis(500);
-/// Hold-off after a Stop or a Pause of another client. A client may send a motion request before it learns of the Stop,
-/// and the request may arrive during the hold-off.
+/// Hold-off after a Stop or a Pause of another client. During this time, motion requests are refused, because a
+/// client may have sent them before it learnt of the Stop.
 const CALM: Duration = Duration::from_secs(3);
 /// Shortest hold-off after a refused motion request.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
@@ -86,10 +86,9 @@ pub struct SharedLine {
     /// End of the hold-off. During the hold-off, only the client of the last Stop or Pause may begin a motion.
     calm_until: Duration,
     motion_tracker: MotionTracker,
-    /// Name and policy of the last lease holder. While no client holds the lease, the policy of the last lease holder
-    /// applies to the motion.
+    /// Name and policy of the last lease holder. The policy applies to the motion while no client holds the lease.
     left: (String, Policy),
-    /// Last will that the line most recently reported.
+    /// [`Will`] that was last reported as an event.
     will: Option<Will>,
     receiver: StatusReceiver,
     status: Option<(Duration, Status)>,
@@ -134,8 +133,8 @@ impl SharedLine {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // Stops from before a client connected do not block its requests. However, the user of a new client may have
-        // decided before such a Stop, so the hold-off applies to the client.
+        // A new client's requests are newer than all Stops before its connection. However, its user may have decided
+        // on a motion before the last Stop, so the hold-off also applies to the new client.
         (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
@@ -203,9 +202,9 @@ impl SharedLine {
             other.halts.stops += u64::from(command == ExecCommand::Stop);
         }
         self.halts.ask(asker, command);
-        // After a Stop or Pause, the arm must hold its position. In Teaching, however, the arm would be compliant. A
-        // requested Teaching may also begin as soon as the arm is at rest. A Stop or Pause therefore also ends
-        // Teaching, whether Teaching is active or only requested.
+        // After a Stop or Pause, the arm must hold its position, but in Teaching it would be compliant. A requested
+        // Teaching could also begin as soon as the arm is at rest. A Stop or Pause therefore ends Teaching, whether
+        // Teaching is active or only requested.
         if self.motion_tracker.may_teach(self.status.as_ref()) {
             self.motion_tracker.end_teaching(now);
         }
@@ -372,8 +371,8 @@ impl SharedLine {
         self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// Returns the number of the last Stop or Pause before the client's last motion request. If the client has made no
-    /// motion request, returns the number of the last Stop or Pause before the client connected.
+    /// Returns the number of the last Stop or Pause before the client's last motion request, or before its connection
+    /// if the client has made no motion request.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
     }
@@ -400,8 +399,8 @@ impl SharedLine {
     }
 
     /// Stops or pauses every motion on behalf of the line's owner. Sends the command even if the arm seems to be at
-    /// rest, because the last status is older than the last command. If the arm seems to be at rest, the controller may
-    /// refuse the command, and no hold-off begins for other clients. Returns true if the arm may have been moving.
+    /// rest, because the last status may be older than the last command. In this case, no hold-off begins for other
+    /// clients, and the controller may refuse the command. Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {

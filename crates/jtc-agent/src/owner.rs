@@ -12,11 +12,11 @@ use tokio::sync::watch;
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
-/// Longest wait for bytes from the controller before the owner checks the requests of clients. A Stop also waits at
-/// most for this time before it is written.
+/// Longest wait for bytes from the controller before the thread handles the requests of clients. A Stop therefore
+/// waits at most for this time before it is written.
 const TURN: Duration = Duration::from_millis(2);
 
-/// Longest time for which an ending owner waits for its last frames and for the confirmation of a Stop.
+/// Longest time for which the owner, when it ends, waits for its last frames and for the confirmation of a Stop.
 const LAST_TURNS: Duration = Duration::from_secs(1);
 
 /// Callback for each event on the serial line. The callback runs on the owner's thread, so it must return quickly.
@@ -225,7 +225,7 @@ impl Drop for Owner {
     }
 }
 
-/// Reads and writes the port until the port is lost, or until the owner must end. An ending owner waits until the
+/// Reads and writes the port until the port is lost or the thread must end. The thread then waits until the serial
 /// line is idle, for at most 1 s.
 fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     let mut gone = Gone(shared, "internal error of the agent".to_owned());

@@ -48,15 +48,15 @@ const LAST_WORDS: Duration = Duration::from_secs(5);
 /// Name of the recorder on the serial line.
 const NAME: &str = "recorder of the agent";
 
-/// Data about a frame to the controller, as far as recordings need the data.
+/// Data that a recording needs about a frame to the controller, or about its answer.
 enum Seen {
     /// Bytes of a Trajectory frame.
     Segment(Vec<u8>),
-    /// Answer to a frame whose data recordings need; `true` if the controller accepted the frame.
+    /// Answer to a Trajectory frame; `true` if the controller accepted the frame.
     Answered(bool),
-    /// Time of a Jog frame on the serial line.
+    /// Time when a Jog frame was sent.
     Jog(Duration),
-    /// Time on the serial line of a frame that may change the arm.
+    /// Time when a frame was sent that may change the arm.
     Change(Duration),
 }
 
@@ -106,7 +106,7 @@ impl Prepared {
         Ok(Self { retention: Retention::open(dir, limit)?, witness, seen, missed })
     }
 
-    /// Returns the witness that the owner of the line calls for each event. Returns `None` at each later call.
+    /// Returns the [`Witness`], which must receive each event of the serial line. Returns `None` at each later call.
     pub fn witness(&mut self) -> Option<Witness> {
         self.witness.take()
     }
@@ -170,17 +170,17 @@ struct Identity {
 }
 
 impl Identity {
-    /// Returns the identity for a device that does not report its identity. The recorder does not request the arm of a controller if the
-    /// controller reports the hash of the built-in arm.
+    /// Returns the identity for a controller that does not report one: the built-in arm without device data. The hash
+    /// is set, so the recorder does not request the arm of a controller that reports the same hash.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }
     }
 }
 
-/// State after a possible change of the arm.
+/// State after a possible change of the arm, until the controller reports its arm again.
 struct Doubt {
-    /// Time on the serial line since which the recorder no longer knows the arm.
+    /// Time since which the recorder does not know the arm.
     since: Duration,
     asked: Option<Duration>,
 }
@@ -236,8 +236,8 @@ impl Following {
                     self.follow(steps, &mut session);
                     return;
                 }
-                // The line disconnected the recorder's client, for example because the computer was suspended. The recorder therefore adds
-                // a new client.
+                // The line has disconnected the recorder's client, for example because the computer was suspended.
+                // The recorder therefore adds a new client.
                 (session, arrived) = connect(line);
             }
             self.take_seen();

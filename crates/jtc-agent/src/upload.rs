@@ -111,11 +111,12 @@ impl Upload {
         *self = Self::default();
     }
 
-    /// Returns the controller's trajectory if all segments of the trajectory were received. If `executes` is true, the controller executes
-    /// the trajectory. A trajectory that the controller executes is always complete.
+    /// Returns the controller's trajectory if all its segments were received. `executes` is true if the controller
+    /// executes it; a trajectory that is executed is always complete.
     pub(crate) fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
         if executes {
-            // If the response record of the first segment was lost, the segment counts as accepted.
+            // The controller executes the trajectory, so it has accepted all segments, even if the response record of
+            // the first one was lost.
             self.answered(true);
         }
         let current = self.current.as_ref().filter(|c| c.taken == c.segments && c.points.len() >= 2)?;
@@ -178,7 +179,8 @@ mod tests {
         }
         upload.answered(true);
         upload.answered(true);
-        // The client sends several frames before the first answer. The controller refuses the first frame and all frames after it.
+        // The client sends all frames of the new upload before the first answer. The controller then refuses each of
+        // these frames.
         for frame in &new {
             upload.sent(frame);
         }

@@ -83,8 +83,9 @@ proptest! {
         board.run_ms(after_us / 1000);
         board.send(bob, &STOP);
         board.run_ms(100);
-        // If the operating system delays the bytes of a frame, the board sends more than one error record for this frame. If an error
-        // record may belong to the Stop, the line sends the Stop again. Each Stop arrives as a complete frame.
+        // If the operating system delays the bytes of a frame, the board sends several error records for this frame.
+        // If an error record may belong to the Stop, the line sends the Stop again. Each Stop arrives as a complete
+        // frame.
         let stops = board.written.iter().filter(|(_, bytes)| bytes.ends_with(&STOP)).count();
         prop_assert!(stops >= 1);
         prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), stops);
@@ -208,7 +209,7 @@ fn a_lease_that_is_not_renewed_lapses_and_its_policy_counts() {
         board.run_ms(200);
         assert_eq!(board.line.lease(), None, "{policy:?}");
         let sent = board.frames.iter().find(|f| f.1 == Some(FrameType::TrajSetExecStatus)).map(|f| f.2[4]);
-        // The line ends Teaching, so the arm is in position hold again.
+        // The agent ends Teaching, so the arm is in position hold again.
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), usize::from(wanted.is_some()));
         assert_eq!(sent, wanted, "{policy:?}");
         let now = board.now();
@@ -250,7 +251,8 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert_eq!(board.arrived(FrameType::GripperControl), 1, "it moves nothing");
-    // A program may ignore the refusal, repeat the command, and send an upload. The line sends no frame of this program to the controller.
+    // A program may ignore the refusal, repeat the command, and send an upload. The agent sends no frame of this
+    // program to the controller.
     for _ in 0..20 {
         board.run_ms(400);
         board.send(a, &EXECUTE);
@@ -310,8 +312,8 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
-/// The controller begins Teaching only in position hold, and refuses a Stop before that. If the line did not end Teaching, the arm would
-/// become compliant after the Stop.
+/// The controller begins Teaching only in position hold, and refuses a Stop before that. If the agent did not end
+/// Teaching, the arm would become compliant after the Stop.
 #[test]
 fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     for damaged in [0, 10] {
@@ -330,8 +332,8 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
         board.run_ms(1_000);
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), 1);
         assert!(board.line.is_idle());
-        // A Stop also ends Teaching if Teaching is active. When Teaching has ended, the line does not send the frame that ends Teaching
-        // again.
+        // A Stop also ends Teaching if Teaching is active. When Teaching has ended, the agent does not send the frame
+        // that ends Teaching again.
         board.status.state = ControllerState::Teaching.into();
         board.run_ms(100);
         board.send(b, &STOP);
@@ -624,7 +626,8 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     // The client that waits for the lease disconnects.
     board.line.leave(bob, now);
     board.line.want_lease(carl, now).expect("nobody waits any more");
-    // A client without a connection to the line keeps its position in the queue for the lease by sending requests.
+    // An HTTP client, which has no connection to the line, keeps its position in the queue for the lease by sending
+    // requests.
     let dora = operator(&mut board, "dora");
     let lasts = Some(Duration::from_secs(1));
     board.line.leave(carl, now);
@@ -681,9 +684,8 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
     use TrajectoryState::{Execute, Finish, Pause, Stop};
-    // Each case contains the timeout (ms), the controller state, and `true` if the lease of the holder lapses. The last two values of each
-    // case are the frame interval of the lease holder (ms; 0 for no frames), and a flag. The flag is `true` if the requests of the viewer
-    // are sent.
+    // Each case contains the timeout (ms), the controller state, `true` if the lease of the holder lapses, the frame
+    // interval of the lease holder (ms; 0 for no frames), and `true` if the requests of the viewer are sent.
     let cases = [
         (0, (Operate, Execute), true, 0, true),
         (1500, (Operate, Execute), true, 0, false),
@@ -725,7 +727,8 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
                 board.send(anna, &fixed::get_settings(0));
                 own += 1;
             }
-            // Shortly after a frame of the lease holder, other clients may send requests.
+            // If the lease holder sends a frame every 2 s, the viewer's request is permitted shortly after this
+            // frame. The viewer therefore sends no request in the first 400 ms.
             if ms < 3000 && (every_ms != 2000 || ms % 2000 >= 400) {
                 board.send(bob, &fixed::GET_INFO);
                 asked += 1;

@@ -171,7 +171,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
         let pdu = cell.plc.respond(&connection, &[4, 0, 14, 0, 2]);
         (u16::from_be_bytes([pdu[2], pdu[3]]), usize::from(pdu[5]))
     };
-    // The test waits until the server has detected that the first connection is closed.
+    // The test repeats a write until the server has detected that the first connection is closed.
     let write = [6, 0, holding::SPEED as u8, 0, 100];
     until("its turn", || cell.plc.respond(&connection, &write) == write);
     for command in [Command::Start, Command::Recover, Command::TeachOn] {
@@ -264,7 +264,8 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     for other in &mut others[1..] {
         other.input(0);
     }
-    // The connection that sends commands is still open, although it was silent for as long as the closed connection.
+    // The connection that sends commands is still open, although it has been silent for as long as the connection
+    // that the server closed.
     assert_eq!(cell.connect().input(0), 1);
     assert!(others[0].response().is_none());
     assert_eq!(first.input(0), 1);
@@ -385,8 +386,8 @@ fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
     assert_eq!((client.input(20), client.input(21)), (33, 3));
 }
 
-/// Without the next sequence number, a write request of a PLC sends no frame to the controller. Without the next sequence number, a write
-/// request also begins no job and does not take the lease.
+/// A write request of a PLC without the next sequence number sends no frame to the controller, begins no job, and
+/// does not take the lease.
 #[test]
 fn nothing_goes_to_the_controller_without_the_next_number() {
     let cell = Cell::start(&[]);

@@ -1,5 +1,5 @@
-//! Test program that contains all tests of the crate. Each test file is a module of the test program. Linking the single program takes
-//! as long as linking a program for one test file.
+//! Test program that contains all tests of the crate. Each test file is a module of this program. Linking one program
+//! is faster than linking one program per test file.
 mod board;
 mod description;
 mod fuzz_regressions;

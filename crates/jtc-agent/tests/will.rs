@@ -8,7 +8,7 @@ use jtc_agent::line::{Applied, Moves, Will};
 use jtc_agent::{LineEvent, Policy, Role};
 use jtc_wire::{ControllerState, ExecCommand, FrameType, RawPoint, TrajectoryState, fixed, trajectory};
 
-/// Returns the last wills that the line reported since the previous call, in order.
+/// Returns the values of the last will that were reported since the previous call, in order.
 fn wills(board: &mut Board) -> Vec<Option<Will>> {
     let events = board.line.take_events().into_iter();
     events.filter_map(|event| if let LineEvent::Will(will) = event { Some(will) } else { None }).collect()
@@ -96,7 +96,7 @@ fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let now = board.now();
     board.line.halt_for(None, "the desk", ExecCommand::Stop, now);
     board.run_ms(900);
-    // The line's owner also calls this method if it has received no bytes.
+    // The owner of the line also calls `from_device` when no bytes have arrived.
     let now = board.now();
     board.line.from_device(&[], now);
     assert_eq!(wills(&mut board), [will("the desk", Policy::Stop, Moves::Motion)]);

@@ -1,5 +1,5 @@
-//! Long request bodies. The agent reads only a limited number of large bodies at the same time, and does not use the
-//! threads that serve requests.
+//! Long request bodies. The agent limits how many large bodies it reads at the same time, and parses them on threads
+//! that do not serve requests.
 use agent_kit::api::Problem;
 use axum::Json;
 use axum::body::Bytes;
@@ -23,8 +23,8 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
     }
 }
 
-/// Reads a JSON request body and converts it with `understand`. The conversion of the body is completed even if the
-/// client disconnects.
+/// Reads a JSON request body and converts it with `understand`. The conversion is completed even if the client
+/// disconnects.
 pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     agent: &Agent,
     request: Request,

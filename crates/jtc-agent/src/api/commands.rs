@@ -1,4 +1,4 @@
-//! Short commands of the lease holder.
+//! Commands of the lease holder that end at once, in contrast to jobs.
 use std::borrow::Cow;
 use std::time::Duration;
 
@@ -43,7 +43,7 @@ pub(super) struct Switch {
 }
 
 impl Agent {
-    /// Runs a command that cannot move the arm on the session of the lease holder.
+    /// Runs a command in the session of the lease holder; the command cannot move the arm.
     pub(super) async fn command<T, E>(
         &self,
         asker: &Asker,
@@ -59,7 +59,7 @@ impl Agent {
         self.act(&http_session, turn, what, act).await
     }
 
-    /// Runs a command that may move the arm on the session of the lease holder.
+    /// Runs a command in the session of the lease holder; the command may move the arm.
     pub(super) async fn motion<T, E>(
         &self,
         asker: &Asker,

@@ -1,4 +1,4 @@
-//! Errors that the API returns. All errors of the API use the same type of object.
+//! Errors that the API returns, all as objects of one type.
 use std::collections::BTreeMap;
 
 use agent_kit::api::Problem;

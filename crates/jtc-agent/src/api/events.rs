@@ -1,4 +1,5 @@
-//! Events of the arm as numbered lists, and a live stream of events with the controller's statuses.
+//! Events of the arm. Clients request events by number, or receive them as a live stream together with the
+//! controller's statuses.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};

@@ -1,10 +1,10 @@
-//! Live data for Foxglove, Lichtblick and PlotJuggler over the Foxglove WebSocket protocol. The message types of the
-//! live data are the message types of recordings.
+//! Live data for Foxglove, Lichtblick and PlotJuggler over the Foxglove WebSocket protocol. The message types are
+//! those of recordings.
 //!
-//! A client receives the latest values of the arm at most 25 times a second. The answers to pings show how much data
-//! the client has read. If a ping is unanswered for 400 ms, the agent sends no further values to the client until it
-//! answers. A slow client therefore loses messages but always sees recent data. The agent disconnects a client that
-//! does not read at all.
+//! A client receives the latest values of the arm at most 25 times a second. The agent sends pings, and the answers
+//! show how much data the client has read. If a ping is unanswered for 400 ms, the agent sends no further values
+//! until the client answers. A slow client therefore loses messages but always sees recent data. The agent
+//! disconnects a client that does not read at all.
 mod channels;
 mod protocol;
 

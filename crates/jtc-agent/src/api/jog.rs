@@ -29,7 +29,7 @@ pub(super) struct JogRequest {
     pub rates_rad_s: [f64; 6],
 }
 
-/// Knowledge of the client when it requested the jog.
+/// Data that the client had when it requested the jog.
 #[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
@@ -44,8 +44,8 @@ pub(super) struct KnownToJog {
     as_of_ms: Option<u64>,
 }
 
-/// Data that the client knew when it sent the jog request. If the client does not send the number of the last Stop or Pause,
-/// the agent reads the number before the body. The agent does this because the body may arrive slowly.
+/// Data that the client had when it sent the jog request. If the client does not send the number of the last Stop or
+/// Pause, the agent reads this number before the request body, which may arrive slowly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JogAsked {
     after: AskedAfter,
@@ -110,7 +110,8 @@ pub(super) async fn jog(
     let http_session = agent.http_session(&asker)?;
     let turn = http_session.turn()?;
     let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);
-    // The agent takes the arrival time now, because the body may have arrived later than the head.
+    // The arrival time is taken here, when the body is complete, because the body may have arrived later than the
+    // head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
         // After a Stop the user must release the jog key. While the user holds the key down, each late request also extends

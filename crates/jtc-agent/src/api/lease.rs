@@ -57,8 +57,8 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// Returns the client that uses a lease key. Renews the lease of this client, or takes the lease for it if no
-    /// client holds the lease. Returns an error if another client holds the lease.
+    /// Returns the client that uses a lease key. Renews the client's lease, or takes the lease for the client if it
+    /// is free. Returns an error if another client holds the lease.
     pub(super) fn http_session(&self, asker: &Asker) -> Result<Arc<HttpSession>, Problem> {
         let (http_session, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(http_session.client, Some(lasts), now));
@@ -66,10 +66,10 @@ impl Agent {
         Ok(http_session)
     }
 
-    /// Like [`http_session`](Self::http_session), for requests that may move the arm. Refuses a request that the client
-    /// made before the last Stop or Pause. Also refuses all requests within three seconds after a Stop or Pause of
-    /// another client. Reserves the session of the client first. The permission to move therefore does not apply to
-    /// requests that cannot begin yet.
+    /// Like [`http_session`](Self::http_session), for requests that may move the arm. Refuses a request that the
+    /// client made before the last Stop or Pause. Also refuses all requests within three seconds after a Stop or
+    /// Pause of another client. Reserves the client's session before it permits the motion, so a request that is
+    /// refused because the session is busy never gets the permission.
     pub(super) fn mover(
         &self,
         asker: &Asker,

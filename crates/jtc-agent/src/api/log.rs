@@ -76,7 +76,7 @@ impl LogValues {
         let rows: Vec<&Sample> =
             samples.iter().filter(|sample| (from..=end).contains(&sample.time_s)).collect();
         let joint = |j: usize| {
-            // Seven digits are more than the resolution of an encoder.
+            // Seven decimal places are finer than the resolution of an encoder.
             let column = |value: fn(&JointSample) -> f64| {
                 let known = |sample: &&Sample| {
                     sample.joints.get(j).map(value).filter(|x| x.is_finite()).map(|x| (x * 1e7).round() / 1e7)
@@ -182,8 +182,7 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the flight recorder log and converts the log with `make`. Only operators may read the flight recorder log, one
-/// request at a time.
+/// Reads the flight recorder log and converts it with `make`. Only operators may do this, one request at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
@@ -196,7 +195,7 @@ async fn from_log<T: Send + 'static>(
         let next = "send the request again after some seconds";
         Problem::new("busy", "another client is reading the log of the flight recorder", next)
     })?;
-    // The log is read with a separate client, so that other queries do not wait for the log.
+    // A separate client reads the log, so that other queries to the controller do not wait for it.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = HttpSession::new(&agent.line, introduction);

@@ -224,7 +224,8 @@ pub(super) async fn plan(
     Extension(caller): Extension<Caller>,
     request: Request,
 ) -> Result<Json<PlanObject>, Problem> {
-    // A plan needs computing time, and may change trajectories that other clients run.
+    // Only operators may request a plan: it needs much computing time, and may replace a trajectory that other
+    // clients run.
     caller.operator()?;
     let (request, file) = read(&agent, request, understood).await?;
     if let Some(KeepRequest { number, new: true, .. }) = request.keep {
@@ -269,8 +270,8 @@ pub(super) async fn plan(
     Ok(Json(plan))
 }
 
-/// Returns the error for a plan after its client has disconnected. The client may have already stored another trajectory
-/// under the same number.
+/// Returns the error for a plan whose client has disconnected. The plan is not stored, because the client may already
+/// have stored another trajectory under this number.
 fn abandoned() -> Problem {
     Problem::new(
         "abandoned",

@@ -238,7 +238,7 @@ pub(super) async fn begin_run(
     )
 }
 
-/// Returns the error for a trajectory number under which another trajectory is stored now.
+/// Returns the error for a run whose trajectory was replaced since the client read it.
 fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(
@@ -332,8 +332,7 @@ fn begin(
     let job = agent.jobs.begin(&http_session, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
-            // If the result is uncertain, the motion may continue. If the motion may continue, the policy from the start
-            // of the motion stays valid.
+            // If the job failed and the arm may still move, the policy from the start of the motion stays valid.
             if error.is_none() || !line.may_move(now) {
                 line.set_policy(client, own);
             }

@@ -179,8 +179,8 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
-    // After a delay of this computer, the agent does not send the missed pings later. The agent therefore does not
-    // count the delay as silence of the client.
+    // After a delay of this computer, the agent does not make up for missed pings, so the delay does not count as
+    // silence of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut silent = 0;
     // The agent assumes that a new client knows all Stops and Pauses before its connection.

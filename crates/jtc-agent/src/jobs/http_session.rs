@@ -55,8 +55,8 @@ pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSema
 /// Reason why the session of a client cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unable {
-    /// The session is busy, because a job or another function uses the session. Number of the job that uses the
-    /// session; `None` if no job uses the session.
+    /// A job or another function uses the session. The value is the number of the job; `None` if no job uses the
+    /// session.
     Busy(Option<u64>),
     /// The serial line was lost, or the client was disconnected.
     Gone,
@@ -91,8 +91,8 @@ impl HttpSession {
         self.moves.store(true, Ordering::Release);
     }
 
-    /// Marks the end of a motion. Drops the requests that arrived too late, and their result channels. The closed
-    /// channels inform the clients that the motion has ended.
+    /// Marks the end of a motion. Drops the requests that arrived too late, together with their result channels. The
+    /// closed channel informs each requester that the motion has ended.
     pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
         let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
         self.moves.store(false, Ordering::Release);
@@ -112,7 +112,7 @@ impl HttpSession {
         self.job.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|(job, _)| *job)
     }
 
-    /// Returns a permit for the session if the session is free.
+    /// Returns a permit for the session.
     ///
     /// # Errors
     ///
@@ -210,7 +210,7 @@ impl HttpSession {
     fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), Problem>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        // `motion_ended` takes the same lock, so a request for one motion never reaches the next motion.
+        // `motion_ended` takes this lock too, so a request for one motion never reaches the next motion.
         let (_, wishes) = job.as_ref().filter(|_| self.is_moving())?;
         wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }
@@ -221,7 +221,7 @@ impl HttpSession {
 }
 
 /// Runs the queued functions on the session until no caller remains. Between two functions, the thread reads the
-/// deliveries of the line. The shared line disconnects a client that does not read.
+/// messages from the shared line, because the line disconnects a client that does not read.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

@@ -169,8 +169,8 @@ impl Observer<ClientPort> for RunJob<'_> {
         before_motion(self.task, &error)
     }
 
-    /// A Stop before the start of the motion also cancels the run, because the user who stops expects the arm to stay
-    /// at rest.
+    /// A Stop before the start of the motion also cancels the run, because the person who stops the arm expects it to
+    /// stay at rest.
     fn is_cancelled(&mut self) -> bool {
         self.task.is_halted()
     }
@@ -246,8 +246,8 @@ impl Observer<ClientPort> for RunJob<'_> {
 
     fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), Problem> {
         let (task, done) = (self.task, &mut *self.done);
-        // A request of the client that arrives with the last status has no effect. The client then receives the answer
-        // that the motion has ended.
+        // A request that arrives with the last status comes too late to have an effect. Its client then receives the
+        // answer that the motion has ended.
         self.wish = None;
         task.http_session.motion_ended(task.wishes);
         let digest = self.digest.take();

@@ -13,16 +13,16 @@ const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Default)]
 struct State {
-    /// Number of held stops that have ended. The controller's answer about a held stop is dropped if the stop has
-    /// ended.
+    /// Number of held stops that have ended. If the stop has ended before the controller's answer arrives, the answer
+    /// is dropped.
     ended: u64,
     held: bool,
     asked: Option<Instant>,
     /// Answer of the controller, and the time of this answer. The inner `None` means that the controller does not
     /// report its reactions.
     told: Option<(Duration, Option<Reactions>)>,
-    /// Joints with an encoder jump, one bit per joint. The bits for encoder jumps are valid until the torque is
-    /// off, because the drives are configured again after that.
+    /// Joints with an encoder jump, one bit per joint. The bits are valid until the torque is off, because the drives
+    /// are then configured again.
     jumped: u8,
 }
 
@@ -50,7 +50,7 @@ impl Stops {
     /// controller.
     pub(super) fn see(&self, status: &Status, asker: &HttpSession) {
         let Some(stop) = self.begins(status) else { return };
-        // The session is busy. The cause is requested after a later status instead.
+        // The session is busy, so the cause is requested after a later status.
         let Ok(turn) = asker.turn() else { return };
         self.lock().asked = Some(Instant::now());
         let own = self.clone();
@@ -61,8 +61,7 @@ impl Stops {
         });
     }
 
-    /// Returns the number of the held stop whose cause must be requested. Returns `None` if no cause must be
-    /// requested.
+    /// Returns the number of the held stop whose cause must be requested, or `None` if no request is needed.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
         if !labels::has_torque(status) {
@@ -116,7 +115,7 @@ mod tests {
         stops.told(next, second(3), Some(reactions));
         assert_eq!(stops.begins(&held), None, "its cause is known");
         assert_eq!(stops.cause(&held, second(4)), Some((cause, 1500)));
-        // The status in this test is newer than the last check.
+        // `begins` has not processed this status yet. The status shows no held stop, so `cause` returns no cause.
         assert_eq!(stops.cause(&free, second(4)), None);
         assert_eq!(stops.begins(&free), None);
         assert_eq!(stops.jumped(&free), 0b100, "it lasts beyond the held stop");

@@ -10,11 +10,10 @@ use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 use super::Denied;
 use super::frame_class::HostFrame;
 
-/// Largest number of queued bytes of a client's frames. This number of bytes is enough for some commands and for the
-/// frames of an upload that are sent without waiting for a response.
+/// Largest number of queued bytes of a client's frames. This is enough for some commands and for those frames of an
+/// upload that are sent without waiting for a response.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
-/// Largest number of queued frames of a client. The largest number of queued frames equals the number of frames that a
-/// client may send in one burst.
+/// Largest number of queued frames of a client; equal to the number of frames that a client may send in one burst.
 const FRAMES_WAITING: usize = 500;
 /// Largest number of unread bytes of a client; this number is enough for two minutes of statuses.
 const UNREAD_MAX: usize = 1 << 20;
@@ -22,8 +21,7 @@ const UNREAD_MAX: usize = 1 << 20;
 /// Largest number of frames that a client may send, per second and in one burst.
 const FRAMES_PER_S: f64 = 250.0;
 const FRAMES_AT_ONCE: f64 = 500.0;
-/// Largest number of queued response records for refused frames. Each status delivers at most one response record for
-/// a refused frame.
+/// Largest number of queued response records for refused frames. Each status delivers at most one of them.
 const REFUSALS_MAX: usize = 600;
 
 /// Number that identifies a client. Client numbers are not reused.
@@ -237,8 +235,8 @@ impl Client {
         Some(frame)
     }
 
-    /// Removes the queued frames that need the lease; the remaining frames keep their order. Returns at once if no
-    /// frame that needs the lease is queued, because every Stop calls this function for all clients.
+    /// Removes the queued frames that need the lease; the remaining frames keep their order. Returns at once if there
+    /// is no such frame, because every Stop calls this function for all clients.
     pub(super) fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();

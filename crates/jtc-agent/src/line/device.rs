@@ -105,8 +105,8 @@ impl SharedLine {
         None
     }
 
-    /// Refuses queued frames of clients that have lost the lease. A client whose lease has lapsed takes the lease
-    /// again if the lease is free and the client's policy lets the motion continue.
+    /// Refuses queued frames of clients that have lost the lease. However, a client with the policy Continue takes
+    /// the lapsed lease again if the lease is free.
     fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
         let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());
@@ -182,7 +182,7 @@ impl SharedLine {
                 && response.data != DataStatus::NoError
                 && response.frame_type == FrameType::TeachingModeEnable as u8
             {
-                // The controller has refused Teaching.
+                // The controller has refused Teaching, so Teaching will not begin.
                 self.motion_tracker.taught();
             }
             if *client == OWNER && taken && response.frame_type == FrameType::TeachingModeDisable as u8 {
@@ -207,8 +207,8 @@ impl SharedLine {
     /// requested the Stop.
     fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
         let arrived = response.status == FrameStatus::NoError;
-        // Response records arrive in the order of the frames. If the response record of an earlier frame has not
-        // arrived, it was therefore lost or damaged.
+        // Response records arrive in the order of the frames. If an earlier frame still has no response record, its
+        // record was therefore lost or damaged.
         let at = self.sent.iter().position(|sent| {
             if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
         });

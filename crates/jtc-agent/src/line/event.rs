@@ -3,7 +3,7 @@ use jtc_wire::{FrameType, Response};
 
 use super::{ClientId, Denied, FrameClass, Lease, Policy, PutOut, Will};
 
-/// Numbers of events on a line since the start of the thread that owns the line.
+/// Counts of events on the serial line since its thread started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Number of written frames that change the state of the controller.

@@ -51,7 +51,7 @@ pub enum Denied {
     #[error("this client has lost its connection: the agent or the client ended it")]
     Gone,
     /// Host supervision of the controller is active, and the lease holder is silent. Queries of other clients would
-    /// prevent the controller from detecting the silence of the lease holder (J-59).
+    /// hide this silence from the controller (J-59).
     #[error(
         "{who} is silent: the agent sends no queries of other clients until the arm is at rest, so that the \
          controller can pause the motion"
@@ -142,16 +142,15 @@ impl SharedLine {
         }
     }
 
-    /// Disconnects a lease holder that no longer sends data, and applies the holder's policy to its motion. The client
-    /// must reconnect before it sends data again. By reconnecting, the client receives the changes that other clients
-    /// have made.
+    /// Disconnects a lease holder that sends no more data, and applies the holder's policy to its motion. The client
+    /// must reconnect before it can send data, and then receives the changes that other clients have made.
     pub fn lapse(&mut self, client: ClientId, now: Duration) {
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.put_out(client, PutOut::Silent, now);
         }
     }
 
-    /// Checks that the client holds the lease. If no client holds the lease, the client takes it.
+    /// Checks that the client holds the lease, or takes a free lease for it.
     pub(super) fn may_command(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         if self.lease.is_none() {
@@ -214,8 +213,8 @@ impl SharedLine {
         if self.hold(POLICY, command, now) {
             self.events.push_back(LineEvent::PolicyApplied { client: holder, policy });
         } else if let Some(client) = self.clients.get_mut(&holder) {
-            // The client may be about to begin a motion; the value `NOT_ASKED` prevents the motion. The value
-            // `NOT_ASKED` does not affect other clients.
+            // The client may be about to begin a motion; the value `NOT_ASKED` prevents this. Other clients are not
+            // affected.
             client.asked_after = NOT_ASKED;
         }
     }

@@ -7,10 +7,10 @@ use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
 use super::Moves;
 use super::frame_class::HostFrame;
 
-/// Time within which the statuses show a motion after the frame that begins it. The tracker does not use statuses that are older
-/// than 1 s.
+/// Time within which the statuses show that a frame has begun a motion. A status that is older than this time is
+/// ignored.
 const SHOWS: Duration = Duration::from_secs(1);
-/// Time after an upload within which the uploaded motion is expected.
+/// Time after an upload within which a start of the uploaded motion is expected.
 const FOLLOWS: Duration = Duration::from_secs(5);
 /// Interval at which the frame that ends Teaching is repeated until the controller confirms it.
 const AGAIN: Duration = Duration::from_millis(250);
@@ -40,7 +40,8 @@ impl MotionTracker {
         self.uploaded_at = Some(at);
     }
 
-    /// Records that the frame that ends Teaching was sent.
+    /// Records that Teaching is not expected: the frame that ends Teaching was sent, or the controller refused
+    /// Teaching.
     pub(super) fn taught(&mut self) {
         self.teaches = false;
     }

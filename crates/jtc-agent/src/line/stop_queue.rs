@@ -34,7 +34,7 @@ impl Halt {
     }
 }
 
-/// Stops and Pauses that still wait for their response records. The requests of several clients share one frame. Each
+/// Stops and Pauses that wait for their response records. The requests of several clients share one frame, and each
 /// of these clients receives the response record of the frame.
 #[derive(Debug, Default)]
 pub(super) struct StopQueue {
@@ -130,8 +130,8 @@ impl StopQueue {
         if self.waiting.is_some() { Some(now) } else { self.written.front().map(|halt| halt.again_at) }
     }
 
-    /// Returns the command that was sent more than once because the controller does not confirm it. If both a Stop and
-    /// a Pause were sent more than once, returns the Stop.
+    /// Returns the command that was sent more than once because the controller does not confirm it; a Stop has
+    /// priority over a Pause.
     pub(super) fn untaken(&self) -> Option<ExecCommand> {
         let again = self.waiting.iter().chain(&self.written).filter(|halt| halt.tries > 1);
         again.map(|halt| halt.command).max_by_key(|command| *command == ExecCommand::Stop)

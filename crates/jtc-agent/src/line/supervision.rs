@@ -56,9 +56,9 @@ impl Supervision {
 }
 
 impl SharedLine {
-    /// Checks that this client may send a query to the controller now. While the arm moves under host supervision,
-    /// other clients may send queries only if the last frame of the lease holder is younger than half of the timeout.
-    /// The project's own clients send a frame within each third of the timeout.
+    /// Checks that this client may send a query to the controller at `now`. During a supervised motion, the query of
+    /// another client is refused if the lease holder has sent no frame for half of the timeout. The project's own
+    /// clients send a frame within each third of the timeout.
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);

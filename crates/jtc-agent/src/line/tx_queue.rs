@@ -105,8 +105,8 @@ impl TxQueue {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // If an urgent frame replaces the current frame, the queue aborts the current frame. The queue does this
-            // when it could write the next piece of the current frame.
+            // An urgent frame can abort the current frame at the time when the queue could otherwise write the next
+            // piece of that frame.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -123,8 +123,8 @@ impl TxQueue {
         if now < self.silent_until {
             return (bytes, passed);
         }
-        // On a serial line without a bit rate, the queue assumes that the operating system contains no bytes. Frames
-        // are still written in pieces, so that a Stop can overtake them.
+        // On a serial line without a bit rate, the queue assumes that no bytes are queued in the operating system.
+        // Frames are nevertheless written in pieces, so that a Stop can overtake them.
         let queued = bytes_in(self.free_at.saturating_sub(now), self.baud);
         let room = AHEAD.saturating_sub(queued);
         if self.urgent.is_some() {
@@ -134,8 +134,8 @@ impl TxQueue {
                 passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
                 return (bytes, passed);
             }
-            // The urgent frame is written as soon as it fits, with the remainder of the current frame, within the limit
-            // of queued bytes. The urgent frame would not arrive sooner if it were written earlier.
+            // The urgent frame is written as soon as it and the remainder of the current frame fit within the limit
+            // of queued bytes. It would not arrive sooner if it were written earlier.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {
@@ -169,8 +169,8 @@ impl TxQueue {
         (bytes, passed)
     }
 
-    /// Records that the operating system accepted the bytes only now. If the serial line was idle, it began to send
-    /// later than estimated. If the serial line began to send later than estimated, it is also free later.
+    /// Records that the operating system accepted the bytes only now. A serial line that was idle therefore began to
+    /// send later than estimated, and will also be free later.
     pub(super) fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);

@@ -64,8 +64,8 @@ impl SharedLine {
     pub fn apply_left(&mut self, client: &str, policy: Policy, now: Duration) -> Applied {
         self.bequeath(client.to_owned(), policy);
         if self.status.is_none() {
-            // The agent does not know the cause of the motion. The last will applies until the controller reports that
-            // the arm is at rest.
+            // Without a status, the agent does not know the cause of the motion. The last will applies until the
+            // controller reports that the arm is at rest.
             self.will = Some(self.will_of(Moves::Motion));
         }
         let moves = self.motion_tracker.may_move(self.status.as_ref(), now);

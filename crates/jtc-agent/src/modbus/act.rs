@@ -156,8 +156,7 @@ impl Plc {
         let order = RunOrder {
             course: Course::Along(Arc::new(stored.trajectory.clone())),
             approach: order.approach,
-            // The speed register always has a value. The default speed value of 100 means that the PLC has not chosen
-            // a speed.
+            // The speed register always has a value. Its default of 100 means that the PLC has not chosen a speed.
             speed_percent: Some(order.speed).filter(|speed| *speed != 100).map(f64::from),
             repeat: order.repeat.into(),
             accept_device_limits: false,

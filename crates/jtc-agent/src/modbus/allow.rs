@@ -20,8 +20,7 @@ impl Network {
     pub fn contains(&self, address: IpAddr) -> bool {
         let (own, other) = (number(self.address), number(address.to_canonical()));
         let left = own.1 - u32::from(self.bits);
-        // `left` may be the full number of bits of an address. If `left` is the full number of
-        // bits, `checked_shr` returns `None`.
+        // If `left` is the full number of bits of an address, `checked_shr` returns `None`.
         own.1 == other.1 && own.0.checked_shr(left).unwrap_or(0) == other.0.checked_shr(left).unwrap_or(0)
     }
 }

@@ -1,5 +1,4 @@
-//! Body of the fuzz target `modbus_stream`. The body of the fuzz target uses only this file and the file `pdu` of the
-//! crate.
+//! Body of the fuzz target `modbus_stream`. It uses only this file and the file `pdu` of the crate.
 use super::pdu::{Device, Exception, HEADER_LEN, Header, Table, answer};
 
 /// Longest response, including its header, that the Modbus standard permits, in bytes.
@@ -43,8 +42,8 @@ impl Device for Sixteen {
     }
 }
 
-/// Simulates a connection that sends the bytes `data`. Checks that each request receives one response with the same
-/// transaction number and a permitted length. Checks that the response shows whether the device executed the request.
+/// Simulates a connection that sends the bytes `data`. Checks that each request receives one response with its
+/// transaction number and a permitted length, and that the response shows whether the device executed the request.
 /// Also checks that a refused request writes nothing, and that written values can be read back.
 ///
 /// # Panics

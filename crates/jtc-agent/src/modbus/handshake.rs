@@ -27,8 +27,8 @@ pub struct Order {
 ///
 /// The sequence number of a command must follow the sequence number of the last command. A command with any other
 /// sequence number is not executed. If an answer is lost and the PLC repeats its write, the repeated write therefore
-/// has no effect. A PLC may also repeat values that it wrote before the start of the agent. Values that were written
-/// before the start of the agent have no effect, because each agent starts with a different sequence number.
+/// has no effect. A PLC may also repeat values that it wrote before the start of the agent. These values have no
+/// effect, because each agent starts with a different sequence number.
 #[derive(Clone, Debug)]
 pub struct Handshake {
     values: [u16; holding::COUNT],

@@ -10,8 +10,8 @@ use super::codes::{Outcome, error_number};
 use super::pdu::Exception;
 use crate::jobs::{Job, NUMBER_MAX, Stage};
 
-/// Version of the register map. The version increases when the meaning of a register address changes. The version
-/// stays the same when registers are added at the end.
+/// Version of the register map. The version increases if the meaning of an address changes, but not if registers are
+/// added at the end.
 pub const VERSION: u16 = 1;
 /// Register value that means "not known".
 pub const UNKNOWN: u16 = u16::MAX;
@@ -407,7 +407,7 @@ mod tests {
             jumped: 0b100,
             ..View::default()
         };
-        // The words of 61.5 are 42760000, and those of 54 are 42580000.
+        // The value 61.5 and its limit 54 are 42760000 and 42580000 in IEEE 754, and 12,300 ms are 12 s.
         assert_eq!(inputs(&view)[86..94], [2, 2, 0x4276, 0, 0x4258, 0, 12, 0b100]);
         let bit = |view: &View| (DISCRETE_INPUTS[13].value)(view);
         assert!(bit(&view) && !view.is_ready());

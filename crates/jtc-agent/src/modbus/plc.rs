@@ -18,8 +18,8 @@ use crate::owner::Line;
 
 /// Name of the PLC client on the serial line.
 const NAME: &str = "the PLC (Modbus)";
-/// Duration of silence after which the connection that sends commands counts as lost. The limit is `GONE`; a longer watchdog
-/// time replaces this limit. If the watchdog is off, the limit is `GONE_UNWATCHED`.
+/// Duration of silence after which the connection that sends commands is considered lost. If the watchdog time is
+/// longer, the watchdog time applies instead. If the watchdog is off, `GONE_UNWATCHED` applies.
 const GONE: Duration = Duration::from_secs(1);
 const GONE_UNWATCHED: Duration = Duration::from_secs(60);
 
@@ -77,7 +77,7 @@ impl Plc {
             handshake: Handshake::new(sequence),
             operator: None,
             coils: BTreeMap::new(),
-            // The PLC client is added to the line now. Stops of other clients therefore apply to this client even before its
+            // The PLC client is added to the line here, so that Stops of other clients apply to it even before its
             // first request.
             http_session: http_session(&line),
             job: None,
@@ -108,8 +108,8 @@ impl Plc {
         }
     }
 
-    /// Returns `true` if the connection sends commands, or if one of its coils holds the arm at rest. The server must not
-    /// close such a connection in favour of a new connection.
+    /// Returns `true` if the connection sends commands, or if one of its coils holds the arm at rest. The server must
+    /// not close such a connection to make room for a new one.
     pub fn needs_its_place(&self, connection: u64) -> bool {
         let state = self.lock();
         let holds = state.coils.get(&connection).is_some_and(|coils| coils.contains(&true));
@@ -138,7 +138,7 @@ impl Plc {
     pub(super) fn http_session(&self) -> Arc<HttpSession> {
         let mut state = self.lock();
         if self.line.with(|line, _| line.introduction(state.http_session.client).is_none()) {
-            // The line disconnected the previous client, so a new client is added.
+            // The serial line has disconnected the previous client, so a new client is added.
             state.http_session = http_session(&self.line);
         }
         state.http_session.clone()

@@ -19,8 +19,8 @@ use super::plc::{Connection, Plc};
 
 /// Largest number of PLC connections.
 pub const CONNECTIONS_MAX: usize = 8;
-/// Duration of silence after which the server may close a connection in favour of a new connection. In favour of a
-/// new connection, the server never closes a connection that sends commands or holds the arm at rest with a coil.
+/// Duration of silence after which the server may close a connection to make room for a new connection. The server
+/// never closes a connection for this reason if it sends commands or its coil holds the arm at rest.
 const GIVES_WAY: Duration = Duration::from_secs(2);
 /// Duration of silence after which the server closes any connection. The duration is longer than the longest watchdog
 /// time.
@@ -137,10 +137,9 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
     }
 }
 
-/// Ensures that the server can accept another connection. If necessary, closes an idle connection. Returns `false` if
-/// no connection can be closed. For a new connection, the server closes no connection that sends commands, holds the
-/// arm at rest with a coil, or was not idle long enough. If all connections hold the arm at rest, no motion can
-/// begin.
+/// Ensures that the server can accept another connection. If necessary, closes the connection that has been idle
+/// longest. Never closes a connection that sends commands, whose coil holds the arm at rest, or that was idle for
+/// less than `GIVES_WAY`. Returns `false` if no connection can be closed.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {

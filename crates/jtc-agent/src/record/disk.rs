@@ -245,8 +245,7 @@ impl Writer {
     fn break_off(&mut self) -> Option<PathBuf> {
         let Open { recorder, begun } = self.open.take()?;
         let (path, samples) = (begun.path.clone(), recorder.samples());
-        // When the recorder is dropped, it tries to complete the file. A failure of this attempt to
-        // complete the file is ignored.
+        // When the recorder is dropped, it tries to complete the file. A failure is ignored.
         drop(recorder);
         self.retention.break_off(begun, samples);
         Some(path)

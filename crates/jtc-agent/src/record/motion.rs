@@ -301,8 +301,8 @@ mod tests {
             arm.is(HoldPos, end, 0.0);
             arm.run_ms(200);
         }
-        // In the first case, the next motion begins after a short rest. In the second case, the next motion begins
-        // between two statuses.
+        // The fourth run begins after a short rest. The fifth run begins between two statuses, so only the decrease
+        // of the point index shows it.
         arm.is(Operate, Execute, 0.3);
         arm.run_ms(400);
         arm.status.point = 0;

@@ -22,8 +22,8 @@ const GONE_MAX: usize = 10_000;
 struct Own {
     /// File name of the recording without extension.
     name: String,
-    /// Length of the file in bytes; 0 if the length is unknown. If a file has a different length than the list file states, another
-    /// program has changed the file. The agent never removes a file that another program has changed.
+    /// Length of the file in bytes; 0 if the length is unknown. If a file has another length than the list file
+    /// states, another program has changed the file. The agent never removes such a file.
     bytes: u64,
     /// `true` if the recording is incomplete or in progress.
     part: bool,
@@ -86,7 +86,7 @@ impl Retention {
         Ok(retention)
     }
 
-    /// Processes a line of the list file. Ignores an invalid line of the list file.
+    /// Processes a line of the list file; ignores an invalid line.
     fn take_line(&mut self, line: &str) {
         let mut words = line.split(' ');
         let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
@@ -209,8 +209,8 @@ impl Retention {
             let _ = self.note(&format!("gone {}", oldest.name));
         }
         if self.gone > GONE_MAX {
-            // An error is ignored. If the list file then lacks the name of a recording, a later agent does not remove
-            // this recording.
+            // An error is ignored. If the name of a recording is then missing in the list file, no later agent
+            // removes this recording.
             let _ = self.rewrite();
         }
         removed
@@ -237,13 +237,14 @@ fn make(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Returns the length of the file at this path. For a symbolic link, the result is the length of the link itself, not of its target.
+/// Returns the length of the file at this path. The length of a symbolic link is that of the link itself, not of its
+/// target.
 fn length(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
 }
 
-/// Returns the name of a recording, which consists of time (UTC) and number, such as `20261123T154412Z-000017`. The numbers of recordings
-/// always increase with time. The names of recordings also increase with time, unless the clock was set back.
+/// Returns the name of a recording, which consists of time (UTC) and number, such as `20261123T154412Z-000017`. The
+/// numbers always increase with time. The names also increase with time, unless the clock was set back.
 fn name(now: Duration, number: u64) -> String {
     let since = now.as_secs();
     let (year, month, day) = date((since / 86_400) as i64);

@@ -13,7 +13,7 @@ use crate::record::Notice;
 
 /// Time within which a connected controller sends a status.
 const REPORTS: Duration = Duration::from_secs(1);
-/// Longest wait until the controller confirms a Stop. After 1 s, the line continues to repeat the Stop.
+/// Longest wait until the controller confirms a Stop. The Stop is repeated even after this time.
 const TAKES: Duration = Duration::from_secs(1);
 /// Interval at which a condition on the line is checked.
 const LOOK: Duration = Duration::from_millis(10);
@@ -41,13 +41,13 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
 }
 
-/// Reads `host_timeout_ms` from the controller, so that the line knows this value. A motion that a killed program has started may still be
-/// in progress. The controller would treat requests of other clients as signs that the killed program still runs (J-59). The line
-/// therefore uses the timeout to refuse requests of other clients. Has no effect if the controller does not have the setting
-/// `host_timeout_ms` or does not answer.
+/// Reads `host_timeout_ms` from the controller, so that the line knows this value. The motion of a killed program may
+/// still be in progress. The controller would take requests of other clients as signs that the killed program still
+/// runs (J-59). The line therefore uses the timeout to refuse these requests. Has no effect if the controller does
+/// not have the setting or does not answer.
 pub fn read_host_timeout(line: &Line) {
     let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
-    // The result is not used, because the line itself reads the setting in the controller's answer.
+    // The result is not used, because the shared line itself reads the setting in the controller's answer.
     let _ = Session::new(line.connect(introduction)).settings();
 }
 

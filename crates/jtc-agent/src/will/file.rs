@@ -39,7 +39,7 @@ pub enum Found {
     Nothing,
     /// Last will of an agent that was killed during a motion.
     Left(Stored),
-    /// The file has invalid contents; the text is the reason. If the file has invalid contents, the policy is unknown.
+    /// The file has invalid contents, so the policy is unknown. The text is the reason.
     Doubtful(String),
 }
 
@@ -103,8 +103,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the complete file of the last will in one step. After the write, the file is valid even if the agent is killed. When the disk
-/// has stored the file, the file also survives a loss of power.
+/// Writes the complete file of the last will in one step. From then on, the file is valid even if the agent is
+/// killed. When the disk has stored it, it also survives a loss of power.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };

@@ -20,8 +20,8 @@ type Wanted = Option<(Will, f64)>;
 
 struct Slot {
     wanted: Wanted,
-    /// `true` until the agent has applied the last will of the previous agent. Before that, the keeper must not change the file of the
-    /// previous agent.
+    /// `true` until the agent has applied the last will of the previous agent. Until then, the keeper must not change
+    /// the file.
     held: bool,
     ended: bool,
     /// `true` after the keeper's thread has ended.
@@ -81,7 +81,7 @@ impl Keeper {
         Ok((Self(shared), found))
     }
 
-    /// Returns the witness that the owner of the line calls for each event.
+    /// Returns the [`Witness`], which must receive each event of the serial line.
     pub fn witness(&self) -> Witness {
         Witness(self.0.clone())
     }
@@ -258,7 +258,7 @@ mod tests {
         drop(keeper);
         let (keeper, found, _notices) = begin(dir.path());
         let Found::Left(stored) = &found else { panic!("{found:?}") };
-        // The file and its time stay unchanged until the last will is applied, even if the agent ends earlier.
+        // The file and its time stay unchanged until `settle` is called, even if the agent ends before that.
         drop(keeper);
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());

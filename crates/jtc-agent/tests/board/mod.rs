@@ -1,5 +1,5 @@
-//! Simulated controller at a serial line, bit by bit in virtual time. The simulation and the tested code share only the parser of
-//! `jtc-wire`.
+//! Simulated controller on a simulated serial line, in virtual time. The simulation and the tested code share only
+//! the parser of `jtc-wire`.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use jtc_wire::{DataStatus, FRAME_MAX, FrameType, LinkEvent, Receiver, Response, 
 
 /// Step of the virtual time, µs; at 115,200 Bd, one byte takes 86.8 µs.
 const STEP_US: u64 = 20;
-/// Longest interval between two calls of the line's owner, µs.
+/// Interval between two calls of the shared line, µs. It equals the longest wait of the thread that owns a real port.
 const TURN_US: u64 = 2000;
 /// Interval between two statuses, µs.
 const REPORT_US: u64 = 15_500;

@@ -1,7 +1,7 @@
 //! List of the agents of this user on this computer. With this list, a command finds the agent that owns its port.
 //!
-//! Each agent has a locked file in a folder to which no other user can write. The file of a killed agent is unlocked. Another program may
-//! listen at the address of a killed agent.
+//! Each agent has a locked file in a folder to which no other user can write. If an agent is killed, its file is
+//! unlocked. The lock is checked because another program may then listen at the address of this agent.
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -57,8 +57,7 @@ pub fn registered() -> Vec<Registered> {
     files.flatten().filter_map(|file| alive(&file.path())).collect()
 }
 
-/// Returns the agent of a file. Returns `None` if the file is unlocked, because the agent of an unlocked file no longer
-/// runs.
+/// Returns the agent of a file, or `None` if the file is unlocked, because the agent of an unlocked file has ended.
 fn alive(path: &Path) -> Option<Registered> {
     let mut file = File::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {

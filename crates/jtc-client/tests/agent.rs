@@ -1,5 +1,5 @@
-//! Tests of sessions through an agent. A session through an agent has the same functions as a session on a serial port.
-//! Several clients can have sessions at the same time.
+//! Tests of sessions through an agent, which have the same functions as sessions on a serial port. Several clients
+//! can have sessions at the same time.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -86,7 +86,7 @@ fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
     );
 }
 
-/// A client that does not know about a Stop sends requests that are older than the Stop. Requests that are older than a Stop cannot move
+/// A client that does not know about a Stop sends requests that are older than the Stop. Such requests cannot move
 /// the arm.
 #[test]
 fn what_a_client_was_asked_for_before_a_stop_moves_nothing_until_somebody_asks_anew() {

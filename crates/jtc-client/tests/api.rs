@@ -41,7 +41,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     assert_eq!(check["passed"], true, "{check}");
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7 }));
     let (number, _) = event(&served, 0, "executing");
-    // The agent refuses another command at the same time, and the error contains the active job.
+    // While the job runs, the agent refuses another command, and the error contains the number of the job.
     let (status, busy) = anna.ask("POST /api/gripper", Some(json!({ "on": true })));
     assert!(
         status == 409
@@ -133,8 +133,8 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
     {
         let anna = Program::new(&served, "anna", 1.0, policy);
-        // The agent refuses a jog after the Stop or Pause of the previous client. The agent also refuses repeated
-        // requests for this jog until the hold-off ends.
+        // The policy of the previous client may have stopped or paused the arm. During the hold-off after that, the
+        // agent refuses a jog, so the test repeats the jog until the hold-off ends.
         let halted =
             || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": ([0.0; 6]) }))).1["code"] == "denied";
         while halted() {
@@ -144,7 +144,8 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         let last = served.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number");
         let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
         event(&served, last, "executing");
-        // The program sends no more requests. The next requests of the test do not renew the lease of this program.
+        // The program sends no more requests. The test itself sends only requests that do not renew the program's
+        // lease.
         let ended = || served.api(&format!("GET /api/jobs/{job}"), None, None).1;
         let paused =
             || served.line.with(|line, _| line.status().map(|(_, s)| s.trajectory.name().to_owned()));

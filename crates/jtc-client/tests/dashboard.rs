@@ -274,8 +274,8 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
         "{}",
         good.len()
     );
-    // The path ends before the arm has settled. The controller commands the end point of the path until the arm has
-    // settled.
+    // The path ends before the arm has settled. Until it has settled, the controller commands the end point of the
+    // path.
     until("nothing is commanded", || controller()["commanded_rad"].is_null());
 
     // A stopped motion also has a report, and earlier reports are kept.

@@ -68,7 +68,7 @@ fn halts_that_no_agent_has_counted_are_refused_with_what_it_has() {
 
 #[test]
 fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
-    // The line is slow enough for a Stop during the upload.
+    // At this bit rate, the upload takes long enough for a Stop during the upload.
     let served = Served::start(115_200);
     let text =
         AVENA_TOML.replacen("name = \"avena\"", "name = \"other\"", 1) + "\n[settings]\nstop_ms = 400\n";

@@ -1,5 +1,5 @@
-//! Tests that a run executes the trajectory that the user saw. A request with `new` = `true` does not replace a stored
-//! trajectory.
+//! Tests that a run executes the trajectory that the user saw, and that a request with `new` = `true` replaces no
+//! stored trajectory.
 use crate::common;
 
 use common::Served;

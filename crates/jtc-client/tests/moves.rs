@@ -86,7 +86,7 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     }
     let (_, error) = anna.ask("POST /api/moves", Some(json!({ "to_pose": "bend" })));
     assert!(error["message"].as_str().is_some_and(|m| m.contains("bent")), "{error}");
-    // The target is out of reach. The job reports that the target is out of reach, and no joint moves.
+    // The target is out of reach. The job reports this, and no joint moves.
     let far = json!({ "to_flange": { "xyz_m": [5.0, 0.0, 0.3], "rpy_rad": [0.0, 0.0, 0.0] } });
     let failed = anna.over(anna.begin("POST /api/moves", far));
     assert_eq!(failed["stage"], "failed", "{failed}");

@@ -81,7 +81,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     assert_eq!(status, 204, "{error}");
     let planned = plan(json!({ "waypoints": THREE })).1;
     assert!(seconds(&planned) > 8.0, "{}", seconds(&planned));
-    // The plan uses a payload.
+    // A plan with a payload of 2 kg needs more torque.
     let heavy = json!({ "mass_kg": 2.0, "com_m": [0.0, 0.0, 0.1] });
     let loaded = plan(json!({ "waypoints": THREE, "payload": heavy })).1;
     let torque = |planned: &Value| planned["joints"][1]["torque_peak_nm"].as_f64().expect("a torque");

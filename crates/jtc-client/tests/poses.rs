@@ -56,7 +56,7 @@ fn poses_are_saved_used_deleted_and_outlast_the_agent() {
         let first_joint = here["positions_rad"][0].as_f64().expect("a number");
         assert!((first_joint - 0.3).abs() < 0.01, "{here}");
     }
-    // A plan can use poses of both kinds.
+    // A plan can use a pose of the arm file and a saved pose.
     let through = json!({ "waypoints": "pose\nhome\nabove-table\n" });
     assert_eq!(first.api("POST /api/plans", None, Some(through)).0, 200);
     text_with(&first.log, &["\"what\":\"pose\"", "above-table"]);

@@ -1,5 +1,5 @@
-//! Tests of settings and other parameters of a controller by HTTP. The agent refuses requests of other clients, and
-//! requests in the wrong state. A request is applied completely or not at all.
+//! Tests of settings and other parameters of a controller by HTTP. The agent refuses changes by other clients, and
+//! changes in the wrong state. It applies all changes of a request, or none of them.
 use crate::common;
 
 use common::Served;
@@ -36,7 +36,7 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
     let lines = logged(&served, "host_timeout_ms = 1500, velocity_max_rad_s of joint 2 = 0.75");
     assert!(lines.len() == 1 && lines[0]["why_not"].is_null(), "{lines:?}");
 
-    // Each invalid setting is sent together with a valid setting. The agent refuses both settings.
+    // Each invalid setting is sent together with a valid setting. The agent refuses both.
     for (wrong, facts) in [
         (json!({ "name": "host_timeout", "value": 1 }), [Value::Null, json!(1.0), Value::Null]),
         (json!({ "name": "host_timeout_ms", "value": 60001 }), [Value::Null, json!(60001.0), json!(60000.0)]),
@@ -63,8 +63,8 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
         assert!(matches!(change(none).0, 400 | 422));
     }
 
-    // While the torque is on, the controller refuses these settings and keeps its parameters. Some other settings can
-    // also be changed while the torque is on.
+    // While the torque is on, the controller refuses these settings and keeps its parameters. It accepts some other
+    // settings.
     anna.recover();
     let (status, error) = change(json!([{ "name": "stop_ms", "value": 300 }]));
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("torque")), "{error}");

@@ -1,4 +1,5 @@
-//! Program with all tests of the crate. Therefore only one program is linked. Each file in this directory is a module of the program.
+//! All tests of the crate are in one program, so that only one program is linked. Each file in this directory is a
+//! module of the program.
 mod agent;
 mod api;
 mod arm;

@@ -1,5 +1,5 @@
-//! Measurement of Stops under each load. At the same time, the example measures simple round trips to a server that
-//! uses the HTTP library of the agent.
+//! Measurement of Stops under each load. For comparison, it also measures simple round trips to a server that uses
+//! the HTTP library of the agent.
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
@@ -11,8 +11,8 @@ use crate::crowd::Crowd;
 use crate::line::{self, Watch};
 use crate::operator::Operator;
 
-/// Time between two Stops. Within this time, the record of the first Stop arrives. A random time up to `AT_ANY_TIME_US` is added. Therefore
-/// Stops occur at random times between two statuses.
+/// Time between two Stops, within which the record of the first Stop arrives. A random time up to `AT_ANY_TIME_US` is
+/// added, so that Stops occur at random times between two statuses.
 const BETWEEN: Duration = Duration::from_millis(220);
 const AT_ANY_TIME_US: u64 = 120_000;
 /// Longest wait for an event. If the event does not occur within this time, the measurement has failed.

@@ -244,8 +244,8 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
     let facts = json!({ "command": "stop", "from": asker.caller.peer.to_string(), "by": by, "lost": lost });
     match client {
         Some(_) => agent.gate.note("halt", facts),
-        // A client without a lease can send any number of Stops, so the log contains only the first of them in full
-        // and counts the others.
+        // A client without a lease can send any number of Stops. The log contains only the first of them in full and
+        // counts the others.
         None => agent.gate.note_repeated("halt", asker.caller.peer, facts),
     }
     if let Some(lost) = lost {

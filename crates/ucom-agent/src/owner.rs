@@ -27,8 +27,8 @@ pub struct Config {
     pub signals: SignalTable,
     /// Cache for the signal names of the boards.
     pub cache: Cache,
-    /// List of the clean-up steps that would be missing if the process ended now. The code that ends the process prints the list
-    /// of missing clean-up steps.
+    /// List of the clean-up steps that would be missing if the process ended now. The code that ends the process
+    /// prints this list.
     pub cleanup: CleanupList,
     /// Inventory file that contains records of the images that updates wrote. If `None`, the agent keeps records of written images
     /// only while it runs.
@@ -48,7 +48,7 @@ impl Owner {
     ///
     /// The URL is invalid, or the bus cannot be opened.
     pub fn open(url: &str, config: Config) -> Result<Self, SessionError> {
-        // The owner's thread sends heartbeats and Stops, so it must not wait for the disk.
+        // The thread that owns the bus sends heartbeats and Stops, so it must not wait for the disk.
         let config = Config { cache: config.cache.in_memory(), ..config };
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         let link = Link::on(Box::new(Prompt(bus)), url);

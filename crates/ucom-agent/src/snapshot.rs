@@ -25,8 +25,7 @@ pub(crate) struct Values {
 /// State of the bus and the boards at one time.
 #[derive(Clone)]
 pub(crate) struct BusSnapshot {
-    /// Time of the snapshot by the clock of the bus session, in µs. `at` is the time of the snapshot by the clock of
-    /// the agent.
+    /// Time of the snapshot by the clock of the bus session, in µs. `at` is the same time by the clock of the agent.
     pub now_us: u64,
     pub at: Instant,
     pub profile: Profile,

@@ -60,8 +60,8 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("start")), "{error}");
     let (status, started) = served.api("POST /api/boards/1/start", Some(&key), None);
     assert_eq!((status, started["state"].as_str()), (200, Some("started")), "{started}");
-    // A value that was neither set nor read is unknown. If such values were 0, a client that reads all values and writes them back would
-    // write zeros.
+    // A value that was neither set nor read is unknown. If it were shown as 0, a client that reads all values and
+    // writes them back would write zeros.
     let known = |of: &Value| {
         of["inputs"]
             .as_array()
@@ -205,8 +205,8 @@ fn a_run_that_is_stopped_while_it_begins_does_not_begin() {
     }
 }
 
-/// D-51: the agent reports a board as late after 1.5 s without a heartbeat, and as lost after 3 s. D-51: the agent reports a lost board
-/// as back with its next heartbeat.
+/// D-51: the agent reports a board as late after 1.5 s without a heartbeat, as lost after 3 s, and as back with its
+/// next heartbeat.
 #[test]
 fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
     let (served, key) = Served::numbered(2);
@@ -231,7 +231,8 @@ fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
             assert_eq!(served.board(1)["heartbeat"], "alive");
         }
     }
-    // The board sent its last heartbeat up to one second before the fault.
+    // The board sent its last heartbeat up to one second before the fault. The event `late` therefore comes 0.5 to
+    // 1.5 s after the fault, and the event `lost` 2 to 3 s after it, with some tolerance.
     assert!((0.4..1.7).contains(&at[0]) && (1.9..3.2).contains(&at[1]), "{at:?}");
     assert!((1.4..1.6).contains(&(at[1] - at[0])) && at[2] < 6.7, "{at:?}");
 }
@@ -277,8 +278,8 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     assert_eq!(job["stage"], "failed", "{job}");
     assert!(job["error"]["message"].as_str().is_some_and(|m| m.contains("PC")), "{job}");
     other.end();
-    // A bus without another master works normally. The test takes the lease only now, because the steps above take long on a busy
-    // computer.
+    // A bus without another master works normally. The test takes this lease only here, because it could lapse during
+    // the steps above on a busy computer.
     let (served, key) = Served::numbered(2);
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
     // If another master is present, the agent also sends no queries for a viewer.
@@ -428,7 +429,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
         }
         stop();
         is_master(false);
-        // The lease of this test must not lapse before the check.
+        // Bob's lease of 60 s must still be valid at this check.
         assert_eq!(status()["lease"].is_null(), !lease, "{}", status());
         let beat = |frame: &can_link::CanFrame| frame.id().value() == 0x680 && frame.data().is_empty();
         let (mut peer, begun, mut beats) = (served.chain.peer(), Instant::now(), 0);

@@ -7,7 +7,7 @@ fn the_description_in_the_docs_is_that_of_the_code() {
     page::whole("ucom-openapi.json", &format!("{}\n", ucom_agent::api::description()));
 }
 
-/// The next step of an error names a request, or a command if the API has no request for this step.
+/// The next step in an error names an HTTP request, or a command if the API has no request for this step.
 #[test]
 fn each_request_of_a_next_step_exists() {
     let is_own = |action: &&Action| action.name(FrontEnd::Command).starts_with("ucom ");

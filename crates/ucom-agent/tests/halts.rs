@@ -1,5 +1,5 @@
-//! Tests that a request that was made before a Stop moves no board after the Stop. The test uses different delays of the request,
-//! and Stops of different clients.
+//! Tests that a request from before a Stop moves no board after the Stop. The tests use different delays of the
+//! request, and Stops of different clients.
 use crate::common;
 
 use std::io::{Read as _, Write as _};

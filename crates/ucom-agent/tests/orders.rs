@@ -59,7 +59,7 @@ fn a_run_whose_client_dies_meanwhile_is_stopped() {
     }
 }
 
-/// If a run was cancelled but one of its boards could not be stopped, the agent stops this board when the agent ends.
+/// If a run was cancelled but one of its boards could not be stopped, the agent stops this board before it ends.
 #[test]
 fn a_run_that_cannot_be_taken_back_counts_as_started() {
     let (served, key) = Served::numbered(3);
@@ -74,7 +74,7 @@ fn a_run_that_cannot_be_taken_back_counts_as_started() {
     assert_eq!(over["stage"], "cancelled", "{over}");
     let mut peer = served.chain.peer();
     let mut served = served;
-    // The board is still listed as started, so the agent must send a Stop to this board before the agent ends.
+    // Board 1 is still listed as started, so the agent must send a Stop to this board before it ends.
     let ending = std::thread::spawn(move || {
         served.end();
         served
@@ -103,7 +103,7 @@ fn a_lease_lapses_in_the_middle_of_an_update() {
     assert_eq!(stopped["not_stopped"], json!([]), "{stopped}");
 }
 
-/// If a client has lost the lease, its queued request is not executed under the lease of another client.
+/// If a client loses the lease while its request is queued, the request is not executed.
 #[test]
 fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -147,7 +147,8 @@ fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     hang_up(2, false);
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
     served.board_when(2, "off", |board| board["active"] == false);
-    // The agent has executed this later request, so it has processed all earlier requests.
+    // The agent processes requests in order. After this later request, it has therefore processed all earlier
+    // requests.
     assert_eq!(served.api("PUT /api/boards/2/outputs", Some(&key), Some(json!({ "active": false }))).0, 204);
     assert_eq!(served.board(1)["active"], false);
 }
@@ -210,7 +211,7 @@ fn a_board_that_is_silent_at_a_stop_is_named_and_still_counts() {
     assert_eq!((&stopped["boards"], &stopped["not_stopped"]), (&json!([1, 2]), &json!([])), "{stopped}");
 }
 
-/// Read-only requests do not delay commands, even if these requests query a silent board again and again.
+/// Read-only requests do not delay commands, even if they query a silent board again and again.
 #[test]
 fn questions_keep_no_command_waiting() {
     let (served, key) = Served::numbered(2);
@@ -252,8 +253,8 @@ fn the_end_stops_what_runs_before_a_job_is_undone() {
     drop(ending.join());
 }
 
-/// If a command can be executed only shortly before its HTTP request times out, the agent refuses it. Otherwise, the client would not
-/// see the effect of the command.
+/// A command that has waited in the queue for more than 5 s is refused, because its HTTP request times out after 10
+/// s. Otherwise, the client might not see the effect of the command.
 #[test]
 fn what_waits_too_long_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -295,14 +296,14 @@ fn d34_an_input_of_a_board_without_power_is_no_success() {
     let (status, error) = set();
     assert_eq!(status, 200, "{error}");
     served.chain.fault("power-loss board=1 for_s=60");
-    // In the first half second without power, the last outputs are not older than the outputs of a running board.
+    // Outputs that are at most 0.5 s old still count as outputs of a running board, so the test waits longer.
     std::thread::sleep(Duration::from_millis(600));
     let (status, error) = set();
     assert_eq!(status, 409, "{error}");
 }
 
-/// A client cannot release its lease while its run starts. If the client could release its lease, the agent would enable outputs later,
-/// when no client holds the lease.
+/// A client cannot release its lease while its run starts. Otherwise, the agent would enable outputs later, when no
+/// client holds the lease.
 #[test]
 fn the_lease_is_not_let_go_while_a_run_begins() {
     let (served, key) = Served::numbered(1);
@@ -319,8 +320,8 @@ fn heartbeats_end(served: &Served) {
     until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }
 
-/// D-50: read-only requests do not make the agent continue its heartbeats, even if the requests are frequent. If no client holds the
-/// lease, the boards become safe.
+/// D-50: read-only requests do not keep the agent's heartbeats going, even if the requests are frequent. If no client
+/// holds the lease, the boards become safe.
 #[test]
 fn d50_questions_do_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -354,8 +355,8 @@ fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     heartbeats_end(&served);
 }
 
-/// D-50: another PC has started the control loop of a board. If this agent stops the control loop of another PC's board, it does not
-/// treat the board as one that it has started.
+/// D-50: another PC has started the control loop of a board. If this agent stops that control loop, it does not treat
+/// the board as one that it has started.
 #[test]
 fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);

@@ -63,8 +63,8 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
 }
 
-/// D-62: if the same image has another address, the agent writes its bytes again. If the agent has no record of a program, it
-/// does not report the program as verified. U-3: if an update has no date, the board keeps the date of its program.
+/// D-62: if the same image has another address, the agent writes its bytes again. A program without a record in the
+/// agent is not reported as verified. U-3: if an update has no date, the board keeps the date of its program.
 #[test]
 fn d62_what_the_agent_wrote_is_what_it_knows() {
     let (served, key) = Served::numbered(1);
@@ -189,8 +189,8 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     );
     std::thread::sleep(Duration::from_millis(100));
     assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 409);
-    // The flash was not erased, so the board still has its old program. After the start of an update, the agent no longer knows
-    // the contents of the flash (D-62).
+    // The flash was not erased, so the board still has its old program. However, since the start of an update, the
+    // agent does not know the contents of the flash (D-62).
     let job = served.job("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
     assert_eq!(job["update"]["boards"][0]["outcome"], "program-up-to-date", "{job}");
 }

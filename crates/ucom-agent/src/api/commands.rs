@@ -1,4 +1,4 @@
-//! Short commands of the lease holder.
+//! Commands of the lease holder that end at once, in contrast to jobs.
 use std::sync::Arc;
 
 use agent_kit::api::{Asked, Body, Number, Problem, Refusals};
@@ -96,7 +96,7 @@ pub(super) struct ResetObject {
 }
 
 impl Agent {
-    /// Runs a command of the lease holder in the owner's thread, and logs the command.
+    /// Runs a command of the lease holder in the thread that owns the bus, and logs the command.
     async fn command<T: Send + 'static>(
         &self,
         asker: &Asker,
@@ -148,8 +148,8 @@ fn set(
     note_rounded(&worker.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = worker.driver.now_us();
     let boards = worker.driver.master.boards();
-    // The agent sends the inputs of a running board repeatedly, so a later frame replaces a lost frame. If a board has no
-    // power, its control loop does not run.
+    // The agent repeats the inputs of a running board, so a lost frame has no effect and needs no check. A board that
+    // sends no outputs may be without power, and does not count as running.
     let runs = worker.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -289,8 +289,8 @@ pub(super) async fn start_board(
         let all = worker.starting(&[board], |worker| {
             worker.driver.change_each(&[board], |board| Request::Start { board, force: false })
         })?;
-        // The names of the values are loaded now. If the names cannot be loaded, this does not affect the application,
-        // which has already started.
+        // The names of the values are also loaded now. A failure does not affect the application, which has already
+        // started.
         let _ = worker.known(board);
         all.first()
             .map(|one| AnswerObject::of(one, &worker.driver.master.profile()))

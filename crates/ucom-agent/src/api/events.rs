@@ -1,4 +1,5 @@
-//! Events of the chain: numbered lists, and a live stream of events with the values of running boards.
+//! Events of the chain. Clients request events by number, or receive them as a live stream together with the values
+//! of running boards.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};

@@ -141,8 +141,8 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash date: the requested date, or else the current date (UTC). Returns 0 if the headers contain no
-/// date.
+/// Returns the flash date: the requested date, or else the current date (UTC). Returns 0 if updates with this profile
+/// send no header, because only the header contains the date.
 fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Problem> {
     let wrong = |text: &str| {
         usage(

@@ -83,15 +83,15 @@ impl Shared {
         worker: Result<&'a mut Worker, Refused>,
         asked: Option<Asked>,
     ) -> Result<&'a mut Worker, Problem> {
-        // A thread that holds the lock of the leases may also call this closure to refuse the request. `turn` therefore takes the
-        // lock of the leases only below, when it runs in the owner's thread.
+        // If the request is refused here, this thread may already hold the lock of the leases. The lock is therefore
+        // taken only below, where `turn` runs in the owner's thread.
         let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),
             Refused::Closed => gone(),
         })?;
         let late = asked.and_then(|asked| {
-            // A Stop may arrive while the leases are checked.
+            // A Stop may arrive while `too_late` checks the leases, so the number of Stops is checked after that.
             self.too_late(asked).or_else(|| (asked.halt < self.queue.stops()).then(|| self.stopped()))
         });
         if late.is_some() {
@@ -101,8 +101,8 @@ impl Shared {
         late.map_or(Ok(worker), Err)
     }
 
-    /// Runs a short function in the owner's thread and waits for its result. The function is a command, or a query that needs no
-    /// lease.
+    /// Runs a short function in the thread that owns the bus, and waits for its result. The function is a command, or
+    /// a query that needs no lease.
     pub(crate) async fn call<T: Send + 'static>(
         self: &Arc<Self>,
         asked: Option<Asked>,

@@ -1,4 +1,5 @@
-//! Operator of the bus session: publishes snapshots and events of the bus, even during a procedure.
+//! Functions that the bus session calls for the agent. They publish snapshots and events of the bus, even during a
+//! procedure.
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -30,29 +31,28 @@ type Step = (u64, Vec<u8>, u32, u32);
 /// State of the owner's thread that is also accessible during a procedure.
 #[derive(Default)]
 pub(super) struct Local {
-    /// Boards that returned no names to a request without the lease. Each entry for such a board has the time and the
-    /// reason.
+    /// Boards that returned no names to a request without the lease, each with the time and the reason.
     pub nameless: BTreeMap<u8, (Instant, Problem)>,
     pub states: BTreeMap<u8, &'static str>,
-    /// Number of Stops whose frames were sent. `halted_us` is the time of the last Stop whose frames were sent.
+    /// Number of Stops whose frames were sent. `halted_us` is the time of the last of them.
     pub halts_sent: u64,
     pub halted_us: Option<u64>,
     /// Update step of the last progress event, and the time of this event in µs.
     pub progress: Option<(Step, u64)>,
-    /// `true` if the agent has sent the Stop that it sends when it ends.
+    /// `true` if the agent has sent its last Stop, which it sends when it ends.
     pub end_sent: bool,
     pub job: Option<u64>,
     /// Time of the last event about another PC, in µs.
     pub competing_us: Option<u64>,
     pub now_us: u64,
-    /// Time of the last snapshot; if `None`, the next turn publishes a new snapshot.
+    /// Time of the last snapshot; if `None`, the next cycle of the bus loop publishes a new snapshot.
     pub published: Option<Instant>,
     /// Events that are written after the next snapshot. A client that reads an event therefore finds the new state in
     /// the snapshot.
     pub happened: Vec<ChainEvent>,
 }
 
-/// Operator of the bus session.
+/// Implementation of [`Operator`] for the agent: the bus session calls its functions.
 pub(super) struct Hand {
     pub shared: Arc<Shared>,
     pub held: Rc<RefCell<Held>>,
@@ -76,7 +76,7 @@ impl Operator for Hand {
     fn happened(&self, event: &Event, text: Option<String>) {
         let mut local = self.local.borrow_mut();
         let now_us = local.now_us;
-        // The agent reports supervision changes in each turn.
+        // The returned change is ignored, because `Worker::turn` reports all changes of control loops with `look`.
         let _ = self.held.borrow_mut().see(event, now_us);
         let job = local.job;
         let mut write = Vec::new();
@@ -133,8 +133,8 @@ impl Operator for Hand {
     }
 
     fn turned(&self, master: &mut Master, link: &mut Link) {
-        // The leases are checked in each turn. A running or queued request can therefore not prevent the lapse of a
-        // lease.
+        // `leases` ends a lapsed lease. The agent calls it in each cycle of the bus loop, so that a running or queued
+        // request cannot delay the end of a lease.
         drop(self.shared.leases());
         let mut local = self.local.borrow_mut();
         local.now_us = link.now_us();
@@ -148,8 +148,8 @@ impl Operator for Hand {
             master.stop_at_once(local.now_us, None);
         }
         if self.shared.has_ended() && !local.end_sent {
-            // The started boards are stopped first, because a running request may still undo steps on boards that do not
-            // answer.
+            // The started boards are stopped at once. A running request may need longer, because it may undo steps on
+            // boards that do not answer.
             local.end_sent = true;
             let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
             master.stop_at_once(local.now_us, Some(&started));
@@ -174,7 +174,7 @@ impl Hand {
         }
         local.states = states;
         let held = self.held.borrow();
-        // If a board now has another application, its stored names are invalid.
+        // If a board has another application than before, its stored names are invalid.
         let is_its = |(number, known): &(&u8, &Arc<Known>)| {
             let info = boards.get(**number).and_then(|board| board.info);
             info.is_none_or(|info| DescriptionKey::of(&info) == DescriptionKey::of(&known.info))

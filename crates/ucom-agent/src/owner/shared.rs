@@ -37,7 +37,7 @@ struct Halt {
 /// Requesters of the last Stops. The queue of the owner counts the Stops.
 #[derive(Default)]
 struct Halts {
-    /// Time of the last event about Stops. `more` is the number of Stops since the last event about Stops.
+    /// Time of the last event about Stops. `more` is the number of Stops since that event.
     shown: Option<Instant>,
     more: u64,
     last: Option<Halt>,
@@ -80,7 +80,7 @@ pub(crate) struct Shared {
     leases: Mutex<Leases<Policy>>,
     /// Lease holder at the time of the last check.
     holder: Mutex<Option<String>>,
-    /// `true` from the time before the first frame to a started board until all started boards were stopped.
+    /// `true` from shortly before the first frame that starts a board, until all started boards are stopped.
     pub(super) runs: Arc<AtomicBool>,
 }
 
@@ -136,8 +136,8 @@ impl Shared {
             }
         };
         let number = {
-            // The Stop counter and the requester of the Stop change under one lock. A thread that reads the number of a Stop therefore
-            // also reads the requester of this Stop.
+            // The Stop counter and the requester change under one lock, so that a thread never reads the number of
+            // one Stop with the requester of another.
             let mut halts = lock(&self.halts);
             halts.add(by, client);
             self.queue.stop_alike(Tag::default(), Box::new(act))
@@ -148,7 +148,7 @@ impl Shared {
         number
     }
 
-    /// Returns the number of requested Stops. The number of requested Stops is also the number of the last Stop.
+    /// Returns the number of requested Stops, which is also the number of the last Stop.
     pub(crate) fn halts(&self) -> u64 {
         self.queue.stops()
     }
@@ -197,14 +197,14 @@ impl Shared {
     }
 }
 
-/// Functions for the owner of the bus.
+/// Functions for the owner of the bus: the thread that runs the bus loop.
 impl Shared {
-    /// Requests that the owner ends.
+    /// Asks the owner's thread to end.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// Returns `true` if the owner must end.
+    /// Returns `true` if the owner's thread must end.
     pub(super) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Relaxed)
     }

@@ -17,7 +17,7 @@ use super::shared::Shared;
 use crate::event::ChainEvent;
 use crate::snapshot::Values;
 
-/// Maximum waiting time in one turn.
+/// Longest wait for a frame in one cycle of the bus loop.
 const TURN: Duration = Duration::from_millis(5);
 /// Time for which the agent only listens before its first query. Another PC may be the master of the bus (D-08).
 const LISTEN: Duration = Duration::from_millis(600);
@@ -68,7 +68,8 @@ impl Worker {
             if !looked && start.elapsed() >= LISTEN {
                 looked = true;
                 if self.driver.master.competing_master().is_none() {
-                    // If the scan fails, a client can request another scan. If the bus is lost, the next turn detects the loss.
+                    // If the scan fails, a client can request another scan. If the bus is lost, the next call of
+                    // `turn` detects the loss.
                     let _ = self.driver.run(Request::Scan);
                 }
             }
@@ -82,11 +83,12 @@ impl Worker {
             }
             self.rest();
         }
-        // If a client requested a Stop just before the end, this turn sends its frames.
+        // If a client requested a Stop just before the end, this call sends its frames.
         self.turn()
     }
 
-    /// Runs one turn of the bus. Also checks the leases; see [`Hand`].
+    /// Runs one cycle of the bus loop: handles frames for a short time, and records boards that left or re-entered
+    /// their control loops. Also checks the leases; see [`Hand`].
     fn turn(&mut self) -> Result<(), SessionError> {
         self.session.turn(TURN)?;
         let events = self.session.look().into_iter().map(|notice| {
@@ -103,18 +105,18 @@ impl Worker {
         self.session.rest(commands);
     }
 
-    /// Publishes the snapshot and the events of a request and marks the request as ended. The snapshot is published and the
-    /// request ends before the client receives the answer.
+    /// Publishes the snapshot and the events of a request and marks the request as ended, all before the client
+    /// receives the answer.
     pub(super) fn settle(&mut self) {
         self.local.borrow_mut().published = None;
-        // If the bus is lost, the next turn detects the loss.
+        // If the bus is lost, the next call of `turn` detects the loss.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }
 
     /// Executes one request.
     fn serve_one(&mut self, turn: owner::Turn<Self, Tag>) {
-        // The queries that the session sends in the background must not keep a board busy.
+        // Cancels background queries of the session, so that the board is not busy when the request begins.
         self.quiet();
         self.local.borrow_mut().job = turn.tag.job;
         turn.run(self);
@@ -123,8 +125,8 @@ impl Worker {
         self.shared.queue.done();
     }
 
-    /// Returns the problem for an error of the bus session. If a Stop or the end of the agent caused the error, returns the
-    /// problem for that cause instead.
+    /// Returns the problem for an error of the bus session. If a Stop or the end of the agent caused the error, the
+    /// problem states this cause.
     pub(crate) fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
             let kind = match (error.kind(), error) {

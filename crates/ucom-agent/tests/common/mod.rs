@@ -45,8 +45,7 @@ impl Chain {
                 let given: Vec<_> = lines.try_iter().collect();
                 given.iter().for_each(|(line, _)| server.fault(line));
                 server.turn(Duration::from_millis(20));
-                // The fault has begun in this turn of the simulation. Dropping the sender resumes the
-                // test that waits for the fault.
+                // `turn` has started the fault. Dropping the sender resumes the test that waits for the fault.
                 drop(given);
             }
         });

@@ -30,7 +30,8 @@ pub fn with_script(book: &mut Book) -> usize {
 /// Copies the script, which is a part of the source of mdbook-mermaid, into the book.
 pub fn copy_script(root: &Path, out: &Path) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    // `cargo metadata` reads the manifests for every platform. The build for this computer may have fetched only some of them.
+    // The option `--offline` is missing on purpose: `cargo metadata` reads the manifests for every platform, and the
+    // build for this computer may have fetched only some of them.
     let words = ["metadata", "--format-version", "1", "--locked", "--manifest-path"];
     let asked = Command::new(cargo).args(words).arg(root.join("book/Cargo.toml")).output()?;
     ensure!(asked.status.success(), "cargo metadata: {}", String::from_utf8_lossy(&asked.stderr));

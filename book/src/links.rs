@@ -1,7 +1,7 @@
 //! The links of a page of Markdown.
 
-/// Returns the page with the targets of its links replaced by those that `change` returns. An empty target leaves the words without a link.
-/// Fenced blocks are not changed.
+/// Returns the page with the targets of its links replaced by those that `change` returns. If the new target is
+/// empty, the words stay without a link. Fenced blocks are not changed.
 pub fn rewritten(page: &str, mut change: impl FnMut(&str) -> Option<String>) -> String {
     let mut out = String::with_capacity(page.len());
     let mut fenced = false;
@@ -24,7 +24,7 @@ fn rewrite_line(line: &str, out: &mut String, change: &mut impl FnMut(&str) -> O
         let Some((target, behind)) = after.split_once(')') else { break };
         match change(target) {
             Some(new) if new.is_empty() => {
-                // `[words](target)` becomes `words`.
+                // Reduces the link `[words](target)` to `words`.
                 let (kept, words) = before.rsplit_once('[').unwrap_or((before, ""));
                 *out += kept;
                 *out += words;

@@ -16,7 +16,7 @@ use anyhow::{Context, Result, bail, ensure};
 use mdbook_driver::MDBook;
 use mdbook_driver::config::Config;
 
-/// A file that every book made by mdbook contains.
+/// File that every book made by mdbook contains. It shows that an output folder contains an earlier book.
 const MARK: &str = "searcher.js";
 
 fn main() -> Result<()> {
@@ -29,7 +29,7 @@ fn main() -> Result<()> {
     let root = root.canonicalize().with_context(|| root.display().to_string())?;
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let out = out.canonicalize()?;
-    // This is checked because mdbook first empties the folder.
+    // mdbook empties the output folder first, so this folder must not contain the repository.
     ensure!(!root.starts_with(&out), "{} holds the repository, and would be emptied", out.display());
     let is_empty = std::fs::read_dir(&out)?.next().is_none();
     ensure!(

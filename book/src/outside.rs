@@ -12,11 +12,11 @@ use crate::links::rewritten;
 /// Folder of the book for files from outside docs/.
 pub const FOLDER: &str = "repository";
 
-/// Extensions of pictures, which are copied as they are.
+/// File name extensions of pictures, which are copied unchanged.
 const PICTURES: [&str; 4] = ["png", "svg", "jpg", "gif"];
 
-/// Gives every link that leads out of docs/ a target in the book, and adds a page for each file except pictures. Returns the pictures, as paths
-/// from the root of the repository.
+/// Gives every link that leads out of docs/ a target in the book, and adds a page for each file that is not a
+/// picture. Returns the pictures, as paths from the root of the repository.
 pub fn resolve(root: &Path, book: &mut Book) -> Result<BTreeSet<PathBuf>> {
     let mut files = BTreeSet::new();
     let mut failed = None;
@@ -55,7 +55,7 @@ pub fn resolve(root: &Path, book: &mut Book) -> Result<BTreeSet<PathBuf>> {
     Ok(pictures)
 }
 
-/// The page of a file.
+/// Returns the page of the book that shows this file.
 fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapter> {
     let name = file.display().to_string();
     let text = std::fs::read_to_string(root.join(file)).with_context(|| name.clone())?;
@@ -69,7 +69,7 @@ fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapte
                 Err(_) if pages.contains(&file) => {
                     Some(format!("{up}{FOLDER}/{}{anchor}", shown(&file).display()))
                 }
-                // The target is in the repository, but not in the book.
+                // The book has no page for this file, so the link is removed and its words stay.
                 Err(_) => Some(String::new()),
             }
         })
@@ -80,9 +80,9 @@ fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapte
     Ok(Chapter::new(&name, content, Path::new(FOLDER).join(shown(file)), Vec::new()))
 }
 
-/// Name of a file in the book: pictures keep theirs, every other file becomes a page.
+/// Returns the name of a file in the book. Pictures keep their names. Every other file becomes a page.
 fn shown(file: &Path) -> PathBuf {
-    // mdbook makes an index of a file of that name, and does not follow links to it from other folders.
+    // mdbook turns `README.md` into an index page, and does not adjust links to it from other folders.
     if file.file_name() == Some(OsStr::new("README.md")) {
         return file.with_file_name("about.md");
     }
@@ -98,14 +98,16 @@ fn is_picture(file: &Path) -> bool {
     file.extension().and_then(OsStr::to_str).is_some_and(|ending| PICTURES.contains(&ending))
 }
 
-/// Path and anchor (with its `#`) of a target that is a file; `None` for addresses and places on the same page.
+/// Returns the path and the anchor (with its `#`) of a link target that is a file. Returns `None` for web addresses,
+/// and for anchors on the same page.
 fn split(target: &str) -> Option<(&str, &str)> {
     let at = target.find('#').unwrap_or(target.len());
     let (path, anchor) = target.split_at(at);
     (!path.is_empty() && !path.contains("://") && !path.starts_with("mailto:")).then_some((path, anchor))
 }
 
-/// Resolves `path` relative to `folder` into a path from the root of the repository. Returns `None` if it leads out of the repository.
+/// Resolves `path` relative to `folder` into a path from the root of the repository. Returns `None` if the path leads
+/// out of the repository.
 fn joined(folder: &Path, path: &str) -> Option<PathBuf> {
     let mut whole = PathBuf::new();
     for part in folder.join(path).components() {

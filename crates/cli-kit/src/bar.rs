@@ -10,7 +10,7 @@ use crate::view::LEAST;
 /// Progress bar that was created last.
 static LAST: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
-/// Prints while the progress bar is hidden, and draws the progress bar again afterwards.
+/// Hides the progress bar, calls `print`, and draws the progress bar again.
 pub(crate) fn suspended<T>(print: impl FnOnce() -> T) -> T {
     let bar = LAST.lock().unwrap_or_else(PoisonError::into_inner).as_ref().and_then(WeakProgressBar::upgrade);
     match bar.filter(|bar| !bar.is_finished()) {
@@ -19,7 +19,7 @@ pub(crate) fn suspended<T>(print: impl FnOnce() -> T) -> T {
     }
 }
 
-/// Stderr for code that writes whole lines while a progress bar is shown.
+/// Writer to stderr for whole lines. While a progress bar is shown, the lines appear above the bar.
 #[derive(Debug)]
 pub struct Stderr;
 

@@ -112,7 +112,7 @@ mod terminal {
             if !std::io::stdin().is_terminal() {
                 return None;
             }
-            // If a background process changed the terminal mode, the system would suspend the process.
+            // Only a foreground process may change the terminal mode. The system would suspend a background process.
             if tcgetpgrp(stdin()).is_ok_and(|foreground| foreground != getpgrp()) {
                 return None;
             }
@@ -140,7 +140,8 @@ mod terminal {
                 return Vec::new();
             }
             if !matches!(waited, Ok(1..)) {
-                // If the key had more bytes, these bytes would have arrived together with the first byte.
+                // All bytes of a key arrive together. If no further byte has arrived, the first byte is the Escape
+                // key itself.
                 return if std::mem::take(&mut self.begun).is_empty() {
                     Vec::new()
                 } else {
@@ -239,7 +240,7 @@ mod tests {
         assert_eq!(keys(b"\x1BOA\x1B[6~\x1B[1~"), (vec![Key::Up, Key::PageDown, Key::Home], &b""[..]));
         assert_eq!(keys(b"x\x1B[5"), (vec![Key::Char('x')], &b"\x1B[5"[..]));
         assert_eq!(keys(b"\x1B"), (vec![], &b"\x1B"[..]));
-        // The parser ignores unknown keys and letters that are not ASCII.
+        // The parser ignores an unknown key (F5) and a letter that is not ASCII (é).
         assert_eq!(keys("\x1B[15~\u{e9}s".as_bytes()), (vec![Key::Char('s')], &b""[..]));
     }
 }

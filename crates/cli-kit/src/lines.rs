@@ -185,7 +185,7 @@ mod tests {
         let (mut lines, _reader) = slow();
         (0..3 * WAITING).for_each(|i| lines.push(i.to_string()));
         lines.push_always("end".into());
-        // The printing thread may already have taken one line.
+        // The count includes a line that the printing thread has already taken but cannot print.
         let unseen = lines.finish();
         assert_eq!(unseen, 3 * WAITING as u64 + 1);
     }

@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(within("one two three four five", None), "one two three four five");
     }
 
-    /// The table never truncates columns on a narrow terminal.
+    /// On a narrow terminal, columns that do not fit are shown below, and no column is truncated.
     #[test]
     fn columns_without_room_come_below() {
         let rows = [vec!["joint 1".into(), "0.201".into(), "0.773".into(), "12".into()]];

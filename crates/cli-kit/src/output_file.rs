@@ -112,7 +112,7 @@ impl OutputFile {
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
             Err(e) => return Err(io(e)),
         }
-        // A pipe or a device contains no data that could be lost.
+        // A pipe or a device contains no data that could be lost, so only an existing regular file is rejected.
         if !overwrite && path.is_file() {
             return Err(OutputError::Exists { path: path.to_owned() });
         }
@@ -154,8 +154,8 @@ impl OutputFile {
         Ok(file)
     }
 
-    /// Marks the output file as written, because other code created the file at its path, for example by renaming a
-    /// complete file.
+    /// Marks the output file as written. The caller uses this function if other code has created the file at this
+    /// path, for example by renaming a complete file.
     pub fn is_written(mut self) {
         self.written = true;
         settled(&self.path);
@@ -182,7 +182,7 @@ impl Drop for OutputFile {
     }
 }
 
-/// Waits until the bytes of the file are on the disk, because some systems report a full disk only at that time.
+/// Waits until the bytes of the file are on the disk. Some systems report a full disk only at this point.
 pub fn settle(file: &File) -> io::Result<()> {
     if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
 }

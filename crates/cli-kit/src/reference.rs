@@ -66,7 +66,7 @@ fn one(command: &Command, top: bool, page: &mut String) {
     }
     let after = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     for block in after.trim().split("\n\n").filter(|block| !block.is_empty()) {
-        // Examples and tables are indented.
+        // A paragraph with an indented line is an example or a table, and is shown as code.
         let _ = if block.lines().any(|line| line.starts_with(' ')) {
             write!(page, "```text\n{block}\n```\n\n")
         } else {
@@ -141,7 +141,7 @@ fn text(help: &str) -> String {
 mod tests {
     use super::*;
 
-    /// A command line to try.
+    /// Command line for the tests.
     #[derive(clap::Parser)]
     #[command(name = "try", about = "Tries things", disable_help_subcommand = true)]
     struct Cli {

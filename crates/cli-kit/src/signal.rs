@@ -37,8 +37,8 @@ impl Stop {
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         for signal in signals() {
-            // The second Ctrl-C ends the process in every state. The handler for this case is registered first, because
-            // it must read the flag before the handler that sets the flag.
+            // The second Ctrl-C ends the process in every state. This handler is registered first, because it must
+            // check the flag before the other handler sets the flag.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))?;
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
         }

@@ -39,7 +39,7 @@ pub fn check_help_is_wrapped_once(command: &clap::Command) {
 ///
 /// # Panics
 ///
-/// The command line does not have a command or an option.
+/// Panics if the command line does not have a command or an option that a next step names.
 pub fn check_commands_of_next_steps(program: &clap::Command) {
     let own = format!("{} ", program.get_name());
     let commands = Action::ALL.iter().map(|action| action.name(FrontEnd::Command));

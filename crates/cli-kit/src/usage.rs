@@ -44,7 +44,7 @@ pub fn parse_with<Cli: Parser>(
             }
             let lines: Vec<String> = report.ignored.into_iter().chain(report.in_effect).collect();
             if !lines.is_empty() {
-                // A blocked stderr must not delay a Stop.
+                // The lines are printed with a timeout, because a blocked stderr must not delay a Stop.
                 print_within(PRINT_TIMEOUT, move || lines.iter().for_each(|line| out.log(line)));
             }
             return Ok(cli);

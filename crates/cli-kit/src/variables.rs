@@ -73,8 +73,8 @@ impl Retired {
         Self { variable, command, option, without: Without::Other }
     }
 
-    /// Returns the option that the variable set, if the command has this option and does not read it from this
-    /// variable.
+    /// Returns the option that this retired variable set. Returns `None` if the command does not have this option, or
+    /// if the option still reads this variable.
     fn option_of<'a>(&self, command: &'a Command, words: &str) -> Option<&'a Arg> {
         let named = self.command.is_empty() || self.command == words;
         let mut options = command.get_arguments().filter(|arg| arg.get_long() == Some(self.option));

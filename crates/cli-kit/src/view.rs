@@ -70,9 +70,9 @@ pub struct Trouble {
 }
 
 impl Trouble {
-    /// Returns the lines for the head of a live view, at most about `most`. The lines contain as many complete causes
-    /// as fit, the next command, and the result of the last key press. The second list contains the causes that do not
-    /// fit, which are the first rows of the scrolled part.
+    /// Returns the lines for the head of a live view, about `most` lines at most. The lines contain as many complete
+    /// causes as fit, the next command, and the result of the last key press. The second list contains the causes
+    /// that do not fit, which are the first rows of the scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
         let yellow = |text: String| Line::from(text).style(Style::new().fg(Color::Yellow));
@@ -173,8 +173,8 @@ mod tests {
         lines.iter().map(ToString::to_string).collect()
     }
 
-    /// The live view never truncates causes. The view counts the causes that do not fit, and shows them as the first rows of
-    /// the scrolled part.
+    /// The live view never truncates the text of a cause. It counts the causes that do not fit, and shows them as the
+    /// first rows of the scrolled part.
     #[test]
     fn causes_are_shown_whole_or_scroll() {
         let trouble = Trouble {

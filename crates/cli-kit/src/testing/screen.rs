@@ -5,7 +5,7 @@
 pub struct Picture {
     cells: Vec<Vec<char>>,
     at: (usize, usize),
-    /// First bytes of an escape sequence or of a character.
+    /// First bytes of an escape sequence or of a character whose remaining bytes have not arrived yet.
     begun: Vec<u8>,
 }
 

@@ -36,7 +36,7 @@ fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
 
 /// A pseudo-terminal of the test.
 pub struct Terminal {
-    /// Input that the user types. When this input is closed, the terminal hangs up.
+    /// The user's side of the terminal. When this handle is closed, the terminal hangs up.
     person: Option<File>,
     slave: Option<OwnedFd>,
     closed: Arc<AtomicBool>,
@@ -57,7 +57,8 @@ impl Terminal {
         let slave = rustix::fs::open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).expect("it opens");
         tcsetwinsize(&slave, Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
             .expect("its size");
-        // The command must not inherit the user's side of the terminal, because the terminal could then not hang up.
+        // The command must not inherit the user's side of the terminal. Otherwise, the terminal could not hang up
+        // while the command runs.
         for end in [&master, &slave] {
             fcntl_setfd(end, FdFlags::CLOEXEC).expect("its flags");
         }
@@ -132,7 +133,7 @@ impl Terminal {
     /// terminal open.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
-        // The reading thread owns the last handle of the terminal.
+        // The reading thread owns the last handle of the user's side. The terminal hangs up when this thread ends.
         self.closed.store(true, Ordering::Relaxed);
         self.reader.take().map(JoinHandle::join);
     }

@@ -3,7 +3,7 @@ use clap::{CommandFactory, Parser};
 use super::audit::{Kind, faults};
 use super::*;
 
-/// A command line to try.
+/// Command line for the tests.
 #[derive(Debug, clap::Parser)]
 #[command(name = "try")]
 struct Cli {
@@ -89,8 +89,8 @@ fn variables_of_options_that_act_are_named_and_ignored_or_refused() {
         (2, "use --speed, or unset TRY_SPEED")
     );
     assert!(refused.message.contains("TRY_SPEED=9") && refused.message.contains("`try go`"), "{refused:?}");
-    // Cases: the option is typed, the variable is off, the variable is empty, or the variable belongs to another
-    // command.
+    // In each of these cases, the variable is neither reported nor refused: the option is typed, the variable is off,
+    // the variable is empty, or the variable belongs to another command.
     for (words, environment) in [
         (&["go", "--speed", "2"][..], &[("TRY_SPEED", "9")][..]),
         (&["go", "--active"], &[("TRY_ACTIVE", "1")]),
@@ -110,8 +110,8 @@ fn where_a_command_line_is_wrong_the_variable_behind_it_is_named() {
         let typed: Vec<OsString> = words.iter().map(OsString::from).collect();
         VARIABLES.report_error("try", &root, &error, &typed, of(environment))
     };
-    // The test does not set any variable of its own process, so clap does not read a variable. The typed words cause
-    // the error, and the report finds the variable.
+    // The test passes the variables as an argument, and sets no variable of its own process. Therefore clap reads no
+    // variable. The wrong option causes the error, and the report still contains the variable.
     assert_eq!(lines(&["go", "--sped", "3"], &[("TRY_ACTIVE", "1")]).len(), 1);
     assert!(lines(&["go", "--bus"], &[("TRY_BUS", "x")]).is_empty(), "it is typed");
 }

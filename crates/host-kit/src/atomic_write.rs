@@ -24,7 +24,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
             beside.as_file().set_permissions(mode)?;
             beside
         }
-        // A new file gets the default permissions of the system.
+        // A file that does not exist yet gets the default permissions of the system.
         None => builder.make_in(directory, |path| File::options().write(true).create_new(true).open(path))?,
     };
     beside.write_all(content)?;
@@ -33,7 +33,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the final target of a chain of links, even if this file does not exist yet.
+/// Returns the final target of a chain of symbolic links, even if this file does not exist yet.
 fn end_of_links(path: &Path) -> PathBuf {
     let mut at = path.to_path_buf();
     for _ in 0..40 {

@@ -22,7 +22,7 @@ pub fn each_record<E: From<McapError>>(
     mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,
 ) -> Result<bool, E> {
-    // An incomplete file has no magic bytes at its end.
+    // An incomplete file has no magic bytes at its end, so the reader must not require these bytes.
     let options =
         LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);

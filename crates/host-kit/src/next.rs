@@ -263,13 +263,14 @@ impl Next {
             }
             Part::Action { action, boards, .. } => {
                 let numbers = match (boards.as_slice(), front_end) {
-                    // A request names one board.
+                    // A request of the agent addresses exactly one board. For no board or several boards, the
+                    // placeholder stays.
                     ([] | [_, _, ..], FrontEnd::Agent) => NUMBER.to_owned(),
                     ([], _) => "N".to_owned(),
                     (boards, _) => boards.iter().map(u8::to_string).collect::<Vec<_>>().join(","),
                 };
                 let name = action.name(front_end).replace(NUMBER, &numbers);
-                // Some names are words that contain an expression in backticks.
+                // Some names already contain an expression in backticks.
                 if name.contains('`') { name.into() } else { format!("`{name}`").into() }
             }
         });

@@ -44,7 +44,7 @@ pub enum Refused {
 /// the function needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
-/// Value of [`Request::after`] for a request that no Stop refuses.
+/// Value of [`Request::after`] for a request that no Stop may refuse.
 pub const NEVER_LATE: u64 = u64::MAX;
 
 /// Request to the owner of a device `D`, with a tag of the front end.
@@ -75,7 +75,7 @@ struct Current<T> {
 }
 
 struct State<D, T> {
-    /// Functions of Stops that have not begun, the oldest first.
+    /// Functions of the Stops that have not begun yet, the oldest first.
     stopping: VecDeque<(T, Act<D>)>,
     waiting: VecDeque<Request<D, T>>,
     current: Option<Current<T>>,
@@ -231,7 +231,7 @@ impl<D, T: Clone> Queue<D, T> {
         let (stopping, waiting) = {
             let mut state = self.lock();
             state.closed = true;
-            // The owner may have panicked during the current request.
+            // If the owner panicked while it carried out a request, this request is still the current request.
             state.current = None;
             (std::mem::take(&mut state.stopping), std::mem::take(&mut state.waiting))
         };
@@ -376,8 +376,8 @@ mod tests {
         let stop = |bench: &Bench, tag| bench.queue.stop_alike(tag, bench.act(tag));
         assert_eq!((stop(&bench, 1), stop(&bench, 2)), (1, 2));
         let turn = bench.queue.take().expect("the first waits");
-        // The first Stop has begun, and may have checked for a Stop before the third Stop was requested. Therefore the
-        // queue keeps the function of the third Stop.
+        // The first Stop has begun. Its function may have checked for further Stops before the third Stop was
+        // requested. Therefore the queue keeps the function of the third Stop.
         assert_eq!(stop(&bench, 3), 3);
         turn.run(&mut bench.device);
         bench.serve();
@@ -421,7 +421,8 @@ mod tests {
     fn nothing_is_done_for_a_request_that_is_refused() {
         let queue = Arc::new(Queue::<Done, u32>::default());
         let log = Log::default();
-        // The function of each refused request uses the queue.
+        // The function of each request uses the queue. Therefore the queue must not hold its lock when it calls the
+        // function.
         let put = |tag, after| {
             let (own, log) = (queue.clone(), log.clone());
             let act: Act<Done> = Box::new(move |device| {
@@ -485,7 +486,7 @@ mod tests {
         assert!(bench.queue.has(|tag| *tag == 1) && bench.queue.has(|tag| *tag == 2));
         assert!(bench.queue.cancel(|tag| *tag == 2));
         assert!(!bench.queue.is_cancelled() && !bench.queue.has(|tag| *tag == 2));
-        // A user may cancel an update.
+        // A Stop does not cancel an update that has begun, but a user may cancel it.
         assert!(bench.queue.cancel(|tag| *tag == 1));
         assert!(bench.queue.is_cancelled());
         turn.run(&mut bench.device);
@@ -498,7 +499,7 @@ mod tests {
     fn a_closed_queue_refuses_all_requests() {
         let mut bench = Bench::default();
         bench.request(Kind::Command, 0, 1);
-        // The owner drops the request before the request is complete.
+        // The owner takes a request and drops it without carrying it out.
         drop(bench.queue.take());
         bench.request(Kind::Command, 0, 2);
         bench.stop(3);

@@ -382,7 +382,7 @@ pub(crate) enum Command {
     },
 }
 
-/// Words that users may type instead of a command, each with the correct command.
+/// Words that users may type by mistake instead of a command, each with the correct command.
 pub(crate) const MEANT: [(&str, &str); 15] = [
     ("pause", "jtc traj pause"),
     ("hold", "jtc traj pause"),
@@ -426,7 +426,8 @@ mod tests {
 
     use super::*;
 
-    /// Compares docs/commands-jtc.md with the command line; `UPDATE_DOCS=1` writes the page again.
+    /// Compares docs/commands-jtc.md with the definition of the command line. With `UPDATE_DOCS=1`, writes the page
+    /// again.
     #[test]
     fn the_page_of_the_commands_is_made_from_them() {
         let opening = "This page is generated from the definition of the command line, like `jtc help COMMAND` and the manual pages. The variable \

@@ -37,7 +37,7 @@ fn strongest(keys: &[Key]) -> Option<Wish> {
     } else if pressed(&[' ']) {
         Some(Wish::PauseOrResume)
     } else {
-        // On many keyboards, the user types `+` with Shift and the `=` key.
+        // On many keyboards, the user types `+` with Shift and the `=` key. Therefore `=` is accepted as `+`.
         let faster = pressed(&['+', '=']).then_some(Wish::Faster);
         faster.or_else(|| pressed(&['-', '_']).then_some(Wish::Slower))
     }

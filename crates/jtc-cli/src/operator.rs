@@ -95,7 +95,7 @@ impl<'a> Operator<'a> {
             return;
         }
         match draws_bars() {
-            // The terminal shows the key help below the progress bar.
+            // No message is needed, because the key help is shown below the progress bar.
             Ok(()) if !self.out.is_json() => {}
             Err(Some((columns, rows))) => self.out.note(format_args!(
                 "{}: the progress bar needs {} columns and {} rows, but the terminal has {columns} and \
@@ -134,10 +134,10 @@ impl<'a> Operator<'a> {
             match (status.trajectory == TrajectoryState::Pause, &self.keys) {
                 (true, Some(_)) => self.out.note("paused; press space to resume"),
                 (false, Some(_)) => self.out.note("moving"),
-                // The motion begins with this status.
+                // This is the first status of the motion, so no change is reported.
                 (_, None) if before.is_none() => {}
-                // Another program has paused the motion. Alternatively, the controller has paused the motion after a
-                // timeout without frames of this program (J-59).
+                // Another program has paused the motion, or the controller has paused it after a timeout without
+                // frames of this program (J-59).
                 (true, None) => {
                     self.out.note("paused; `jtc traj resume` resumes the motion, `jtc traj stop` ends it");
                 }

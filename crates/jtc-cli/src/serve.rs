@@ -21,8 +21,8 @@ pub(crate) use typed::{Typed, hand};
 /// Largest number of host bytes that wait for transmission, like the buffer of a serial adapter. When this buffer is full, writes of
 /// the host block.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for a host that does not read before statuses are lost. The value applies if virtual time does not
-/// follow the real-time clock.
+/// Longest wait for a host that does not read, if virtual time does not follow the real-time clock. After this wait,
+/// statuses are lost.
 const READER_WAIT: Duration = Duration::from_millis(100);
 /// Largest delay for which virtual time catches up, µs. After a longer delay (for example a suspended computer), the simulator skips the
 /// missed time.

@@ -33,7 +33,7 @@ impl Tape {
         match live {
             Ok(live) => Ok(Self { name: output.name(), live, on_disk }),
             Err(e) => {
-                // If the header of the recording cannot be written, the recording is useless.
+                // The recording is useless without its header, so a new file is removed.
                 output.is_worthless();
                 Err(e.into())
             }

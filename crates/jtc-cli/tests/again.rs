@@ -12,8 +12,8 @@ fn phases(value: &Value) -> Vec<&str> {
     value["runs"].as_array().unwrap().iter().map(|run| run["phase"].as_str().unwrap()).collect()
 }
 
-/// After a restart of the controller, the arm is at the position at which a closed path begins and ends. The command then
-/// executes the whole path.
+/// The controller is restarted while the arm is at the point at which a closed path begins and ends. This position
+/// does not show how much of the path was executed. Therefore the command executes the whole path.
 #[test]
 fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let dir = tempfile::tempdir().unwrap();
@@ -45,7 +45,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
-    // The test replays the complete motion, and then the measured motion.
+    // The recording is replayed twice: first the complete trajectory, then only the measured motion.
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
     assert!(output.err.contains("the whole trajectory of the recording; the run reached"), "{}", output.err);
     assert!((output.json()["verdict"]["duration_s"].as_f64().unwrap() - whole).abs() < 0.1);
@@ -82,7 +82,8 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     let words = ["traj", "replay", &record, "--measured", "--approach", "--record", &again];
     let value = sim.json(&words, 0);
     let executed = value["verdict"]["duration_s"].as_f64().unwrap();
-    // The motion takes 2.4 s. The end time of the measured motion is accurate to 0.1 s.
+    // The motion takes 2.4 s. The measured end time of the motion is accurate to 0.1 s, so the replay takes at least
+    // 2.3 s.
     assert!((2.3..8.0).contains(&executed), "{executed} s");
     let most = value["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
@@ -107,7 +108,7 @@ fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(0);
 }
 
-/// The command rejects options that would have no effect, before it sends any frame.
+/// Options that would have no effect are rejected before any frame is sent.
 #[test]
 fn options_without_a_meaning_are_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -214,8 +215,9 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     at(&sim, [0.0; 6]);
 }
 
-/// After an interruption in the second of three runs, the command executes the remainder of the second run, and then the third run.
-/// The command also works if the recording contains a remainder, or if the controller has finished the run without the program.
+/// After an interruption in the second of three runs, the command executes the remainder of the second run, and then
+/// the third run. This also works with the recording of a continued run, and if the controller has finished the run
+/// after the program was killed.
 #[test]
 fn the_runs_that_are_left_are_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -225,7 +227,7 @@ fn the_runs_that_are_left_are_run() {
     let child = moving_after(&sim, &words, "run 1 of 3 finished", 0.7);
     cli_kit::testing::signal(&child, "-INT");
     child.wait_with_output().unwrap();
-    // The test interrupts the command again during the last run.
+    // The second interruption occurs during the last run.
     let words = ["traj", "continue", &run, "--record", &rest];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
     cli_kit::testing::signal(&child, "-KILL");
@@ -233,7 +235,7 @@ fn the_runs_that_are_left_are_run() {
     std::thread::sleep(std::time::Duration::from_secs(3));
     let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
     assert!(output.err.contains("no part of it remains"), "{}", output.err);
-    // With `--repeat 3`, the user requests one more run.
+    // Both runs of this recording have finished, so `--repeat 3` requests one more run.
     let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
     assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");
     // The test continues from the first recording again, after the controller has executed another motion. The command executes the
@@ -244,7 +246,7 @@ fn the_runs_that_are_left_are_run() {
     let value = output.json();
     assert_eq!(value["runs_finished"], 2, "{value}");
     assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
-    // The command reports that a recording lacks required data.
+    // A CSV recording does not contain the number of runs, and the command reports this.
     let csv = path("run.csv");
     let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);

@@ -53,7 +53,7 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
-/// J-55: without an arm file, the arm of the controller decides whether a trajectory is possible, not the built-in arm.
+/// J-55: without an arm file, a trajectory is checked with the arm of the controller, not with the built-in arm.
 #[test]
 fn j55_a_run_without_an_arm_file_is_checked_with_the_arm_of_the_controller() {
     let dir = Dir::new();
@@ -72,13 +72,13 @@ fn j55_a_run_without_an_arm_file_is_checked_with_the_arm_of_the_controller() {
         assert!(problems.iter().all(|problem| problem["kind"] == "position"), "{value}");
     };
 
-    // If no controller can be reached, or the controller has the built-in arm, the motion is refused.
+    // The motion is refused if no controller can be reached, or if the controller has the built-in arm.
     refused(jtc(&["--json", "traj", "run", &file, "--port", "/nowhere/tty"]));
     refused(Sim::start(&["--no-throttle"]).held().jtc(&["--json", "traj", "run", &file]));
     let sim = Sim::start(&["--no-throttle", "--arm", &wide]).held();
     let output = sim.jtc(&["traj", "run", &file]).ends(0);
     assert!(output.err.contains("checked with the arm of the controller"), "{}", output.err);
-    // An arm file that the user has specified still decides before the command connects.
+    // An arm file that the user has specified is checked before the command connects to the controller.
     let narrow = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     refused(jtc(&["--json", "traj", "run", &file, "--arm", narrow, "--port", "/nowhere/tty"]));
 }
@@ -106,7 +106,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     assert_eq!(left_out(urdf), serde_json::json!(["friction", "rotor inertia"]));
     let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     assert_eq!(left_out(whole), serde_json::json!([]));
-    // A run uses the rotor values of the controller.
+    // A run uses the rotor values of the controller, so only the friction is missing.
     let sim = Sim::start(&["--no-throttle"]).held();
     let output = sim.jtc(&["traj", "run", file, "--arm", urdf]).ends(0);
     assert!(output.err.contains("without friction: the file"), "{}", output.err);
@@ -207,7 +207,7 @@ fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
         "{}",
         output.out
     );
-    // If the command cannot read the file, the exit code is 2.
+    // The exit code is 2 if the file does not exist or is not an arm file.
     jtc(&["arm", "check", "nowhere.toml"]).ends(2);
     jtc(&["arm", "check", "Cargo.toml"]).ends(2);
 }

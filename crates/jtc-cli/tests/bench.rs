@@ -10,7 +10,8 @@ const WITHOUT: &str = "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\
 #[test]
 fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let sim = Sim::with_faults(&["--no-throttle"], WITHOUT);
-    // If joint 3 is not declared absent, the controller waits for its drive or reports an error.
+    // Joint 3 is not declared absent yet. Therefore the controller does not reach HoldPos: it waits for the drive of
+    // joint 3, or reports an error.
     std::thread::sleep(std::time::Duration::from_secs(3));
     assert_ne!(sim.json(&["status"], 0)["state"], "HoldPos");
     let set = sim.json(&["bench", "absent", "3=30", "--deg"], 0);
@@ -50,7 +51,7 @@ fn j53_absent_joints_leave_the_others_to_be_jogged() {
     let moved = way["to_rad"][4].as_f64().unwrap() - way["from_rad"][4].as_f64().unwrap();
     assert!(moved > 0.02, "{moved} rad");
 
-    // The user can declare joints absent or present only while the drives produce no torque.
+    // Joints can be declared absent or present only while the drives produce no torque.
     let refused = sim.jtc(&["bench", "present"]).ends(1).err;
     assert!(refused.contains("jtc disable"), "{refused}");
     sim.jtc(&["disable", "--yes"]).ends(0);

@@ -9,7 +9,7 @@ use crate::desk::Desk;
 
 const PAGE: &str = "from-two-poses-to-a-cycle.md";
 
-/// Runs a command that must succeed and whose output contains measured values.
+/// Runs a command that must succeed, and replaces the measured values in its output by placeholders.
 fn done(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command);
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
@@ -94,7 +94,7 @@ fn plan(desk: &Desk) {
         ),
         ("The check that every run makes", "jtc traj check cycle.csv"),
     ] {
-        // The output of the first plan depends on measured poses.
+        // Only the output of the first plan depends on measured poses, so only its numbers may vary.
         let printed = if command.contains("poses.csv") { done(desk, command) } else { exact(desk, command) };
         page.case(title, command, &printed);
     }

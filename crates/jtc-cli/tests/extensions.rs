@@ -31,7 +31,7 @@ fn j52_a_controller_tells_who_it_is() {
     }
     let text = sim.jtc(&["info"]).ends(0).out;
     assert!(text.contains(info["hash"].as_str().unwrap()) && text.contains("started:   once"), "{text}");
-    // The controller and the host compute the same hash for the arm.
+    // The hash of the arm does not change when the parameters are sent.
     let sim = sim.with_parameters();
     assert_eq!(sim.json(&["info"], 0)["hash"], info["hash"]);
     let avena = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
@@ -44,8 +44,8 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let sim = Sim::start(&["--no-throttle"]);
     let arm = another(&sim);
     let file = sim.file("motion.csv", &motion(0.2));
-    // Before the push, all these values differ from the values of the controller. The gains and the friction of the controller are the
-    // built-in values.
+    // Before the push, only these three values differ between the file and the controller. The controller still uses
+    // its built-in gains and friction.
     let diff = sim.json(&["arm", "diff", &arm], 4);
     assert_eq!(names(&diff), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
 
@@ -56,8 +56,8 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
     assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
 
-    // The new arm is now the default of the controller, and the command checks a run with the new arm. The command rejects a run with a
-    // different arm file.
+    // The new arm is now the default of the controller. A run is checked with the new arm, and a run with a different
+    // arm file is rejected.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let sim = sim.held();
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
@@ -69,7 +69,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let named = sim.jtc(&["traj", "run", &file]).ends(0).err;
     assert!(named.contains("checked with the arm of the controller, another"), "{named}");
 
-    // The arm file that the command has read from the controller is equal to the arm file that it has sent.
+    // The arm file that is read from the controller is equal to the arm file that was sent.
     let pulled = sim.path("pulled.toml");
     assert_eq!(sim.json(&["arm", "pull", "-o", &pulled], 0)["hash"], pushed["hash"]);
     assert_eq!(sim.json(&["arm", "diff", &pulled], 0)["equal"], true);
@@ -77,7 +77,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let shown = sim.json(&["arm", "show"], 0);
     assert_eq!(shown["arm"], "another");
 
-    // The user can change settings of the arm only while the drives produce no torque.
+    // Settings of the arm can change only while the drives produce no torque.
     let refused = sim.jtc(&["arm", "push", avena]).ends(1);
     assert!(
         refused.err.contains("jtc disable") && refused.err.contains("nothing was changed"),
@@ -85,15 +85,15 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
         refused.err
     );
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
-    // Without a terminal, the command rejects the request, because no user can confirm that the torque may be switched
-    // off.
+    // Without a terminal, no user can confirm that the torque may be switched off. Therefore the command rejects the
+    // request.
     sim.jtc(&["disable"]).ends(4);
     assert_eq!(sim.json(&["disable", "--yes"], 0)["status"]["state"], "Init");
     sim.jtc(&["arm", "push", avena]).ends(0);
     assert_eq!(sim.json(&["arm", "diff", avena], 0)["equal"], true);
 }
 
-/// An arm without gains is incomplete, so the command does not send it.
+/// An arm without gains is incomplete, so `jtc arm push` does not send it.
 #[test]
 fn j55_an_arm_that_is_not_whole_is_not_pushed() {
     let text: String = include_str!("../../../arms/avena.toml")
@@ -122,7 +122,8 @@ fn j57_the_speed_of_a_motion_changes_while_it_runs() {
     let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
     assert!(run.err.contains("speed override of the controller is 50 %"), "{}", run.err);
     let executed = run.json()["recorded_s"].as_f64().unwrap();
-    // The lower speed does not apply to the approach, so the duration of the approach is unchanged.
+    // At 50 %, the motion takes twice the time. The recorded time also contains short times before and after the
+    // motion, which do not depend on the speed.
     assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
     for wrong in ["4", "101", "nan"] {
         sim.jtc(&["traj", "speed", wrong]).ends(2);
@@ -141,7 +142,7 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
     let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
     assert!(at(&back["to_rad"], 2) < at(&way["to_rad"], 2) - 0.05);
-    // A killed command cannot send a Stop. Therefore the controller stops the arm without a Stop.
+    // The controller must stop the arm by itself, because a killed command cannot send a Stop.
     let mut child = sim.command(&["jog", "1", "0.3"]).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(600));
     child.kill().unwrap();
@@ -161,8 +162,8 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
 
-/// If an error switches off the torque of the arm during a jog, the command reports the error and its reason to the
-/// script.
+/// If an error switches off the torque during a jog, the command ends with exit code 5 and reports the error and its
+/// reason.
 #[test]
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
@@ -191,7 +192,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
         (&status["state"], status["missing_parameters"].as_array().unwrap().len()),
         (&"Init".into(), 3)
     );
-    // The command does not switch off the torque of an arm that the controller holds, unless the user confirms this.
+    // The torque of a held arm is switched off only if the user confirms this.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let refused = sim.jtc(&["arm", "push", &arm, "--store"]).ends(1);
     assert!(
@@ -212,7 +213,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     assert!(refused.err.contains("the file contains no stored arm"), "{}", refused.err);
 }
 
-/// Like a board, the simulated controller reads the arm of the user from its memory.
+/// If the simulator is started with another arm, its controller has stored this arm, like a real board.
 #[test]
 fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     let dir = tempfile::tempdir().unwrap();

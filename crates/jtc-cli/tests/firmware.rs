@@ -30,7 +30,7 @@ fn image(board: &str) -> Vec<u8> {
     bytes[0x600] = 1;
     bytes[0xFFF] = 1;
     if board.starts_with("nucleo-h745") {
-        // The bytes that are appended next are the program of the second core.
+        // For boards with two cores, the program of the second core begins at 1 MiB.
         bytes.resize(1024 * 1024, 0xFF);
         for word in [0x3004_8000u32].into_iter().chain([0x0810_0041; 15]).chain([0xE7FD_BF30]) {
             bytes.extend(word.to_le_bytes());
@@ -80,7 +80,7 @@ fn images_and_drives_are_listed() {
     assert!(listed["drives"].is_array());
     let text = jtc(&dir, &["firmware", "list"]).ends(0).out;
     assert!(text.contains("nucleo-h745zi-q  new.bin, 4096 bytes"), "{text}");
-    // A list without installed images is not an error.
+    // If no images are installed, `jtc firmware list` still succeeds.
     let empty = Dir::new();
     let listed = jtc(&empty, &["firmware", "list"]).ends(0);
     assert!(listed.err.contains("no firmware.json in"), "{}", listed.err);
@@ -107,7 +107,8 @@ fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let question = refused["error"]["message"].as_str().unwrap();
     assert!(question.contains("safety wires") && question.contains("file is complete"), "{question}");
     nothing_written(&drive);
-    // If the USB drive stays mounted, the board has not accepted the image, so the command fails.
+    // The USB drive stays mounted, which means that the board has not accepted the image. Therefore the command
+    // fails.
     let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
     assert_eq!(done["error"]["code"], "not-taken");
     assert_eq!(fs::read(Path::new(&drive).join("openjtc.bin")).unwrap(), image(H745));
@@ -178,7 +179,7 @@ fn a_controller_that_holds_its_arm_or_is_another_one_is_not_reset() {
     assert_eq!(refused["error"]["code"], "has-torque");
     assert!(refused["error"]["hint"].as_str().unwrap().contains("jtc disable"));
     nothing_written(&drive);
-    // A simulated controller has no flash memory, so it cannot report a program.
+    // A simulated controller has no flash memory, so it cannot report its program.
     let verified = sim.json(&["firmware", "verify", "--image", &new], 5);
     assert_eq!(verified["error"]["code"], "not-reported");
 }

@@ -148,8 +148,8 @@ fn j69_the_agent_asks_for_the_cause_and_shows_it() {
     agent.wait().expect("it ends");
 }
 
-/// A command that sends gains to an arm with torque ends when the arm was stable with these gains. If the controller rejects the gains,
-/// the command reports the reason.
+/// A command that sends gains to an arm with torque waits until the controller has tested the gains. If the
+/// controller rejects the gains, the command reports the reason.
 #[test]
 fn j71_params_push_waits_for_the_trial_of_its_gains() {
     let mut sim = Sim::start(&["--no-throttle"]).held();

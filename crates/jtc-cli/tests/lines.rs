@@ -14,8 +14,8 @@ use serde_json::Value;
 type Vec3 = [f64; 3];
 
 impl Dir {
-    /// Returns the output for a plan of this text, and ten flange poses in each interval of the written trajectory. The function
-    /// interpolates the poses in the same way as the controller.
+    /// Plans the waypoints in `text`. Returns the output, and ten flange poses in each interval of the written
+    /// trajectory. The poses are interpolated in the same way as in the controller.
     fn plan(&self, text: &str, options: &[&str]) -> (Value, Vec<(f64, Pose)>) {
         let name = if text.starts_with('[') { "waypoints.json" } else { "waypoints.csv" };
         let (file, out) = (self.file(name, text), self.path("out.csv"));
@@ -25,7 +25,7 @@ impl Dir {
         (printed, flange(&std::fs::read_to_string(out).unwrap()))
     }
 
-    /// Returns the output of a plan that the command rejects, and checks that no file was written.
+    /// Checks that the command rejects a plan and writes no file. Returns the output of the command.
     fn refused(&self, text: &str, options: &[&str], code: i32) -> String {
         let (file, out) = (self.file("refused.csv", text), self.path("none.csv"));
         let output = jtc(&[&["plan", &file, "-o", &out], options].concat()).ends(code);
@@ -82,7 +82,8 @@ fn a_line_is_straight_and_a_leg_in_joint_space_says_that_it_is_not() {
     let (a, b) = ([0.6, -0.3, 0.4], [0.6, 0.3, 0.4]);
     let furthest =
         |all: &[(f64, Pose)]| all.iter().map(|(_, p)| off_leg(p.position, a, b)).fold(0.0, f64::max);
-    // In joint space, the flange leaves the line, and the command prints the distance of the flange from the line.
+    // Without `--line`, the motion is straight in joint space. The flange leaves the line, and the command prints its
+    // largest distance from the line.
     let (printed, all) = dir.plan(TWO, &[]);
     let note = printed["notes"][0].as_str().unwrap();
     let mm: f64 = note.split_once("by up to ").unwrap().1.split_once(" mm").unwrap().0.parse().unwrap();
@@ -140,7 +141,7 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
         }
         durations.push(printed["duration_s"].as_f64().unwrap());
     }
-    // A motion with blends is never slower than a motion that stops at the waypoints.
+    // With blends, the motion is not slower than with stops at the waypoints.
     assert!(durations[1] <= durations[0] && durations[2] < durations[1], "{durations:?}");
 }
 
@@ -201,7 +202,7 @@ fn waypoints_of_any_kind_may_be_ends_of_lines() {
     let early = text.replace("\n5,", "\n0.2,");
     let refused = dir.refused(&early, &["--arm", &arm], 4);
     assert!(refused.contains("line 4: waypoint 3: 0.200 s after waypoint 1 is too early"), "{refused}");
-    // The second end point is another joint configuration with the same flange pose.
+    // Another set of joint positions reaches the same flange pose, but a line cannot end with these positions.
     let other = robots_other(&q);
     let cells = other.map(|v| v.to_string()).join(",");
     let refused =
@@ -226,7 +227,7 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
             legs.iter().enumerate().map(|(i, leg)| format!("0.6,{},0.4,0,0,0,1,{leg}\n", 0.1 * i as f64));
         format!("x,y,z,qx,qy,qz,qw,leg\n{}", rows.collect::<String>())
     };
-    // The next files have errors in their format.
+    // In each of these files, the column `leg` has an error.
     for (kinds, message) in [
         (&["", "via", "line"][..], "refused.csv, line 3: `via` (a point on an arc) is not followed by `arc`"),
         (&["", "line", "via"], "refused.csv, line 4: `via`"),
@@ -240,7 +241,7 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
         let refused = dir.refused(&legs(kinds), &[], 2);
         assert!(refused.contains(message), "{kinds:?}: {refused}");
     }
-    // Three collinear points are not an arc.
+    // Three collinear points do not define an arc.
     let refused = dir.refused(&legs(&["", "via", "arc"]), &[], 4);
     assert!(
         refused.contains("line 4: waypoint 3: the three points of the arc are not on a circle"),

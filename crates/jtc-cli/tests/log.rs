@@ -1,4 +1,4 @@
-//! Tests in which a user reads the flight recorder (J-56) after a fault, during a motion, and again from a file.
+//! Tests of the flight recorder (J-56). A user reads its log after a fault, during a motion, and again from a file.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ fn after_fault() -> Sim {
     let sim = Sim::with_faults(&["--no-throttle"], SILENT).held();
     let file = sim.file("motion.csv", &slow_motion(30));
     sim.jtc(&["traj", "run", &file, "--approach"]).ends(5);
-    // The log also contains events after the fault.
+    // The wait ensures that the log also contains events after the fault.
     std::thread::sleep(std::time::Duration::from_millis(500));
     sim
 }
@@ -62,7 +62,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     std::thread::sleep(std::time::Duration::from_millis(300));
     let anew = sim.json(&["log", "fetch"], 0);
     assert_eq!((&anew["state"], &anew["first"]), (&Value::from("recording"), &Value::Null));
-    // The command never overwrites an existing output file.
+    // Without `--overwrite`, the command does not overwrite an existing output file.
     sim.jtc(&["log", "fetch", "-o", &recording]).ends(4);
 }
 
@@ -99,7 +99,7 @@ fn j56_a_log_without_a_fault_holds_the_motion_that_was() {
     assert!(count(&fetched, "replayed") > 2_000, "{fetched}");
     let words = fetched["events"].to_string();
     assert!(words.contains("trajectory Finish"), "{words}");
-    // The flight recorder has not stopped, and continues to record.
+    // Without an error, the flight recorder continues to record.
     assert_eq!(fetched["state"], "recording");
 }
 

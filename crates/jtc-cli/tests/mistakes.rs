@@ -4,7 +4,8 @@ use crate::common;
 
 use common::{Dir, jtc};
 
-/// The errors for degrees, a missing header and a too fast motion contain a hint, and each hint works.
+/// If a file contains degrees, has no header or is too fast, the error contains a hint. The user can follow each hint
+/// with success.
 #[test]
 fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let dir = tempfile::tempdir().unwrap();
@@ -31,7 +32,7 @@ fn mistakes_in_a_trajectory_are_named_with_what_helps() {
     let output = jtc(&["--json", "traj", "check", file, "--deg"]).ends(0).json();
     let top = output["verdict"]["joints"][0]["position_max_rad"].as_f64().unwrap();
     assert!((top - 45f64.to_radians()).abs() < 1e-3, "{top}");
-    // The command uses the units in the header of the file.
+    // If the header states the unit, the option `--deg` is refused.
     std::fs::write(&path, header.replace("q1,", "q1_deg,") + &rows(45.0, 0.01)).unwrap();
     let output = jtc(&["traj", "info", file, "--deg"]).ends(2);
     assert!(output.err.contains("the file states its units"), "{}", output.err);

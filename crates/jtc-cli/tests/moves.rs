@@ -62,7 +62,7 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let motion = format!("{folder}/motion.csv");
     let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
     let refused = |sim: &Sim, kind: &str| {
-        // The speed is low, because the simulated arm has no real payload.
+        // The move is slow, because the controller may be told a payload that the simulated arm does not carry.
         sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "20"]).ends(0);
         let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
         let kinds: Vec<_> =
@@ -106,7 +106,7 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
     let there = flange(&place(&sim));
     assert!((there.position[1] - 0.2).abs() < 3e-3, "{there:?}");
     assert!((there.rotation[1][0] - 10f64.to_radians().sin()).abs() < 5e-3, "{there:?}");
-    // The test reads the positions that were commanded during the move.
+    // The recording contains the commanded positions of the move.
     let text = std::fs::read_to_string(&record).unwrap();
     let mut lines = text.lines().skip_while(|line| !line.contains("set_position_rad"));
     let head: Vec<&str> = lines.next().expect("a header").split(',').collect();
@@ -117,7 +117,8 @@ fn an_arm_moves_to_poses_of_the_flange_and_on_lines() {
         let cells: Vec<&str> = line.split(',').collect();
         let q: Vec<f64> = columns.iter().filter_map(|i| cells[*i].parse().ok()).collect();
         let [x, y, z] = if q.len() == 6 { flange(&q).position } else { continue };
-        // The tolerance is wide, because the command measured the previous position of the arm.
+        // The tolerance is 3 mm, because the line starts at the measured position of the arm, which differs slightly
+        // from the previous target.
         assert!((x - 0.6).abs() < 3e-3 && (z - 0.4).abs() < 3e-3, "{x} {y} {z}");
         passed += usize::from(y.abs() < 0.1);
     }
@@ -201,7 +202,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
     let output = jtc(&["pose", "remove", "hone", "--arm", &arm]).ends(2);
     assert!(output.err.contains("did you mean \"home\"?"), "{}", output.err);
     at(&sim, [0.0; 6]);
-    // Like `traj run`, a move can begin only in HoldPos.
+    // A move can begin only in HoldPos, and its error is the same as the error of `traj run`.
     let sim = Sim::start(&FAST);
     let all_are_there = || sim.json(&["status"], 0)["missing_nodes"].as_array().unwrap().is_empty();
     assert!((0..100).any(|_| all_are_there()), "the drives are brought up");
@@ -230,8 +231,8 @@ fn waypoints_are_run_several_times() {
         }
     }
     assert!(std::fs::metadata(&page).unwrap().len() > 1000);
-    // The recording contains the trajectory and all runs in sequence, even if the clock of the simulator is ahead of the clock of the
-    // computer.
+    // The recording contains the trajectory and all runs in sequence, even if the clock of the simulator runs ahead
+    // of real time.
     let recording = Recording::read(std::path::Path::new(&record)).unwrap();
     let points: Vec<u32> = recording.samples.iter().filter(|s| s.is_operating()).map(|s| s.point).collect();
     assert_eq!(points.windows(2).filter(|pair| pair[1] < pair[0]).count(), 2, "{points:?}");
@@ -260,7 +261,7 @@ fn the_example_of_lines_is_run() {
     }
 }
 
-/// The command repeats a path that does not end at its start point only with an approach.
+/// A path that does not end at its start point is repeated only with `--approach`.
 #[test]
 fn an_open_path_is_repeated_with_approaches() {
     let sim = ready();
@@ -348,7 +349,7 @@ fn j33_a_move_is_stopped_on_its_path() {
     assert_eq!((&status["state"], &status["trajectory"]), (&"HoldPos".into(), &"Stop".into()));
     let here = place(&sim);
     assert!((0.02..1.4).contains(&here[0]), "{here:?}");
-    // All joints except joint 1 stay at rest during this move.
+    // The move has no motion in joints 2 to 6, so these joints stay at rest.
     assert!(here[1..].iter().all(|q| q.abs() < 3e-3), "{here:?}");
 }
 

@@ -36,7 +36,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 
-/// The user may type an option that every command has before or after the command.
+/// An option that every command has can be typed before or after the command.
 #[test]
 fn the_port_may_stand_before_the_command() {
     for words in [
@@ -88,7 +88,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     let output = jtc(&["--json", "traj", "check", file]).ends(4);
     let problems = output.json()["verdict"]["problems"].clone();
     assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
-    // The user can type the suggested command as it is printed.
+    // The suggested command contains the quotation marks that the shell needs, so the user can type it unchanged.
     let spaced = dir.path().join("my motion.csv");
     std::fs::write(&spaced, motion(0.3)).unwrap();
     let spaced = spaced.to_str().unwrap();
@@ -143,7 +143,7 @@ fn decode_knows_frames_of_both_directions() {
     // The decoder does not lose a frame because of noise before and after the frame.
     let output = jtc_with(&["--json", "decode"], "00 9B 9B 9B 0B 00 07 03 7D 9E 11").ends(0);
     assert!(output.out.lines().any(|l| l.contains("TrajSetExecStatus")), "{}", output.out);
-    // In the bit mask of the frame, bit 2 is joint 3.
+    // Bit 2 of the mask is joint 3, because bits are counted from 0 and joints from 1.
     let output = jtc_with(&["decode"], "9B 10 00 0A 04 00 00 00 AD BE").ends(0);
     assert!(output.out.contains("ResetCanDevices: node 2 (joint 3)"), "{}", output.out);
     jtc_with(&["decode"], "hello").ends(2);
@@ -227,7 +227,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     let file = out.join("recording.mcap");
     let page = out.join("report.html");
     jtc(&["report", file.to_str().unwrap(), "--out", page.to_str().unwrap()]).ends(4);
-    // A report from the recording contains the same numbers as the first report.
+    // A new report from the recording contains the same values as the report of the demo.
     let again = jtc(&["--json", "report", file.to_str().unwrap()]).ends(0).json();
     for (a, b) in again["joints"].as_array().unwrap().iter().zip(value["joints"].as_array().unwrap()) {
         let rms = |v: &serde_json::Value| v["rms_error_mrad"].as_f64().unwrap();
@@ -256,7 +256,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// The command that an example suggests accepts the example file.
+/// Each example suggests a command, and this command accepts the example file.
 #[test]
 fn examples_are_files_that_the_named_commands_take() {
     let dir = tempfile::tempdir().unwrap();
@@ -274,7 +274,7 @@ fn examples_are_files_that_the_named_commands_take() {
             "toml" if name == "arm" => drop(jtc(&["params", "show", file]).ends(0)),
             "toml" => {}
             _ if file.ends_with("-waypoints.csv") => {
-                // A file of waypoints is not a trajectory.
+                // A file of waypoints is not a trajectory, so the error suggests `jtc plan`.
                 let refused = jtc(&["traj", "check", file]).ends(2);
                 assert!(refused.err.contains("`jtc plan`"), "{}", refused.err);
                 let planned = dir.path().join(format!("{name}-planned.csv"));

@@ -136,7 +136,7 @@ fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let mut run = Session::run();
         if signal == "-HUP" {
-            // The terminal is closed, so the output of the command has no reader.
+            // The terminal is closed, so nothing reads the output of the command.
             run.err = None;
         }
         run.signal(signal);
@@ -173,16 +173,17 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut run = Session::run();
     run.signal("-INT");
     run.until("stopping on the path");
-    // Signals within 0.1 s count as one signal, so the test waits for a longer time.
+    // Signals within 0.1 s count as one signal, so the test waits 0.15 s before the second signal.
     std::thread::sleep(std::time::Duration::from_millis(150));
     run.signal("-INT");
     let Ended { code, value, err, sim } = run.end();
-    // On a slow computer, the command may already have ended after the first signal.
+    // On a slow computer, the command may already have ended after the first signal. It then ends in the normal
+    // order.
     let at_once = value["error"]["code"] == "ended-at-once";
     assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
     let words = err.contains("MAY BE MOVING") || err.contains("moves nothing more");
     assert!(!at_once || words, "{err}");
-    // The recording of the run exists, and `jtc report` can read it.
+    // The recording of the interrupted run is complete enough for `jtc report`.
     jtc(&["report", &sim.path("run.csv")]).ends(0);
     sim.jtc(&["traj", "stop"]);
 }
@@ -224,7 +225,7 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, at);
     cli_kit::testing::signal(&child, "-INT");
-    // After this point, the test does not read stderr. A full pipe must not block the command.
+    // The test does not read stderr after this point. Even if the pipe becomes full, the command must not block.
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
     let code = child.wait().unwrap().code().unwrap_or(-1);
@@ -237,7 +238,7 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
     let file = sim.file("motion.csv", &slow_motion(200));
     let run = ["traj", "run", &file];
-    // The test sets the parameters before the run. After that, enabling the drives takes some seconds.
+    // The test sets the parameters before the run. The run must then wait some seconds until the drives are enabled.
     sim.jtc(&["params", "use-defaults"]).ends(0);
     let waits = [("waiting until", "wait for the drives"), ("uploading", "upload")];
     for (at, during) in waits {
@@ -254,13 +255,13 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
-/// After Ctrl-C while a jog waits for the drives, the command reports that it sent no jog. The report differs from the report of a jog
-/// by 0 rad.
+/// If the user presses Ctrl-C while a jog waits for the drives, the command reports that it has sent no jog. It does
+/// not report a jog by 0 rad.
 #[test]
 fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     let sim = Sim::start(&[]);
     sim.jtc(&["params", "use-defaults"]).ends(0);
-    // The controller enables the drives one after another, which takes seconds.
+    // The test waits for HoldPos. After that, enabling the drives still takes some seconds.
     loop {
         let status = sim.json(&["status"], 0);
         if status["state"] == "HoldPos" {
@@ -304,15 +305,16 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
     assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
 }
 
-/// After Ctrl-C in a wait of `recover`, the command sends no further requests, but it stops a motion. The test also checks the output
-/// of the command in each state.
+/// If the user presses Ctrl-C while `recover` waits, the command sends no further request, but it still stops a
+/// motion. The test checks the output of the command in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     let cancelled = |sim: &Sim, words: &[&str], at: &str| {
         let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // After a start of the controller, the command waits for the drives. In this test, one drive is never enabled.
+    // After a start of the controller, `recover` waits for the drives. In this test, the drive of joint 1 is never
+    // enabled.
     let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
     cancelled(
         &Sim::with_faults(&["--no-throttle"], fault),
@@ -322,7 +324,7 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     // The user presses the emergency stop during teaching, after `teach on` has received a status with Teaching.
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
-    // The arm is in motion, but no program monitors the motion.
+    // The program of the motion is killed, so the arm moves and no program monitors the motion.
     let file = sim.file("motion.csv", &slow_motion(600));
     let (_person, slave) = terminal();
     let mut run = sim
@@ -336,7 +338,7 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     run.wait().unwrap();
     cancelled(&sim, &["recover"], "stopping the motion");
     stands(&sim);
-    // The emergency stop button stays pressed.
+    // In Teaching, the emergency stop is pressed and stays pressed.
     sim.jtc(&["teach", "on"]).ends(0);
     reaches(&sim, "Error");
     cancelled(&sim, &["recover"], "release the emergency stop (waiting)");

@@ -243,7 +243,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
         assert!(output.err.contains(message), "{words:?}: {}", output.err);
         assert!(!dir.has("out.csv"), "{words:?} leaves an output");
     }
-    // The hint of the error suggests similar pose names.
+    // If the name of a pose is unknown, the hint suggests a similar name.
     let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
     assert!(output.err.contains("did you mean \"above-table\"?"), "{}", output.err);
     // The command rejects an output file that exists, and an output file that is also the input file.

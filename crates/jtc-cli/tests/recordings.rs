@@ -27,10 +27,11 @@ fn the_simulator_records_each_millisecond() {
         let sim = ready(&["--no-throttle", "--record", &record]);
         let file = sim.file("motion.csv", &motion(0.2));
         sim.jtc(&["traj", "run", &file]).ends(0);
-        // The simulator has already started the recording, so the file exists, and the command does not overwrite it.
+        // The recording file exists already, because the simulator has started it. A second simulator does not
+        // overwrite this file.
         let output = jtc(&["sim", "--record", &record]).ends(4);
         assert!(output.err.contains("already exists"), "{}", output.err);
-        // The recording may lack the data of the last 0.2 s.
+        // The file may lack the last 0.2 s, so the test waits until the recording contains all 1201 points.
         until("1201 places", || jtc(&["traj", "info", &record]).err.contains("at 1201 places"));
         assert_eq!(sim.end("-KILL").0, -1);
         let info = json(&["traj", "info", &record]);
@@ -83,8 +84,8 @@ fn a_run_that_is_killed_leaves_its_recording() {
         run.wait().unwrap();
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
-        // An MCAP file contains the complete trajectory, 6 s at 20 %, even if the controller executed only a part of
-        // the trajectory.
+        // An MCAP file contains the complete trajectory, which takes 30 s (6 s at 20 % speed). A CSV file contains
+        // only the part that the controller has executed.
         assert!(
             if name == "run.mcap" { (seen - 30.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
             "{info}"
@@ -137,7 +138,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
     std::fs::write(&file, motion(0.2)).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    // The reader of the recording reads only the header of the recording.
+    // The reader reads only the first line and then closes the pipe, so the remaining recording cannot be written.
     let reader = std::thread::spawn({
         let pipe = pipe.clone();
         move || {
@@ -154,6 +155,6 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
         (Some("finished"), Some("output-lost"))
     );
     assert!(output.err.contains("no more data are recorded, the motion continues"), "{}", output.err);
-    // The full disk does not affect the report page.
+    // The report page is complete, because only the recording was lost.
     assert_eq!(value["files"], serde_json::json!([page]));
 }

@@ -84,13 +84,13 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     assert!(log.out.contains("HoldPos"), "{}", log.out);
     let second = run(agent.command(&["serve", "--listen", "127.0.0.1:0"], &port), &[], "").ends(3);
     assert!(second.err.contains(&agent.url), "{}", second.err);
-    // The registration file of the killed agent still exists, but no program listens at its address.
+    // The registration file of the killed agent still exists, although no program listens at its address.
     Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
     std::thread::sleep(std::time::Duration::from_millis(200));
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
 }
 
-/// The agent does not print the token into a log file, because other users may read the journal of the system or a
+/// The agent prints the token only on a terminal, because other users may read the journal of the system or a log
 /// file.
 #[test]
 fn the_operators_token_is_printed_on_a_terminal_alone() {

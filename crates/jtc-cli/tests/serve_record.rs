@@ -95,7 +95,7 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     assert!(of_agent.samples.is_sorted_by(|a, b| a.time_s <= b.time_s));
     let report = is_reported(&agent.dir, &file);
     assert!(report["joints"][0]["rms_error_mrad"].is_number() && report["failure"].is_null(), "{report}");
-    // The agent also records a jog and teaching.
+    // The agent records a jog and teaching as two further files.
     agent.jtc(&["jog", "1", "0.1", "--duration", "1"]).ends(0);
     agent.jtc(&["teach", "on"]).ends(0);
     agent.jtc(&["teach", "off"]).ends(0);
@@ -122,7 +122,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
         .expect("it starts");
     let part = recorded(&agent, ".part.mcap", 1).remove(0);
     let moving = |recording: &Recording| recording.samples.iter().filter(|s| s.is_operating()).count();
-    // A user can read the recording while the agent writes it.
+    // The recording can be read while the agent still writes it.
     until("20 samples in motion", || Recording::read(&part).is_ok_and(|recording| moving(&recording) >= 20));
     let (_, dir) = agent.end("-KILL");
     runs.wait().expect("it ends");
@@ -139,7 +139,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     agent.jtc(&["traj", "run", &agent.motion(20)]).ends(0);
     let whole = recorded(&agent, ".mcap", 1).remove(0);
     assert!(part.exists() && whole.to_str().is_some_and(|name| name.ends_with("-000002.mcap")), "{whole:?}");
-    // Two agents cannot use the same directory for recordings.
+    // A second agent cannot use the directory in which another agent records.
     let second = command_in(&agent.dir)
         .args(["serve", "--sim", "--listen", "127.0.0.1:0", "--record"])
         .arg(agent.dir.path().join("recordings"))

@@ -41,7 +41,8 @@ fn a_port_that_is_served_is_not_taken_over() {
     );
     assert_eq!(std::fs::read_link(&sim.port).unwrap(), to);
     sim.jtc(&["status"]).ends(0);
-    // The terminal of another program now has the same number as the terminal of the killed simulator.
+    // The link of a killed simulator may lead to a pseudo-terminal that now belongs to another program, such as a
+    // shell. A new simulator replaces this link.
     let shell =
         rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR | rustix::pty::OpenptFlags::NOCTTY).unwrap();
     rustix::pty::grantpt(&shell).unwrap();
@@ -93,7 +94,7 @@ fn from_power_up_to_a_recorded_motion() {
 
     let status = sim.json(&["status"], 0);
     assert_eq!((status["state"].as_str(), status["trajectory"].as_str()), (Some("HoldPos"), Some("Finish")));
-    // J-34: the user can resume a motion only after a pause.
+    // J-34: only a paused motion can be resumed, so the command fails.
     let output = sim.jtc(&["traj", "resume"]).ends(4);
     assert!(
         output.err.contains("no motion is paused") && output.err.contains("trajectory Finish"),
@@ -180,13 +181,13 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     // The command reports the first failure first, with the joint and the values before and after the failure.
     assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
     assert!(value["failure"]["causes"][0].as_str().unwrap().starts_with("joint 3: "), "{}", value["failure"]);
-    // The fault occurs at 500 ms. Statuses arrive every 40 ms. After the fault, the times of the statuses are arrival
-    // times.
+    // The fault occurs at 500 ms. The reported time is less accurate, because statuses arrive every 40 ms and have
+    // their arrival times after the fault.
     let at_ms = value["failure"]["at_ms"].as_f64().unwrap();
     assert!((440.0..700.0).contains(&at_ms), "{}", value["failure"]);
     let text = std::fs::read_to_string(&page).unwrap();
     assert!(text.contains("<title>FAILED: ") && text.contains("ms into the run: joint 3: "));
-    // The report that is created from the recording shows the same failure.
+    // A report that is created later from the recording shows the same failure.
     let again = sim.path("again.html");
     let output = jtc(&["report", &record, "--out", &again]).ends(0);
     assert!(
@@ -325,7 +326,7 @@ fn the_examples_run_in_the_simulator() {
     let output = sim.jtc(&["traj", "run", motion]).ends(5);
     assert!(output.err.contains("joint 2"), "{}", output.err);
     let point = output.err.split("point ").nth(1).and_then(|t| t.split(|c: char| !c.is_ascii_digit()).next());
-    // The last status before the fault is up to 40 ms old.
+    // The drive stops answering at point 4000. The last status before the fault is up to 40 ms old.
     assert!(point.and_then(|p| p.parse().ok()).is_some_and(|p: u32| p >= 3_950), "{}", output.err);
 }
 
@@ -352,8 +353,8 @@ fn a_recording_is_looked_at_checked_and_run_again() {
 /// If a host sends a frame byte by byte, the arm is not delayed, and statuses still arrive.
 #[test]
 fn time_goes_on_while_a_frame_arrives() {
-    // In real time, a status arrives every 25 ms, so at least 12 statuses arrive during the frame. With a single tick per part of the
-    // frame, only 6 statuses would arrive.
+    // The test sends 160 parts in at least 320 ms (2 ms per part). In real time, a status arrives every 40 ms, so at
+    // least 8 statuses arrive. With a single tick of 1 ms per part, only 4 statuses would arrive.
     for (options, least) in [(&["--no-throttle"][..], 8), (&["--speed", "max", "--no-throttle"], 50)] {
         let sim = Sim::start(options);
         let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&sim.port).unwrap();
@@ -382,8 +383,8 @@ fn time_goes_on_while_a_frame_arrives() {
     }
 }
 
-/// The simulated support holds the arm until the drives are enabled, and after an error. The first line of the output mentions
-/// the support.
+/// Each kind of support either holds the simulated arm or lets it fall, before the drives are enabled and after an
+/// error. The first line of the output mentions the support.
 #[test]
 fn the_support_of_the_arm_is_chosen() {
     for (options, note, falls_first, falls_later) in [
@@ -399,7 +400,8 @@ fn the_support_of_the_arm_is_chosen() {
         let line = sim.error_line();
         assert!(line.starts_with(note), "{options:?}: {line}");
         let sim = sim.with_parameters();
-        // The two variables are the largest positions of any joint: before the drives are enabled, and after the error.
+        // `first` is the largest position of any joint before the error, and `later` is the largest position after
+        // the error, rad.
         let (mut first, mut later) = (0.0f64, 0.0f64);
         for _ in 0..600 {
             let status = sim.json(&["status"], 0);

@@ -1,5 +1,5 @@
-//! Tests of `jtc stop` from a second terminal. The arm stops in every phase of the program that has opened the port, and this program does
-//! not move the arm again.
+//! Tests of `jtc stop` from a second terminal, while another program has opened the port. The arm stops in every
+//! phase of this program, and this program does not move the arm again.
 #![cfg(unix)]
 
 use crate::common;
@@ -62,8 +62,8 @@ impl Cell {
         })
     }
 
-    /// Runs `jtc stop`. Checks that the Stop has stopped this program, and that the program ends with exit code 5. Returns the JSON
-    /// results of the program and of the `jtc stop` command.
+    /// Runs `jtc stop`. Checks that the Stop went through this program, and that the program ends with exit code 5.
+    /// Returns the JSON results of the program and of `jtc stop`.
     fn stops(&self, child: Child) -> (Value, Value) {
         let stopped = self.jtc(&["--json", "stop"]).ends(0).json();
         let pid = child.id();
@@ -106,8 +106,8 @@ fn a_run_is_stopped_from_a_second_terminal() {
     );
     let holder = &stopped["arms"][0]["holder"]["program"];
     assert_eq!(holder, "jtc traj run", "{stopped}");
-    // Repeats the test with text output, with another name of the port, and with another command that has the same
-    // effect.
+    // The test is repeated with text output, with another name of the port, and with another command that has the
+    // same effect.
     let child = cell.moving(&["run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     let real = std::fs::canonicalize(&cell.0.port).unwrap();
     let mut other = command();
@@ -115,7 +115,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm is at rest; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // The message of the Stop states which requests the program may still send.
+    // The message says when the stopped program may request a motion again.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -167,7 +167,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
         );
         cell.stands();
     }
-    // A new command of the user is a new request, so it may move the arm.
+    // A new command of the user may move the arm again.
     let short = cell.0.file("short.csv", &motion(0.1));
     cell.jtc(&["traj", "run", &short]).ends(0);
 }
@@ -176,7 +176,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
 fn a_jog_is_stopped_and_does_not_start_again() {
     let cell = Cell::held();
     let before = place(&cell.0)[0];
-    // The program does not report the start of its upload, so the test tries several times.
+    // The command does not report when the jog begins, so the test tries several times.
     let (child, stopped) = (1..6)
         .map(|seconds| {
             let mut jog = cell.command(&["jog", "1", "0.2"]);
@@ -204,7 +204,7 @@ fn teaching_is_ended_and_the_arm_is_held() {
     assert!(stopped.out.contains("stopped: the arm is at rest; jtc teach record"), "{}", stopped.out);
     ends(child, 5);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
-    // A Stop that goes directly to the controller also ends teaching.
+    // Without another program at the port, the Stop goes directly to the controller, and also ends teaching.
     cell.jtc(&["teach", "on"]).ends(0);
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
@@ -217,7 +217,7 @@ fn a_pause_reaches_the_program_too() {
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let paused = cell.jtc(&["traj", "pause"]).ends(0);
     assert!(paused.out.contains("pausing on the path; jtc traj run"), "{}", paused.out);
-    // When the arm has come to rest, the controller no longer executes a motion.
+    // After the arm has come to rest, no motion is in progress, so the controller rejects a further Pause.
     let mut tries = (0..100).map(|_| cell.jtc(&["traj", "pause"]));
     let refused = tries.find(|again| again.code != 0).expect("the arm comes to rest").ends(1);
     assert!(refused.err.contains("trajectory Pause"), "{}", refused.err);
@@ -240,7 +240,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let checked = CheckedTrajectory::check(&loaded.trajectory, &arm, &status.positions(), &options).unwrap();
     session.upload(&checked, |_| Flow::Continue).unwrap();
     session.execute(&checked).unwrap();
-    // During this time, the program does not read from the port.
+    // The program does not read from the port during this time, as if it were busy.
     std::thread::sleep(Duration::from_millis(1500));
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!(stopped["arms"][0]["moved"], true, "{stopped}");
@@ -257,7 +257,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     assert!(session.teach(true).is_err_and(halted));
     session.jog(&[0.0; 6]).unwrap();
-    // Three seconds later, the library accepts a new request.
+    // After more than three seconds, the library accepts a motion again if the program first calls `ask_to_move`.
     std::thread::sleep(Duration::from_millis(3100));
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     session.ask_to_move().unwrap();
@@ -274,7 +274,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
         assert_eq!(direct.out.trim_end(), words);
         let value = cell.jtc(&["--json", "traj", "stop"]).ends(0).json();
         assert_eq!((&value["command"], &value["arms"][0]["moved"]), (&"stop".into(), &false.into()));
-        // `jtc stop` sends the Stop through a program that only shows the status.
+        // The Stop also works through a program that only shows the status.
         let mut monitor = cell.command(&["--json", "monitor"]).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         let mut out = BufReader::new(monitor.stdout.take().unwrap());
@@ -289,7 +289,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     cell.jtc(&["recover", "--defaults"]).ends(0);
     nothing("HoldPos", "Null");
     cell.jtc(&["traj", "run", &file]).ends(0);
-    // The first Stop resets the trajectory state of the finished trajectory.
+    // The first Stop changes the trajectory state of the finished trajectory from Finish to Stop.
     let direct = cell.jtc(&["stop"]).ends(0);
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
     nothing("HoldPos", "Stop");
@@ -329,7 +329,7 @@ fn an_arm_that_falls_without_torque_does_not_stand() {
     let file = cell.0.file("motion.csv", &slow_motion(50));
     cell.jtc(&["traj", "run", &file]).ends(5);
     stops(&cell, "Error");
-    // The controller is in Init without torque, but the drives were enabled before.
+    // `jtc disable` has switched off the torque, so the controller is in Init and cannot hold the arm.
     let cell = Cell(Sim::start(&["--no-throttle"]).held());
     cell.jtc(&["disable", "--yes"]).ends(0);
     stops(&cell, "Init");
@@ -347,7 +347,7 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!((&stopped["arms"][0]["moved"], &stopped["arms"][0]["holder"]), (&true.into(), &Value::Null));
     cell.stands();
-    // The next program listens at the same socket as the previous program.
+    // A new program can listen at the same socket as the killed program.
     let child = cell.moving(&["traj", "run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     cell.stops(child);
 }

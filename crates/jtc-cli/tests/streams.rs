@@ -89,7 +89,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert_eq!(result["outcome"], "refused");
 }
 
-/// The command reports a failure during a motion at once. The first cause is the first in the list.
+/// A failure during a motion is reported at once. The first cause is the first in the list.
 #[test]
 fn what_breaks_in_motion_is_reported_at_once() {
     let fault =
@@ -126,7 +126,7 @@ fn j33_a_reader_that_does_not_read_holds_no_run() {
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // The test fills the pipe to its capacity.
+    // The test fills the pipe completely, so that the command cannot write any event.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();

@@ -38,7 +38,8 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     let mut child = moving_while(&sim, &["traj", "run", &file], 0.5);
     child.kill().unwrap();
     child.wait().unwrap();
-    // A program that only shows the status does not prevent the controller from pausing the motion.
+    // Status requests of another program do not replace the frames of the killed program, so the controller still
+    // pauses the motion.
     loop {
         let status = sim.json(&["status"], 0);
         let (state, trajectory) = (status["state"].as_str(), status["trajectory"].as_str());
@@ -50,8 +51,8 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     }
 }
 
-/// Only the previous agent knows the timeout of the controller. A new agent reads the timeout before it forwards
-/// requests.
+/// The program of the motion is killed before the agent starts. The agent reads the timeout of the controller before
+/// it forwards requests, so requests of other clients do not prevent the Pause.
 #[test]
 fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let sim = supervised(3000);
@@ -62,7 +63,7 @@ fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let agent = Agent::start(&["--port", sim.port.to_str().unwrap()]);
     let mut patience = Patience::begin();
     loop {
-        // If the agent forwards the requests, each command sends a frame to the controller.
+        // If the agent forwarded this request, the controller would receive a frame and would not pause the motion.
         agent.jtc(&["info"]);
         let status = agent.jtc(&["--json", "status"]).ends(0).json();
         if status["trajectory"] == "Pause" {

@@ -141,7 +141,8 @@ fn moving(page: &mut Page) {
     let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
     pushed.run(run);
     let mut doctor = pushed.run("jtc doctor").blurred();
-    // The simulated time runs at full speed, so the age of the stop may be seconds or hours.
+    // The simulated time runs at full speed, so the age of the stop may be seconds or hours. The test replaces each
+    // unit by `s`.
     for unit in ["s", "min", "h", "days"] {
         doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
     }

@@ -14,8 +14,9 @@ fn with((name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     run(command, words, "")
 }
 
-/// In older versions, some variables changed a motion or a result. The command rejects such a variable before it opens a port (which
-/// would cause exit code 3). If the command ignored the variable, the motion could be different, faster or longer than the user expects.
+/// In older versions, some variables changed a motion or a result. If such a variable were ignored, the motion could
+/// be different, faster or longer than the user expects. Therefore the command is rejected before it opens a port (an
+/// unknown port would cause exit code 3).
 #[test]
 fn a_variable_that_shaped_a_motion_refuses_the_command() {
     let dir = Dir::new();
@@ -89,7 +90,7 @@ fn no_variable_acts() {
     ignored("JTC_TO_FLANGE", "0.6,0,0.4,0,0,0", &["move", "--port", &port], 2);
     ignored("JTC_FORCE", "1", &["example", "motion", "-o", &dir], 4);
     ignored("JTC_OCCURRED", "1", &["clear", "--port", &port], 0);
-    // The environment variable now has a new name.
+    // The variable was renamed, and the message contains the new name.
     let output = ignored("JTC_OUT", &dir, &["example", "no-such-example"], 2);
     assert!(output.err.contains("use --out or JTC_EXAMPLE_DIR"), "{}", output.err);
     assert_eq!(std::fs::read_to_string(existing).unwrap(), "mine");
@@ -134,7 +135,7 @@ fn a_variable_in_effect_is_shown() {
     let programs = with(("JTC_PORT", &port), &["--json", "status"]).ends(0);
     assert_eq!(programs.events()[0]["text"], line.trim_end(), "{}", programs.err);
     assert!(programs.json()["state"].is_string());
-    // The error about an invalid value contains the name of the environment variable.
+    // If the value of a variable is invalid, the error contains the name of the variable.
     let wrong = with(("JTC_BAUD", "fast"), &["status"]).ends(2);
     assert!(wrong.err.contains("--baud is set by the variable JTC_BAUD=fast"), "{}", wrong.err);
 }

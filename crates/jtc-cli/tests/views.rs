@@ -20,7 +20,8 @@ fn moving(sim: &Sim) {
     run.wait().unwrap();
 }
 
-/// The live view can stop a motion whose command has ended. The view shows the Stop and restores the terminal.
+/// The live view can stop a motion that another, ended command has started. The view shows the Stop and restores the
+/// terminal.
 #[test]
 fn j33_the_stop_key_of_the_view_stops() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -37,7 +38,7 @@ fn j33_the_stop_key_of_the_view_stops() {
     assert!(terminal.is_as_before());
 }
 
-/// The live view ends at once and restores the terminal, for every cause of its end.
+/// For every cause of its end, the live view ends at once and restores the terminal.
 #[test]
 fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -48,10 +49,11 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         signal(&child, name);
         assert_eq!(terminal.ends(&mut child), 0, "{name}");
         assert!(terminal.is_as_before() && !terminal.picture.text().contains("thread"), "{name}");
-        // After the live view, the terminal shows its previous screen again.
+        // The terminal has received the control sequence that shows its previous screen again.
         assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
     }
-    // The test closes the terminal window, once in a session that receives the signal and once in a session that ignores the signal.
+    // The terminal is closed twice: once while the command receives SIGHUP, and once while the command ignores SIGHUP
+    // (`nohup`).
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
         let mut monitor = sim.command(&["monitor"]);
@@ -101,7 +103,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let mut terminal = Terminal::new(40, 40);
     let mut child = terminal.start(&sim.command(&["traj", "run", &file, "--speed", "10"]));
     terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
-    // Ctrl-S does not block a command that reads the stop key.
+    // Ctrl-S does not block the output, so the space bar still pauses the motion.
     terminal.press("\u{13} ");
     terminal.until_it_shows("paused; press space to resume");
     terminal.press(" ");
@@ -113,7 +115,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let text = terminal.picture.text();
     assert!(!text.contains('━') && !text.contains('╸') && !text.contains("keys:"), "{text}");
     assert!(text.contains("stopping on the path") && text.contains("stopped"), "{text}");
-    // At the edge of the terminal, the words of the result are complete.
+    // The result is wrapped between words, so these words are complete.
     let words: Vec<&str> = text.split_whitespace().collect();
     for whole in ["statuses,", "frames", "damaged"] {
         assert!(words.contains(&whole), "{whole}: {text}");

@@ -41,7 +41,7 @@ pub(crate) struct ResetArgs {
     /// Do not ask (the arm can lose torque)
     #[arg(long)]
     pub yes: bool,
-    /// Bit mask of older versions (refused, with the replacement)
+    /// Old bit mask (refused; the error names the replacement)
     #[arg(hide = true, value_name = "MASK")]
     pub mask: Option<String>,
     #[command(flatten)]

@@ -332,7 +332,8 @@ pub(crate) enum TeachCommand {
 }
 
 impl ExecuteArgs {
-    /// Returns the policy for the loss of the client, under the name that the agent uses.
+    /// Returns the policy for the loss of the client, which is `continue`, `pause` or `stop`. Returns `None` if the
+    /// user has not selected a policy.
     pub(crate) fn policy(&self) -> Option<&'static str> {
         ["continue", "pause", "stop"].into_iter().find(|word| self.when_gone.as_deref() == Some(word))
     }

@@ -69,7 +69,7 @@ pub enum FrictionKind {
     Table,
 }
 
-/// Option for values of an arm file that no frame carries.
+/// Option to accept values of an arm file that no frame can send to the controller.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct AcceptArgs {
     /// Continue even if limits, gravity or rotor inertia differ.

@@ -41,7 +41,7 @@ pub(crate) enum PayloadCommand {
     },
 }
 
-/// A body at the flange.
+/// Options that describe the payload at the flange.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct PayloadArgs {
     /// Set the mass, kg

@@ -120,7 +120,7 @@ pub(crate) struct MoveArgs {
     pub execute: ExecuteArgs,
 }
 
-/// Torque that a plan leaves.
+/// Option for the torque that a plan keeps in reserve.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct MarginArgs {
     /// Reserve torque, in percent of each limit (0 to 50).
@@ -140,9 +140,9 @@ pub(crate) struct MarginArgs {
 /// Target of a move.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Target {
-    /// As typed, base to wrist.
+    /// Joint positions as the user typed them, from base to wrist.
     Joints([f64; JOINTS]),
-    /// Name of a pose.
+    /// Name of a pose in the arm file.
     Pose(String),
 }
 
@@ -222,7 +222,7 @@ pub(crate) enum PoseCommand {
     },
 }
 
-/// The file that holds the poses.
+/// Option for the arm file that contains the poses.
 #[derive(Args, Debug)]
 pub(crate) struct PoseArm {
     /// Use this arm file, TOML.

@@ -6,8 +6,8 @@ use cli_kit::variables::{Retired, Variables};
 pub(crate) const VARIABLES: Variables = Variables {
     json: "JTC_JSON",
     retired: &[
-        // Variables that caused a motion, a reset, flashing or overwriting. Others confirmed an action, overrode a check, or selected
-        // another file.
+        // The first variables caused a motion, a reset, flashing or overwriting. The others confirmed an action,
+        // overrode a check, or selected another file.
         Retired::less("JTC_ACCEPT_DEVICE_LIMITS", "", "accept-device-limits"),
         Retired::less("JTC_ACCEPT_SUPPLY", "", "accept-supply"),
         Retired::less("JTC_AGAIN", "", "again"),
@@ -36,7 +36,8 @@ pub(crate) const VARIABLES: Variables = Variables {
         Retired::less("JTC_TO_FLANGE", "", "to-flange"),
         Retired::less("JTC_TRAJECTORY", "traj continue", "trajectory"),
         Retired::less("JTC_YES", "", "yes"),
-        // Variables that limited or changed a motion or a result. Without these variables, the result of the command would be different.
+        // These variables limited or changed a motion or a result. If such a variable were ignored, the result of the
+        // command would be different.
         Retired::other("JTC_BLEND", "plan", "blend"),
         Retired::other("JTC_BLEND_M", "plan", "blend-m"),
         Retired::other("JTC_BOARD", "", "board"),
@@ -79,8 +80,8 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option must not have a variable that causes an action. This list contains each variable, with the reason why
-    /// it may exist.
+    /// A new option must not have a variable that causes an action. Therefore this list contains each permitted
+    /// variable, with the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{File, Format, Limit, Line, Output, Place, Simulator};

@@ -40,13 +40,13 @@ pub(super) fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure
     perform(&course, |out| Ok(Job::made(arm, words, out)), Some(&mut make), out)
 }
 
-/// Remainder of an interrupted run, and the runs after the remainder.
+/// Remainder of an interrupted run, and the complete runs that follow.
 struct Left {
     /// Interrupted trajectory and its resume point; `None` if only complete runs remain.
     current: Option<(Trajectory, ResumePoint)>,
-    /// Trajectory of the runs after the remainder of the interrupted run.
+    /// Trajectory of the complete runs that follow.
     then: Trajectory,
-    /// Number of runs after the remainder of the interrupted run.
+    /// Number of the complete runs that follow.
     runs: u32,
 }
 
@@ -72,7 +72,7 @@ impl Left {
         }
     }
 
-    /// Sets the remainder and the runs after it as the motion of a job.
+    /// Sets the remainder and the complete runs as the motion of a job.
     fn make(&self, job: &mut Job, status: &Status, out: &Output) -> Result<(), Failure> {
         let rest = match &self.current {
             None => None,
@@ -94,7 +94,7 @@ impl Left {
                      requested"
                 ),
             });
-            // The command checks the runs after the remainder before the arm moves.
+            // The command checks the complete runs that follow before the arm moves.
             let verdict = job.verdict(&self.then, None, UploadOptions::default());
             if !verdict.is_ok() {
                 return Err(job.refuse(&verdict, out));

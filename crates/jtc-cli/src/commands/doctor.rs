@@ -24,14 +24,16 @@ pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     out.note(format!("listening on {name} at {} Bd", link.baud));
     let mut session = link.session()?;
     let mut seen = session.examine(LISTEN)?;
-    // A drive may answer although its joint is declared absent (J-53). The status has no separate bit for this error.
+    // A drive may answer although its joint is declared absent (J-53). The status has no separate bit for this error,
+    // so the command asks the controller which joints are declared absent.
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
     seen.absent = match &seen.status {
         Some(_) if external => absent(session.absent().unwrap_or_default()),
         Some(status) => jtc_host::labels::absent(status),
         None => Vec::new(),
     };
-    // A held stop and an encoder jump can occur only while the drives produce torque.
+    // The command asks for a held stop and an encoder jump only if the arm has torque, because they cannot occur
+    // without torque.
     if seen.status.as_ref().is_some_and(jtc_host::labels::has_torque) {
         seen.reactions = session.reactions();
     }

@@ -20,14 +20,15 @@ use crate::args::LinkArgs;
 use crate::link::{LinkPort, who};
 use crate::progress::Progress;
 
-/// Longest time for which a program does not accept Stops after it has opened the port, or before it closes the port.
+/// Longest time directly after a program has opened the port, or directly before it closes the port, in which the
+/// program does not accept Stops.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
 /// Like [`CHANGES_HANDS`], for a port for which a program of this user has accepted Stops. This program may be waiting for the end of
 /// an earlier Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Largest number of programs that may open the port one after another during one Stop.
 const OWNERS: usize = 16;
-/// Time after which the command sends a Stop or the end of teaching again if the statuses do not show its effect.
+/// Time after which a Stop, or the request to end teaching, is sent again if the statuses do not show its effect.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Longest wait until a stopped arm is at rest.
 const REST: Duration = Duration::from_secs(5);
@@ -86,7 +87,7 @@ fn failed_json(failure: &Failure) -> Value {
 fn not_asked(arms: &[Arm]) -> Vec<String> {
     let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
     if asked.is_empty() {
-        // The computer has only one port, so the command must not list another port.
+        // No port is known, so the command uses the only port of the computer. There is no other port to list.
         return Vec::new();
     }
     let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
@@ -101,7 +102,8 @@ pub(super) fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             let mut session = *session;
             progress.watch(&mut session);
             session.pause().map_err(|error| match error {
-                // The controller rejects the Pause if no motion is in progress.
+                // If the controller rejects the Pause, no motion is in progress. The failure then must not warn that
+                // the arm may be moving.
                 Error::Link(LinkError::Refused { .. }) => error.into(),
                 error => unconfirmed(error).told(Halt::Pause),
             })?;
@@ -150,8 +152,8 @@ fn arms(link: &LinkArgs) -> Vec<Arm> {
     arms
 }
 
-/// Returns the arms of programs that have a socket for Stops. The result includes the socket of a killed program, because the arm of
-/// this program may still be moving.
+/// Returns the arms of the programs that have a socket for Stops. The result includes killed programs whose socket
+/// still exists, because their arms may still be moving.
 #[cfg(unix)]
 fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
     let (alive, stale): (Vec<_>, Vec<_>) =
@@ -272,7 +274,8 @@ impl NotHalted {
         Self { sent, failure: failure.into() }
     }
 
-    /// Returns this failure with at least the progress `sent`, which the Stop had reached in an earlier program.
+    /// Returns this failure with its progress raised to at least `sent`. The same Stop had already reached this
+    /// progress in an earlier program.
     fn at_least(self, sent: Sent) -> Self {
         Self { sent: self.sent.max(sent), ..self }
     }
@@ -301,7 +304,7 @@ impl NotHalted {
             ),
         };
         let next = self.failure.next.to_string();
-        // The hint of an error may already mention the emergency stop.
+        // If the hint of the error already mentions the emergency stop, it is not repeated.
         let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
         Failure { next: hint.trim_end_matches([' ', '.']).to_owned().into(), ..self.failure }
     }
@@ -413,8 +416,8 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
                     return Ok(Reached::Holder(answer, end));
                 }
-                // The program has ended, so the port is free or another program has opened the port. Alternatively, the program is busy
-                // with other clients.
+                // The program has ended, or is busy with other clients. If the program has ended, the port is free,
+                // or another program has opened the port.
                 if link.port.is_some() {
                     return reach(link, Halt::Stop, true);
                 }
@@ -436,7 +439,7 @@ fn directly(
     holder: Option<Answer>,
 ) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
-    // The command also records a motion that the statuses show before the confirmation of the Stop.
+    // `moved` also becomes `true` if a status shows a motion before the Stop is confirmed.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
     let seen = Rc::clone(&moved);
     session.observe(move |_, status| {
@@ -464,7 +467,8 @@ fn directly(
                 session.end_teaching().map_err(confirmed)?;
             } else if is_paused(&status) {
                 match session.stop() {
-                    // The next statuses show the state of the controller.
+                    // A rejected Stop is not an error here, because the next statuses show whether the arm is at
+                    // rest.
                     Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
                     Err(error) => return Err(confirmed(error)),
                 }

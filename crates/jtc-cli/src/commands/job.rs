@@ -16,7 +16,7 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::CheckArgs;
 
-/// Number of speeds that the command checks between a speed that passes and a speed that fails the trajectory check.
+/// Number of speeds that are tested between a speed that passes and a speed that fails the trajectory check.
 const TRIES: usize = 4;
 
 /// Formats a path in the form in which the user can type it in a shell.
@@ -143,7 +143,7 @@ impl Job {
         self.trajectory = trajectory;
     }
 
-    /// Plans the path of a measured motion again within the limits, if the motion violates the limits with its measured times. The
+    /// If a measured motion violates the limits with its measured times, plans its path again within the limits. The
     /// trajectory check reports the errors that remain.
     pub(super) fn plan_anew(&mut self, out: &Output) {
         let verdict = self.verdict(&self.trajectory, None, UploadOptions::default());
@@ -212,6 +212,7 @@ impl Job {
             slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
         };
         // The estimated speed can be too low. If a torque limit is exceeded, the estimate can also be too high.
+        // Therefore the command tests other speeds.
         let mut good = verdict.slower(self.speed)?;
         let mut bad = self.speed;
         while !passes(good) {
@@ -249,7 +250,8 @@ impl Job {
         Failure::shown(ErrorKind::Refused)
     }
 
-    /// Adds the name of the trajectory file to a failure of this job, if the hint does not contain the name.
+    /// Completes the commands in the hint of a failure with the words that the user typed for this job, such as the
+    /// name of the trajectory file.
     pub(super) fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };

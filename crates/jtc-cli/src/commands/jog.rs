@@ -19,7 +19,7 @@ use jtc_host::session::BRING_UP;
 const HELD: Duration = Duration::from_millis(150);
 /// Joint velocities that the user can select with keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
-/// Index of the highest velocity at which jogging with keys may begin.
+/// Index in [`RATES`] of the highest velocity at which jogging with keys may begin.
 const FIRST_MAX: usize = 2;
 
 /// Moves the joint until a key, the time limit or a signal ends the jog. Waits until the arm is at rest.
@@ -65,7 +65,8 @@ pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     // Therefore the command reports this error first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
-        // The controller rejects a jog during a held stop.
+        // During a held stop, the controller rejects a jog. The held stop is then reported instead of the rejected
+        // jog.
         (_, Err(failure)) if failure.code == "held-stop" => return Err(failure),
         (jogged, rested) => jogged.and(rested)?,
     };
@@ -99,8 +100,8 @@ fn one(
     session.jog_while(&velocity, over).map_err(refused)
 }
 
-/// Returns the index of the initial velocity. The velocity is limited to a share of the velocity limit of the slowest joint. A move uses
-/// the same share by default.
+/// Returns the index of the initial velocity. The velocity is at most a percentage of the velocity limit of the
+/// slowest joint. The percentage is the default speed of a move.
 fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     let share = 1e-2 * session.move_speed(None)?.percent;
     let arm = if session.has_extensions() { session.device_arm()? } else { Arm::avena() };
@@ -244,7 +245,7 @@ mod tests {
         assert_eq!(held.velocity(ms(20)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
         assert_eq!(held.velocity(ms(159)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
         assert_eq!(held.velocity(ms(160)), [0.0; JOINTS]);
-        // Any other key stops the joint, even the key of another joint.
+        // Any other key stops the joint, even a key that selects another joint.
         for key in [Key::Char('x'), Key::Char('4'), Key::Home] {
             held.press(Key::Left, ms(200));
             assert_ne!(held.velocity(ms(201)), [0.0; JOINTS]);

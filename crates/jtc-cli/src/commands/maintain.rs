@@ -26,7 +26,7 @@ pub(super) fn clear(args: &ClearArgs, out: &Output) -> Result<(), Failure> {
     if args.occurred {
         session.clear_occurred()?;
     }
-    // The command reports the errors that remain after this request.
+    // The command waits until this request has taken effect, and then reports the errors that remain.
     session.clear_if_possible(true, ALL_NODES)?;
     let end = session.now() + EFFECT;
     let mut s = session.next_status()?;

@@ -64,8 +64,8 @@ fn push(
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = labels::missing_parameters(status.jtc_init);
-    // The command has not sent the listed parameters, but the controller has values for them. The controller has received these values
-    // earlier from an unknown source.
+    // These parameters were not sent by this command, but the controller has values for them. The values come from an
+    // earlier, unknown source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
@@ -120,7 +120,8 @@ fn check_gains(
     let Some(pid) = set.pid else { return Ok(()) };
     let arm = match &read.arm {
         Some(arm) => Some(arm.clone()),
-        // If the controller cannot report its arm yet, its drives do not produce torque yet.
+        // If the controller cannot report its arm yet, the gains are not checked, because the drives do not produce
+        // torque yet.
         None if session.info()?.is_some() => session.device_arm().ok(),
         None => None,
     };

@@ -20,7 +20,7 @@ pub(super) fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Fail
 }
 
 fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    // The command checks the payload before it searches for a port.
+    // An invalid payload is rejected before the command searches for a port.
     payload.check().map_err(|e| Failure::usage(format!("{e}; nothing was sent")))?;
     let mut session = link.session()?;
     let before = session.payload()?;

@@ -33,7 +33,7 @@ pub(super) fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     named_arm::note_warnings(&arm, out);
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
-    // The command plans the motion before it opens any file, so that it does not create a file if a line is impossible.
+    // The motion is planned before any file is opened. If a line is impossible, no file is created.
     let blend = if args.deg { args.blend.to_radians() } else { args.blend };
     let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
     let way = WaypointPath::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
@@ -113,7 +113,7 @@ fn located(error: &PlanError, file: &WaypointFile) -> Failure {
     Failure { message: file.located(error), ..Failure::of(error) }
 }
 
-/// Like [`located`], but also for waypoints between which no path exists.
+/// Like [`located`], for all errors of a waypoint file. Adds line numbers only to errors of the path.
 fn unplanned(error: &WaypointError, file: &WaypointFile) -> Failure {
     match error {
         WaypointError::Route(e) => located(e, file),
@@ -167,8 +167,8 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
     });
 }
 
-/// Returns the time for which each limit of a joint is the limiting constraint of the motion. Returns a dash if no limit of the
-/// joint is ever the limiting constraint.
+/// Returns the limits of a joint that constrain the motion, each with the time for which it is the limiting
+/// constraint. Returns a dash if no limit constrains the motion.
 fn binds(binding: &[Bound], joint: Joint) -> String {
     let mut limits: Vec<(&str, f64)> = Vec::new();
     for bound in binding.iter().filter(|bound| bound.joint == joint) {

@@ -25,7 +25,7 @@ pub(super) fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output) -> Result<(), Failure> {
-    // The command checks the name and the file before it sends a request, because these checks do not need the controller.
+    // The name and the file are checked first, because this check needs no controller.
     let arm = Arm::load(file)?;
     if arm.poses.contains_key(name) && !overwrite {
         let path = file.to_owned();

@@ -36,7 +36,7 @@ pub(super) fn report(args: &ReportArgs, out: &Output) -> Result<(), Failure> {
     let info = match (arm, recording.info) {
         (Some(arm), _) => run_report::info(&arm, &args.file.display().to_string(), &name, 0),
         (None, Some(info)) => info,
-        // A CSV recording does not contain the limits of the arm.
+        // A CSV recording does not contain the limits of the arm, so the report uses the limits of the built-in arm.
         (None, None) => run_report::info(&Arm::avena(), &args.file.display().to_string(), &name, 0),
     };
     let failure = digest.failure(&info, &recording.ending);

@@ -21,7 +21,7 @@ pub(super) fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = session.fresh_status()?;
-    // In any other state, the session rejects the request and reports the error.
+    // Only a paused motion is checked. In any other state, the session rejects the request and reports the error.
     if status.trajectory == TrajectoryState::Pause {
         match &mut job {
             Some(job) => check_rest(job, args.check.arm.is_none(), &mut session, &status)?,
@@ -68,8 +68,8 @@ fn check_rest(
     })
 }
 
-/// Prints that the command does not check the remainder of the motion. The program did not load the motion, and a controller
-/// cannot return its trajectory.
+/// Prints a note that the remainder of the motion is not checked. Without a trajectory file, its trajectory is
+/// unknown, because a controller cannot return a trajectory.
 fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {

@@ -86,8 +86,8 @@ pub(super) fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
 }
 
-/// Runs the motion of a job. This motion is the unchanged trajectory of a file, or the command plans it when it knows
-/// the position of the arm.
+/// Runs the motion of a job. The motion is the unchanged trajectory of a file, or it is planned as soon as the
+/// position of the arm is known.
 pub(super) fn perform(
     course: &Course,
     load: impl FnOnce(&Output) -> Result<Job, Failure>,
@@ -143,9 +143,9 @@ fn match_device(
     Ok(())
 }
 
-/// Checks a motion that the command knows before it connects to the controller. A repeated motion must end at its start
-/// point. Without an arm file, only the controller knows the arm that moves. If the built-in arm cannot execute the motion,
-/// the function then returns the verdict.
+/// Checks a motion that the command knows before it connects to the controller. A repeated motion must end at its
+/// start point. If the user has specified an arm file, a failed check is an error. Otherwise, the function returns
+/// the failed verdict for the built-in arm, because the controller may have another arm.
 fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<Option<Verdict>, Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {

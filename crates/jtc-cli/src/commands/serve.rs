@@ -64,7 +64,8 @@ pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
     let log = Arc::new(Mutex::new(log));
     let left = if args.sim { None } else { keep_policies(&name, &log, out)? };
-    // In another working directory, a relative name would refer to a different port.
+    // The absolute path is used, because a relative name would refer to a different port in another working
+    // directory.
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let witness = recordings.as_mut().and_then(Prepared::witness);
@@ -89,7 +90,8 @@ pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         token_file: std::path::absolute(&token_file)?,
         certificate: args.tls_cert.as_deref().map(std::path::absolute).transpose()?,
     };
-    // Without the registration, the user can still specify the address of the agent as an option of each command.
+    // An error of the registration is ignored, because the user can still specify the address of the agent as an
+    // option of each command.
     let registration = register(&registered).ok().flatten();
     if !listen.ip().is_loopback() && tls.is_none() {
         out.note(
@@ -168,7 +170,7 @@ fn moves(status: &Status) -> bool {
 fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));
-    // The agent uses only statuses that arrive after this point.
+    // Only statuses that arrive after this point are used.
     let rests = || {
         line.with(|line, _| {
             line.is_idle() && line.status().is_some_and(|(at, status)| *at > began && !moves(status))
@@ -223,7 +225,8 @@ fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog
     keeper
 }
 
-/// Writes notices about recordings and policies to the command log. The agent also prints notices for users.
+/// Returns a function that writes notices about recordings and policies to the command log. The function also prints
+/// the warnings for users.
 fn notices(log: &Arc<Mutex<CommandLog>>, out: &Output, kind: &'static str) -> Box<dyn FnMut(Notice) + Send> {
     let (log, out) = (log.clone(), *out);
     Box::new(move |notice| {

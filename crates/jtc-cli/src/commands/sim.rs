@@ -125,7 +125,7 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
         return Err(Failure::usage(what)
             .next("use --bus multicast:239.74.163.2:43113, which python-can joins as udp_multicast"));
     }
-    // The error already contains the name of the bus.
+    // The message of this error already contains the name of the bus.
     let bus = can_link::open_url(&parsed).map_err(Failure::usage)?;
     Ok(jtc_sim::BusTap::new(bus))
 }

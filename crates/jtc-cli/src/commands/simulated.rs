@@ -32,7 +32,8 @@ pub(super) fn simulated(
     };
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored.is_some() {
-        // Like a board, the controller reads its arm from the stored image, and receives a new arm in frames.
+        // Like a board, the simulated controller starts with the built-in settings, and then reads its arm from the
+        // stored image.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
     }
     Ok((arm, config))

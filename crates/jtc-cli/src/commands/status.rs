@@ -188,7 +188,7 @@ mod tests {
         assert!(told.contains("next: remove what pushes the joint"), "{told}");
         let untold = text(&s, None);
         assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
-        // The text does not contain a held stop after the errors of the stop were cleared.
+        // If the errors of the status were cleared, the text does not contain the held stop.
         assert!(!text(&Status { errors: 0, ..s }, Some(&reactions)).contains("held stop"));
     }
 

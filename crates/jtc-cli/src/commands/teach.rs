@@ -26,7 +26,7 @@ const TOLERANCE: f64 = 0.01;
 /// Runs a `jtc teach` command.
 pub(super) fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
-        // The event stream begins here, so that the command also reports an error at opening a file as an event.
+        // The event stream begins here, so that a file that cannot be opened is also reported as an event.
         out.stream()?;
     }
     match command {
@@ -83,7 +83,8 @@ fn record(
     progress.watch(&mut session);
     let status = session.fresh_status()?;
     if stop.asked() {
-        // The user no longer guides the arm, so an arm in Teaching would have no support.
+        // After Ctrl-C, the user does not guide the arm. The command must not switch on Teaching, because the arm
+        // would then have no support.
         let message = "cancelled before teaching was switched on".into();
         return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
     }
@@ -115,10 +116,10 @@ fn record(
     });
     if let Err(Error::State(StateError::TeachingEnded { .. } | StateError::TeachingFault { .. })) = &recorded
     {
-        // The controller does not let the user guide the arm any longer.
+        // The controller has ended Teaching by itself, so the message after a second signal must not mention Teaching.
         teaching.store(false, Ordering::Relaxed);
     }
-    // The command completes the recording first, even if the link is lost.
+    // The file is completed first, even if the link is lost.
     let written = lost.map_or_else(|| finish(taught, thin, out), Err);
     recorded.map_err(still_teaching)?;
     if !was_on {

@@ -79,7 +79,8 @@ pub(super) struct Incoming {
     missing: usize,
     /// `true` if the bytes that were received last continue a frame.
     continued: bool,
-    /// Time at which the simulated line sent the last byte. For a long frame, the value is the time on a real serial line.
+    /// Time at which the simulated line sent the last byte. For a long frame, time at which a real serial line would
+    /// have sent this byte.
     heard: Instant,
 }
 
@@ -129,8 +130,8 @@ impl Incoming {
         self.missing > 0 || !self.head.is_empty()
     }
 
-    /// Returns how long the host has been silent within a frame, including the moment at which the silence ends. Returns `None` outside a
-    /// frame, or after a silence that is too long for the host to complete the frame.
+    /// Returns how long the host has been silent within a frame. Returns zero if further bytes of the frame have just
+    /// arrived. Returns `None` outside a frame, or if the silence is so long that it ends the frame.
     pub(super) fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);

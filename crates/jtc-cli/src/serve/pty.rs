@@ -89,7 +89,7 @@ impl Pty {
     pub(crate) fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),
-            // The error EIO means that no host has opened the port.
+            // The error EIO means that no host has opened the port, so no bytes are available.
             Err(Errno::AGAIN | Errno::IO | Errno::INTR) => Ok(0),
             Err(e) => Err(fails("read")(e)),
         }

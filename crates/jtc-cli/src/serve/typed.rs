@@ -92,7 +92,7 @@ fn read(mut take: impl FnMut(String) -> bool) {
             }
         }
     }
-    // The last line of the input may end without a line feed.
+    // The last line of the input may end without a line feed, so the remaining bytes are also a line.
     take(text(&mut line));
 }
 

@@ -198,7 +198,8 @@ impl Program {
     }
 }
 
-/// Returns `true` if the message contains a status. On a very busy computer, a status may not arrive in time.
+/// Returns `true` if the answer contains a status. On a very busy computer, the answer may be an error, because no
+/// status arrives in time.
 fn is_status(value: &Value) -> bool {
     value["state"].is_string()
 }

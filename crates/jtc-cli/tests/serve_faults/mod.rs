@@ -1,4 +1,5 @@
-//! Tests of the arm if a program, the agent or the controller is killed, in each phase of a job.
+//! Tests that kill a program, the agent or the controller in each phase of a job. The tests check how the arm then
+//! behaves.
 #![cfg(unix)]
 
 mod cell;
@@ -21,7 +22,7 @@ fn a_program_that_is_killed_leaves_its_motion_to_its_policy() {
         run.wait().expect("it ends");
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
-        // The agent gives the lease to the next client at once.
+        // After the program has ended, the next client gets the lease at once.
         let gripper = cell.jtc(&["gripper", "on", "--port", &cell.url]).output().expect("it ran");
         assert!(gripper.status.success(), "{}", String::from_utf8_lossy(&gripper.stderr));
     }
@@ -32,8 +33,8 @@ fn a_program_that_is_killed_in_its_upload_moves_nothing_whatever_its_policy() {
     for policy in ["continue", "stop"] {
         let cell = Cell::new("57600", 150);
         let mut run = cell.run(policy);
-        // The upload takes seconds. At this time the controller has discarded the old motion, and has received only a part of the new
-        // motion.
+        // The upload takes several seconds. After 2 s, the controller has discarded the old motion, and has received
+        // only a part of the new motion.
         std::thread::sleep(Duration::from_secs(2));
         assert!(run.try_wait().expect("a child").is_none() && !moves(&cell.status()), "it uploads");
         run.kill().expect("it runs");

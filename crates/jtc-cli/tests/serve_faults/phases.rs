@@ -198,7 +198,7 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");
     assert!(is_held(&cell.rests(CALM)), "{ended}");
-    // The motion continues in the same way as if the client were still connected.
+    // With the policy `continue`, the motion continues as if the client were still connected.
     let mut job = Silent::come(&cell, "continue").begins("POST /api/runs", json!({ "trajectory": 8 }));
     job.reports("executing");
     pause(&cell);

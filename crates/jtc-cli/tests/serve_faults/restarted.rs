@@ -36,7 +36,7 @@ fn next(cell: &mut Cell) -> Value {
 fn follow(cell: &mut Cell) -> Value {
     let before = cell.found().len();
     cell.next_agent();
-    // A separate thread of the agent writes the log.
+    // A separate thread of the agent writes the log, so the test waits for the new line.
     until("what the next agent finds", || cell.found().len() > before);
     let found = cell.found();
     assert_eq!(found.len(), before + 1, "{found:?}");
@@ -66,7 +66,8 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             (&json!(policy), &json!("motion"), &json!(true))
         );
         assert!(found["by"].as_str().is_some_and(|by| by.contains("jtc traj")), "{found}");
-        // The agent has sent the request before it served any client.
+        // The agent has applied the policy before it served any client. Its report says which request it has sent for
+        // each policy.
         let taken = [
             ("continue", "the motion continues"),
             ("pause", "a Pause was sent"),
@@ -91,7 +92,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             cell.until("Finish", |status| trajectory(status) == "Finish");
         }
         is_gone(&cell);
-        // If no motion is in progress, the agent reports nothing.
+        // If no motion is in progress, a new agent writes no line about a policy.
         let before = cell.found().len();
         cell.kill_agent();
         cell.next_agent();

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Writes all files of the cases.
 pub(super) fn write(dir: &Path) {
     let save = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
-    // Motion of all joints in 6 s, forward and back to the start.
+    // Trajectory in which all joints move forward and back to the start, in 60 steps of `step_s` seconds.
     let motion = |scale: f64, step_s: f64, offset: f64| {
         let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
         for i in 0..=60 {

@@ -81,8 +81,8 @@ fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }
 
-/// Returns the failure if the controller rejected a setting. The hint says that the controller accepts settings only in Init and
-/// Error.
+/// Returns the failure if the controller rejected a setting. If the arm has torque, the hint says that settings can
+/// change only without torque.
 fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {

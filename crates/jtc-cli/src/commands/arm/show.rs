@@ -68,7 +68,7 @@ fn in_degrees(v: &mut ArmValue) {
 
 /// Formats a number with five significant digits, without trailing zeros.
 pub(super) fn number(value: f64) -> String {
-    // The table shows rounding errors of rotated frames as 0.
+    // Rotated frames have rounding errors, so the table shows such small values as 0.
     if value.abs() < 1e-11 {
         return "0".into();
     }

@@ -41,7 +41,7 @@ pub(super) fn count(s: &Status) -> usize {
     s.joints.len() + usize::from(s.gripper.is_some())
 }
 
-/// Returns `true` if a measured joint reports an error.
+/// Returns `true` if joint `j` reports an error or is in a fault state.
 fn is_broken(s: &Status, j: usize) -> bool {
     let joint = &s.joints[j];
     joint.state.is_fault() || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0

@@ -137,7 +137,7 @@ impl View {
             Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
         frame.render_widget(Paragraph::new(above), causes);
         let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
-        // The view does not draw a table heading without a row.
+        // The table is drawn only if at least one row fits below its heading.
         if table.height > heads + edge {
             frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
         }
@@ -220,7 +220,8 @@ fn state_style(state: Code<ControllerState>) -> Style {
 fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16, silent: bool) -> Sparkline<'static> {
     let known = || history.iter().copied().filter(|v| v.is_finite());
     let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-    // The range has a minimum, so that the curve of a joint at rest is not scaled up to full height.
+    // The value range is at least 0.01, so that small changes of a joint at rest do not fill the full height of the
+    // curve.
     let span = (high - low).max(0.01);
     let height = |v: &f64| v.is_finite().then(|| ((v - low) / span * 100.0) as u64 + 1);
     // The view draws only the newest values, as many as fit inside the frame.

@@ -46,7 +46,8 @@ fn refused(why: &str, file: &str) -> Failure {
 mod tests {
     use super::*;
 
-    /// The trajectory file itself passes its check, but the check rejects the path to the first point of the file.
+    /// If only the path to the first point fails the check, the hint must not tell the user to correct the trajectory
+    /// file.
     #[test]
     fn a_refused_approach_does_not_send_people_to_correct_their_file() {
         let failure = refused("joint 2: no stop in time", "'my motion.csv'");

@@ -85,7 +85,8 @@ pub(super) fn conclude(
     info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
-    // The command reports a lost file even if the run failed. The command reports the failure of the run first.
+    // A lost file is reported even if the run failed. If the run was successful, the first lost file is skipped here,
+    // because it becomes the failure of the command.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
@@ -136,7 +137,8 @@ pub(super) fn conclude(
     }
 }
 
-/// Returns every motion of the run as JSON, including approaches. `last` is the motion that ended the run.
+/// Returns the motions whose results are in memory as JSON, including approaches. `last` is the motion that ended the
+/// run.
 fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     let before = done.kept.iter().map(|d| (d.phase, "finished", &d.summary));
     let mut number = done.runs - done.kept.iter().filter(|d| d.phase == Phase::Motion).count();
@@ -183,7 +185,7 @@ mod tests {
 
     use super::*;
 
-    /// After 100,000 runs, only the results of the last thousand runs are in memory, with their run numbers.
+    /// The test runs 100,000 motions. Only the results of the last 1000 runs stay in memory, with their run numbers.
     #[test]
     fn figures_of_the_last_motions_are_kept() {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);

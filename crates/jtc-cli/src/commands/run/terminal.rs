@@ -32,8 +32,8 @@ pub(super) struct Reel {
     pub tape: Option<Tape>,
     /// Start of the first motion in the recording, on the clock of the session.
     start: Duration,
-    /// Earliest time of the next sample, s. The earliest time is directly after the last sample. If a simulator is faster than real
-    /// time, its clock is ahead of the clock of the computer.
+    /// Earliest time that the next sample may have, s. This time is directly after the last sample. The limit is
+    /// needed because the clock of a fast simulator runs ahead of the clock of the computer.
     until_s: f64,
 }
 
@@ -105,7 +105,7 @@ impl<'a, 'o> Terminal<'a, 'o> {
     /// Returns the recording and the results of the run.
     pub(super) fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
-        // The recording begins before the arm moves.
+        // The recording is missing only if the run ended before its first motion.
         let reel = reel.unwrap_or_else(|| Reel::new(RecordingInfo::of(&job.arm), None, Duration::ZERO));
         Taken { done, samples, reel, outputs }
     }

@@ -10,7 +10,7 @@ use jtc_host::waypoints::{self, thinned};
 
 use crate::failure::recording_interrupted;
 
-/// Largest movement at which the arm counts as at rest, rad.
+/// Largest joint movement of an arm that is considered to be at rest, rad.
 const STILL: f64 = 0.002;
 /// Interval of the statuses of the controller, s. The rows of the file have the same interval. The command uses the clock of the host
 /// only to detect lost statuses.
@@ -33,7 +33,7 @@ pub(super) struct TaughtFile {
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// First pose of the present time at rest, and the number of the last grid interval of this time.
+    /// First pose of the time at rest before the motion, and the number of the last grid interval of this time.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,
@@ -104,7 +104,7 @@ impl TaughtFile {
         self.rows.push(Row { position, end: self.text.len() });
     }
 
-    /// Returns the number of rows before the final time at rest.
+    /// Returns the number of rows up to the end of the motion, including one row at rest.
     fn in_motion(&self) -> usize {
         let Some(last) = self.rows.last() else { return 0 };
         let moving = self.rows.iter().rposition(|row| moved(&row.position, &last.position));
@@ -187,8 +187,8 @@ mod tests {
         );
     }
 
-    /// At every speed, the command reduces a straight path to its two end points. The command also removes the old
-    /// motion from the file.
+    /// The command reduces a motion on a straight path to its two end points, even if the speed varies. The waypoints
+    /// replace the recorded motion in the file.
     #[test]
     fn a_motion_by_hand_becomes_waypoints() {
         let dir = tempfile::tempdir().unwrap();

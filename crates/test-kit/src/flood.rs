@@ -89,7 +89,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
     let (over, opened) = (AtomicBool::new(false), AtomicUsize::new(0));
     std::thread::scope(|threads| {
         threads.spawn(|| keep_open(http, flood, &opened, &over));
-        // The guard ends the flood even if a Stop fails.
+        // The guard ends the flood even if a check panics.
         let _end = End(&over);
         until(format_args!("the flood of {}", flood.what), || opened.load(Ordering::Relaxed) >= CONNECTIONS);
         for n in 0..STOPS {
@@ -125,7 +125,7 @@ fn keep_open(http: &Http, flood: &Flood, opened: &AtomicUsize, over: &AtomicBool
             let Ok(mut stream) = TcpStream::connect_timeout(&http.address, Duration::from_secs(1)) else {
                 break;
             };
-            // The agent may have closed the connection at once.
+            // A write error is ignored, because the agent may have closed the connection at once.
             let _ = stream.set_nonblocking(true).and_then(|()| stream.write_all(&flood.bytes));
             streams.push(stream);
             opened.fetch_add(1, Ordering::Relaxed);

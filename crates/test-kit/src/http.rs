@@ -74,7 +74,8 @@ impl Http {
     fn exchange_bytes(&self, request: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(LONGEST)).expect("a time");
-        // If the agent rejects a request, the agent may close the connection before the whole request is written.
+        // A write error is ignored: if the agent rejects a request, it may close the connection before the whole
+        // request is written.
         let _ = stream.write_all(request.as_bytes());
         let mut all = Vec::new();
         let _ = stream.read_to_end(&mut all);
@@ -154,7 +155,7 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         assert_eq!(http.ask(request, &[&rebound, &bearer]).0, 403, "{request}: a name that points here");
         let neighbour = format!("Origin: http://127.0.0.1:{}", port ^ 1);
         assert_eq!(http.ask(request, &[&own, &neighbour]).0, 403, "{request}: another program's page");
-        // A Stop from this computer does not need a token.
+        // A Stop and a Pause from this computer need no token, so they succeed even with a wrong token.
         let refused = if ["POST /api/stop", "POST /api/pause"].contains(request) { 200 } else { 401 };
         for token in ["Bearer 0123456789abcdefghij", "Basic b3BlcmF0b3I6"] {
             assert_eq!(
@@ -165,14 +166,14 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         }
     }
     assert_eq!(http.get("GET /api/status").0, 200);
-    // A request that reads a state must change nothing, so that an image or a link on a page cannot stop the arm or the boards.
+    // A GET request must not cause a Stop. Otherwise, an image or a link on a page could stop the arm or the boards.
     assert_eq!(http.get("GET /api/stop").0, 405);
 }
 
 /// Checks that the agent serves the dashboard pages for requests with one of its host names, but not for pages of another site.
 pub fn pages_are_the_agents_own(http: &Http) {
     let own = format!("Host: {}", http.address);
-    // A wrong token does not affect a page, because the page itself asks the user for a token.
+    // A page is also served with a wrong token, because the page itself asks the user for a token.
     for lines in [&[own.as_str()][..], &[&own, "Authorization: Bearer 0123456789abcdefghij"]] {
         let (status, page) = http.ask("GET /", lines);
         assert!(status == 200 && page.to_lowercase().starts_with("<!doctype html"), "{status} {page}");
@@ -201,7 +202,7 @@ pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
         let upgrade = [host.as_str(), "Upgrade: websocket", "Sec-WebSocket-Version: 13", key, &protocols];
         http.ask("GET /api/stream", &[&upgrade[..], more].concat()).0
     };
-    // The request is authorised, and then fails because it is not a complete WebSocket handshake.
+    // With a valid token, the request fails only later, because it is not a complete WebSocket handshake.
     assert!(![401, 403].contains(&asked(&http.operator, &[])));
     assert_eq!(asked("0123456789abcdefghij", &[]), 401);
     assert_eq!(asked(&http.operator, &[evil]), 403);
@@ -223,8 +224,8 @@ pub fn tokens_cannot_be_tried_without_end(http: &Http) {
         (0..40).map(|n| http.ask("GET /api/status", &[&host, &format!("Authorization: Bearer {n:0>43}")]).0);
     assert!(answers.by_ref().take(20).all(|status| status == 401));
     assert!(answers.all(|status| status == 429));
-    // The agent does not block clients with a valid token. The agent also does not block clients on this computer, which need no
-    // token.
+    // The limit does not block clients with a valid token. It also does not block requests that need no token, such
+    // as a Stop from this computer.
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
@@ -349,7 +350,7 @@ pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
         let (http, answered) = (http.clone(), answered.clone());
         std::thread::spawn(move || {
             let (status, found) = http.api("GET /api/events?job=1&wait_s=8", None, None);
-            // If the test has failed in the meantime, the receiver no longer exists.
+            // If the test has failed in the meantime, the receiver no longer exists, so this error is ignored.
             let _ = answered.send((status, found["events"].as_array().map_or(0, Vec::len)));
         });
     }

@@ -1,6 +1,6 @@
-//! Shared code of the tests and benchmarks of several crates: runs of the stored fuzz inputs on the stable
-//! toolchain, documents with command output, pages whose commands are run, data of an existing arm, a clock, test
-//! timeouts, and requests to agents.
+//! Shared code of the tests and benchmarks of several crates. The code runs the stored fuzz inputs on the stable
+//! toolchain, and compares documents with the output of their commands. It also contains access to data of an
+//! existing arm, a clock, test timeouts, and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;

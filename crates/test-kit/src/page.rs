@@ -11,7 +11,7 @@ const SHOWN: (usize, usize) = (5, 4);
 /// changed.
 const TRIES: usize = 4;
 
-/// Words before numbers that are kept, because such a number identifies an item.
+/// Words after which a number stays unchanged, because this number identifies an item.
 const KEPT: [&str; 9] =
     ["joint ", "joints ", "board ", "boards ", "number ", "code ", "stop ", "certain: ", "localhost:"];
 
@@ -59,7 +59,7 @@ impl Page {
         self.text += &block(title, command, printed);
     }
 
-    /// Adds a case whose output depends on timing. If the output differs from the document, the function runs the case again.
+    /// Adds a case whose output depends on timing. If the output differs from the document, the case is run again.
     pub fn case_of_a_moment(&mut self, title: &str, command: &str, mut run: impl FnMut() -> Printed) {
         let mut made = String::new();
         for _ in 0..TRIES {
@@ -109,11 +109,12 @@ pub fn part(file: &str, name: &'static str, text: &str) {
     Page { text: text.to_owned(), ..Page::new(file, name) }.finish();
 }
 
-/// Checks that the description of an API has each request in `names`, such as `Stop (POST /api/stop)`. A name without a
-/// request must be a command.
+/// Checks that the description of an API has each request in `names`, such as `Stop (POST /api/stop)`. A name without
+/// a request must be a command.
 ///
 /// # Panics
-/// If the description does not have a request.
+///
+/// Panics if the description does not have a request.
 pub fn check_requests<'a>(description: &str, names: impl Iterator<Item = &'a str>) {
     let description: serde_json::Value = serde_json::from_str(description).expect("JSON");
     for name in names {
@@ -189,8 +190,8 @@ fn block(title: &str, command: &str, printed: &Printed) -> String {
     text
 }
 
-/// Returns the text without the parts that differ from run to run. `blurred` omits tables of measured values. `blurred`
-/// replaces numbers by `…`, except the numbers of joints and boards and numbers that are part of a name.
+/// Returns the text without the parts that differ from run to run. Tables of measured values are omitted. Numbers are
+/// replaced by `…`, except the numbers of joints and boards, and numbers that are part of a name.
 pub fn blurred(text: &str) -> String {
     let mut out = String::new();
     for line in text.lines().filter(|line| !is_figures(line)) {
@@ -205,7 +206,7 @@ pub fn blurred(text: &str) -> String {
                 .map(|digits| 2 + digits.find(|c: char| !c.is_ascii_hexdigit()).unwrap_or(digits.len()));
             let end = hex.unwrap_or(number);
             let named = KEPT.iter().any(|w| before.ends_with(w));
-            // The number is part of a date.
+            // A number before a hyphen and another number is part of a date, which stays unchanged.
             let named = named
                 || from[end..].strip_prefix('-').is_some_and(|r| r.starts_with(|c: char| c.is_ascii_digit()));
             let part = before.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '-');

@@ -25,7 +25,8 @@ impl Patience {
         Self { begun: Instant::now(), late: Duration::ZERO }
     }
 
-    /// Sleeps for 20 ms before the next check. Panics with `missing` after the timeout; `format_args!` is formatted only in this case.
+    /// Sleeps for 20 ms before the next check. Panics with the text `missing` after the timeout. The text is
+    /// formatted only in this case.
     #[track_caller]
     pub fn pause(&mut self, missing: impl Display) {
         self.wait(missing, std::thread::sleep);

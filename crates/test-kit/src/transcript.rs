@@ -103,7 +103,7 @@ pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
         if new != text {
             std::fs::write(page, new).expect("the page can be written");
         }
-        // A command that fails is an error on every page.
+        // The differences are now on the page, so only commands that failed remain as errors.
         run.done.wrong.retain(|text| text.contains("exit code"));
     }
     std::mem::take(&mut run.done)
@@ -114,7 +114,7 @@ struct Run {
     folder: PathBuf,
     programs: PathBuf,
     terminals: BTreeMap<String, Terminal>,
-    /// Terminals in which a program has replaced the shell.
+    /// Names of the terminals in which a program has replaced the shell.
     taken: BTreeSet<String>,
     /// Texts on the page, and the real texts that replace them.
     places: Vec<(String, String)>,
@@ -165,7 +165,7 @@ impl Run {
         }
         let mut steps = block.steps();
         if steps.is_empty() {
-            // The page does not show the output of this block yet.
+            // If the block is empty, its output is not on the page yet.
             steps.push(Step { command: String::new(), shown: Vec::new() });
         }
         let name = block.note("terminal").unwrap_or(OWN).to_owned();
@@ -220,7 +220,7 @@ impl Run {
             self.terminal(name).interrupt();
         }
         let Some(last) = shown.iter().rfind(|line| !line.is_empty()).cloned() else {
-            // If the page does not show the output yet, the test accepts all lines until 6 s pass without a line.
+            // If the page does not show the output yet, all lines are accepted until no line arrives for 6 s.
             let mut printed = Vec::new();
             while std::env::var_os("UPDATE_DOCS").is_some()
                 && let Some(line) = self.terminal(name).line(Duration::from_secs(6))
@@ -231,7 +231,7 @@ impl Run {
         };
         let places = std::cell::RefCell::new(self.places.clone());
         let is_last = |line: &str| {
-            // If the program uses another port than the port on the page, the test stores the pair of ports.
+            // If the program uses another port than the page shows, the test stores both ports.
             if let (Some(port), Some(real)) = (port(&shown.join("\n")), port(line))
                 && starts
                 && port != real
@@ -249,7 +249,7 @@ impl Run {
         if starts {
             return printed;
         }
-        // The test ignores the output before the first line that the page shows.
+        // Output before the first line that the page shows is ignored.
         let from = printed.iter().position(|line| same(&shown[..1], std::slice::from_ref(line), varying));
         printed[from.unwrap_or(0)..].to_vec()
     }

@@ -3,8 +3,8 @@ use std::path::Path;
 
 use crate::patience::Patience;
 
-/// Returns the complete text of a file as soon as the text contains all words in `words`. `text_with` must
-/// wait, because the writer does not wait for the disk.
+/// Waits until the text of a file contains all words in `words`, and returns the text. The wait is needed because the
+/// writer works in parallel.
 pub fn text_with(path: &Path, words: &[&str]) -> String {
     let mut patience = Patience::begin();
     loop {

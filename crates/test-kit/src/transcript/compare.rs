@@ -9,7 +9,7 @@ pub(super) fn same(shown: &[String], printed: &[String], varying: bool) -> bool 
     let prepared = |lines: &[String]| -> Vec<String> {
         let line = |line: &String| if varying { masked(line) } else { line.trim_end().to_owned() };
         let lines: Vec<String> = lines.iter().map(line).collect();
-        // Blank lines at the end are not visible on a page.
+        // Blank lines at the end are not compared, because they are not visible on a page.
         let end = lines.iter().rposition(|line| !line.is_empty()).map_or(0, |last| last + 1);
         lines[..end].to_vec()
     };
@@ -26,8 +26,8 @@ fn fits(shown: &[String], printed: &[String]) -> bool {
     }
 }
 
-/// Returns the line with `#` instead of each number and one blank instead of each gap. The width of a gap depends on the
-/// adjacent numbers.
+/// Returns the line with `#` instead of each number, and with one blank between words. The original number of blanks
+/// depends on the length of the numbers.
 fn masked(line: &str) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut out = Vec::new();
@@ -44,7 +44,7 @@ fn numbers_masked(word: &str) -> String {
     let mut rest = word;
     while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
         let (before, from) = rest.split_at(at);
-        // A sign before the number belongs to the number.
+        // A sign directly before the number is also masked.
         out += before.strip_suffix(['-', '+', '−']).unwrap_or(before);
         out.push('#');
         rest = &from[number_length(from)..];

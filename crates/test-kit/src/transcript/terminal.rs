@@ -30,7 +30,7 @@ impl Terminal {
         let path = std::env::var("PATH").unwrap_or_default();
         let state = folder.join(".home");
         std::fs::create_dir_all(&state).expect("a home");
-        // Agents store files in this directory that only the agent's user may read.
+        // The directory is private, because agents store files in it that only their user may read.
         std::fs::set_permissions(&state, std::os::unix::fs::PermissionsExt::from_mode(0o700))
             .expect("rights");
         shell.env("PATH", format!("{}:{path}", programs.display())).env("COLUMNS", "100");

@@ -1,6 +1,5 @@
-//! Processing of Ctrl-C. The first Ctrl-C cancels the command, which still completes the steps that it has
-//! started. The second Ctrl-C ends the process at once. The second Ctrl-C also prints the remaining steps and
-//! the command for them.
+//! Handling of Ctrl-C. The first Ctrl-C cancels the command, but the command completes the steps that it has started.
+//! The second Ctrl-C ends the process at once, and prints the remaining steps and the command for them.
 
 use std::io::Write;
 use std::time::Duration;
@@ -12,12 +11,12 @@ use ucom_host::session::CleanupList;
 /// Maximum wait for a blocked reader of stderr.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(300);
 
-/// Starts the processing of Ctrl-C.
+/// Starts the handling of Ctrl-C.
 pub(crate) fn listen(cleanup: &CleanupList) -> std::io::Result<Stop> {
     let cleanup = cleanup.clone();
     Stop::listen_with(move || {
         let words = cleanup.words();
-        // Output files that the command has created but not written are removed.
+        // Removes output files that the command has created but not written.
         cli_kit::output_file::abandon();
         print_within(PRINT_TIMEOUT, move || {
             let _ = std::io::stderr().write_all(words.as_bytes());

@@ -22,8 +22,8 @@ fn bus_off_is_not_for_ever() {
     assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
 }
 
-/// An error frame informs a client that its controller is bus-off, and `ucom` prints a message with the next
-/// step. The bus-off is also reported on the stderr of the simulator.
+/// An error frame informs a client that its controller is bus-off. The command `ucom` prints a message with the next
+/// step, and the simulator also reports the bus-off on its stderr.
 #[test]
 fn the_bus_off_controller_is_named() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

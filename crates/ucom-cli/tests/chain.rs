@@ -115,7 +115,7 @@ fn names_inputs_and_motion() {
     let io = sim.json(&["io", "1"], 0);
     assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
     assert_eq!(io["boards"][0]["initial_ci"], json!([0, 1000, 900]));
-    // While a board is supervised, its inputs move its outputs.
+    // The board moves to the input 1500, which is 15 degrees, while the command supervises the board.
     let so = sim.json(&["ci", "1", "set_position=1500", "--for", "1.5"], 0);
     let position = so["so"]["position"].as_i64().unwrap();
     assert!((1450..1550).contains(&position), "{so}");
@@ -228,7 +228,7 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
     }
 }
 
-/// P-20: the command `probe` measures the profile of boards with another byte order.
+/// P-20: the command `probe` measures the profile of boards that use the other byte order (big endian).
 #[test]
 fn p20_probe_finds_big_endian_boards() {
     let chain = tempfile::tempdir().unwrap();
@@ -243,8 +243,8 @@ fn p20_probe_finds_big_endian_boards() {
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
-/// If the user presses Ctrl-C while a board moves, the command stops the board at once. The board's own supervision, which detects the
-/// loss of the PC, would stop the board later.
+/// If the user presses Ctrl-C while a board moves, the command stops the board at once. Without this stop, the board
+/// would stop later, when its own supervision detects the loss of the PC.
 #[test]
 fn an_interrupted_motion_is_stopped() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -253,7 +253,7 @@ fn an_interrupted_motion_is_stopped() {
     peer.wait("601#01010000");
     peer.wait("381#");
     signal(&moving, "-INT");
-    // The PC sends run = 0 before the board's timeout of 1.5 s.
+    // The stop must come from the PC. The board itself would stop only after its timeout of 1.5 s.
     let since = std::time::Instant::now();
     peer.wait("601#00000000");
     assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
@@ -299,7 +299,8 @@ fn d36_one_image_on_boards_that_differ() {
     sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
 }
 
-/// If one of several boards does not answer, the command ends before any change. The command reports changes that were completed.
+/// If one of several boards does not answer, the command ends before any change. If changes were completed before,
+/// the command reports them.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -314,13 +315,13 @@ fn several_boards_are_changed_only_when_all_answer() {
     }
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{received:?}");
-    // The board has lost its number. The command `status` does not show a status that it has not received.
+    // The board has lost its number, so its status is unknown. The command `status` shows no status value.
     let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
     assert!(output.out.contains("lost its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
     let output = sim.json(&["status", "1", "--clear", "INIT"], 0);
     assert_eq!(output["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
-    // Board 2 still has its number, but its application is not started.
+    // Board 2 still has its number, but its application is not started, so the hint suggests `ucom start 2`.
     let output = sim.json(&["io", "all"], 4);
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
@@ -373,8 +374,8 @@ fn a_name_given_twice_is_refused() {
     assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
 }
 
-/// Boards without a number show only the format of their reports. The command `probe` reports that it could measure only the format of
-/// the reports.
+/// Boards without a number show only the format of their reports. The command `probe` reports that it could not
+/// measure anything else.
 #[test]
 fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     let sim = Sim::start(&["--boards", "2"]);

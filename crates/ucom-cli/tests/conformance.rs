@@ -56,8 +56,8 @@ fn running_loops_are_stopped_first() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// D-22: the command applies the formula literally. The command `status --raw` shows the status that the rules
-/// require and the actual status.
+/// D-22: the formula for the new status also applies to value bits outside the mask. The command `status --raw` shows
+/// the status that the rules require and the actual status.
 #[test]
 fn d22_raw_status_sets_bits_outside_the_mask() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -68,11 +68,11 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
-    // With `status all --raw`, the command sends a single broadcast frame.
+    // For `all`, the command sends a single broadcast frame.
     sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);
-    // Without the bit INIT, the board loses its number, as expected.
+    // Without the bit INIT, the board loses its number. This result agrees with the rules.
     let output = sim.json(&["status", "2", "--raw", "0x08:0x00"], 0);
     assert_eq!(
         (&output["boards"][0]["after"], &output["boards"][0]["as_expected"]),

@@ -12,13 +12,13 @@ use common::{Sim, ended_by};
 use serde_json::json;
 use test_kit::patience::until;
 
-/// D-50: stdout has no reader, and its pipe is full from the start. The PC still sends heartbeats, the boards run until
-/// they are stopped at the end, and the command reports the lost output.
+/// D-50: the reader of stdout does not read, and the pipe is full from the start. The PC still sends heartbeats, the
+/// boards run until they are stopped at the end, and the command reports the lost output.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let sim = Sim::numbered(&["--boards", "1"]);
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // 65,536 bytes are the capacity of a pipe.
+    // A pipe has a capacity of 65,536 bytes, so this write fills the pipe completely.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut peer = sim.peer();
     let mut command = sim.command();
@@ -44,8 +44,8 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// If the reader of the `so` command's output is blocked, Ctrl-C still works. If the reader of the `so` command's output
-/// has disconnected, the command ends.
+/// If the reader of the `so` output does not read, Ctrl-C still works. If the reader has disconnected, the command
+/// ends.
 #[test]
 fn outputs_that_nobody_reads() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -83,7 +83,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
         let child = sim.spawn(words);
         peer.wait(wait_for);
         std::thread::sleep(Duration::from_millis(100));
-        // The boards no longer answer, so the clean-up of the command takes a long time.
+        // The boards no longer answer, so the command needs a long time for its remaining steps.
         sim.signal("-STOP");
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
@@ -113,7 +113,8 @@ fn ctrl_c_and_a_wrapper_s_signal_are_one() {
 #[test]
 fn d51_losses_during_the_start_count() {
     let sim = Sim::numbered(&["--boards", "3"]);
-    // Boards send one heartbeat per second; the timeout of the PC in this test is shorter.
+    // Boards send one heartbeat per second. The timeout of the PC in this test is shorter, so the boards count as
+    // lost.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
     let output = sim.ucom(&words).ends(5);
@@ -178,7 +179,7 @@ fn d26_a_board_that_reboots_under_way_fails_the_run() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["--json", "run", "1,2", "--active", "--on-lost", "report"]);
     sim.peer().wait("602#01010000");
-    // The start of the boards needs this time to complete.
+    // The wait is long enough for the start of all boards.
     std::thread::sleep(Duration::from_millis(700));
     sim.fault("crash board=2");
     std::thread::sleep(Duration::from_millis(500));
@@ -191,15 +192,15 @@ fn d26_a_board_that_reboots_under_way_fails_the_run() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// In this test, unlike in the test of a board that reboots, every board answers at the end. A report that no PC has
-/// requested still makes the run fail.
+/// A report that no PC has requested shows that a board has rebooted. The run fails, although every board answers at
+/// the end.
 #[test]
 fn d26_a_reboot_counts_even_if_the_board_answers() {
     let sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["--json", "run", "1,2", "--on-lost", "report"]);
     let mut peer = sim.peer();
     peer.wait("382#");
-    // The frame is DSP_REPORT1 with the UCoM id of board 2.
+    // This frame is an unrequested DSP_REPORT1 of board 2, as after a reboot.
     peer.send("442#22");
     std::thread::sleep(Duration::from_millis(300));
     let output = ended_by(child, "-INT").ends(5);
@@ -235,8 +236,8 @@ fn a_stop_of_all_does_not_hang_on_one_board() {
     ended_by(run, "-INT").ends(5);
 }
 
-/// The test presses Ctrl-C while the command starts a board only to read its names. After the command has ended, the
-/// application of the board is not started.
+/// The user presses Ctrl-C while the command starts a board only to read its signal names. The application of the
+/// board is then stopped again.
 #[test]
 fn a_start_for_names_that_is_cancelled_is_undone() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -252,8 +253,8 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
     }
 }
 
-/// If stderr has no reader and its pipe is full, the second Ctrl-C still ends the process. If stderr is blocked, a failure
-/// of the command also ends the process.
+/// If the reader of stderr does not read and the pipe is full, the second Ctrl-C still ends the process. A failure of
+/// the command also ends the process.
 #[test]
 fn a_blocked_stderr_does_not_keep_the_process() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -279,8 +280,8 @@ fn a_blocked_stderr_does_not_keep_the_process() {
     }
 }
 
-/// If a command that changes boards cannot print its result, it completes and ends with exit code 5. If a command that only
-/// prints cannot print its result, it ends at once.
+/// If the result cannot be printed, a command that changes boards still completes, and ends with exit code 5. A
+/// command that only prints ends at once.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_lost_result_of_what_acts_is_a_fault() {
@@ -298,14 +299,14 @@ fn a_lost_result_of_what_acts_is_a_fault() {
         let mut command = sim.command();
         let child = command.args(words).stdin(Stdio::piped()).stdout(full()).stderr(Stdio::piped()).spawn();
         let child = child.unwrap();
-        // After the wait, the test sends a frame that the command prints.
+        // After the start of the command, the test sends a frame that the command cannot print.
         std::thread::sleep(Duration::from_millis(300));
         peer.send("641#0000");
         let output = ended(child).ends(code);
         assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }
     assert_eq!(sim.status_byte("1"), 0x1B, "stopped all the same");
-    // If the reader of stdout has disconnected, this is not an error.
+    // If the reader of stdout has disconnected, the command ends without an error.
     for words in [&["decode", "--live"][..], &["record", "-"], &["--json", "monitor"]] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
@@ -319,7 +320,8 @@ fn a_lost_result_of_what_acts_is_a_fault() {
     }
 }
 
-/// The second Ctrl-C ends every command with exit code 5 and a list of the remaining steps.
+/// If the output of a command is blocked, the second Ctrl-C still ends the command. The exit code is 5, and the
+/// message says that nothing was changed.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -332,7 +334,8 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // The output of the command has no reader and its pipe is full, so the first signal has no visible effect.
+        // The reader of the output does not read, and its pipe is full. Therefore the first signal has no visible
+        // effect.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();
@@ -345,7 +348,8 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
         let output = ended_by(child, "-INT");
-        // A process that could react to the first signal has already ended.
+        // The command `replay` waits between two frames, so it can react to the first signal and may already have
+        // ended.
         let alike = output.code == 5 && output.err.contains("ended at once; nothing was changed");
         assert!(
             alike || (words[0] == "replay" && output.code == 0),

@@ -8,7 +8,7 @@ use std::time::Duration;
 use cli_kit::testing::{ended, signal};
 use common::{Sim, ended_by};
 
-/// Like Ctrl-C, a closed terminal ends running control loops and the programming of boards.
+/// A closed terminal ends running control loops and the programming of boards in the same way as Ctrl-C.
 #[test]
 fn a_hangup_stops_in_order() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -33,7 +33,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        // The wait for 50 output frames is long enough for a complete snapshot of the outputs on a loaded computer. Without a
+        // Fifty output frames contain a complete snapshot of the outputs, even on a loaded computer. Without a
         // snapshot, the command has no outputs to show.
         peer.wait_for(50, "381#");
         signal(&child, name);
@@ -77,7 +77,8 @@ fn a_killed_recorder_leaves_what_was_recorded() {
         std::thread::sleep(Duration::from_millis(3_300));
         ended_by(child, "-KILL");
         let output = sim.ucom(&["decode", &file]).ends(0);
-        // The output contains at least two frames every 10 ms, for more than a second.
+        // The output contains at least two frames every 10 ms, for more than a second. Therefore it contains more
+        // than 200 frames.
         let frames = output.out.lines().count();
         assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
         assert!(ending != "mcap" || output.err.contains("the file ends after"), "{ending}: {}", output.err);

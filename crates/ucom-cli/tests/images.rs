@@ -129,7 +129,8 @@ fn s_records_count_words_or_bytes() {
     let output = update("bytes.s19", file(16, 4), &[], 0);
     assert!(output.contains("64 bytes from word 0x20, addresses in bytes"), "{output}");
     assert!(output.contains("because only then the records are contiguous"), "{output}");
-    // The gap between the two records may be intended.
+    // With only two records, a gap between them may be intended. The command cannot determine the unit of the
+    // addresses, and refuses the file.
     peer.all(100);
     let output = update("two.s19", file(16, 2), &[], 2);
     assert!(output.contains("0x48") && output.contains("--addresses byte"), "{output}");

@@ -1,6 +1,5 @@
 //! Tests of boards that leave their control loop while `ucom run` supervises them (D-37). The command `run` reports
-//! at once that a board has left its loop, by an event of `--json` and by outdated values. The command `run` then
-//! ends with exit code 5.
+//! each such board at once, with an event of `--json` and with outdated values. At the end, the exit code is 5.
 
 use crate::common;
 
@@ -107,7 +106,7 @@ fn d37_boards_that_another_pc_stops_are_named() {
     sim.peer().wait("382#");
     std::thread::sleep(Duration::from_millis(300));
     sim.peer().send("600#00000000");
-    // The command reports the board at once, while the run continues.
+    // The message is printed at once, while the run continues.
     assert!(lines.any(|line| line.contains("board 2 has left its control loop by itself")));
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-INT");

@@ -56,7 +56,8 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
     let mut terminal = Terminal::new(60, 20);
     let mut child = terminal.start(&monitor(&sim));
     terminal.until("heartbeats", |p| p.text().matches(" started ").count() == 2);
-    // A board that has not yet sent its first heartbeat never counts as lost (D-51).
+    // A board that has not yet sent its first heartbeat never counts as lost (D-51), so the test waits for a
+    // heartbeat of both boards.
     terminal.until("heartbeats of both", |p| p.text().matches("s ago").count() == 2);
     sim.fault("silent board=2");
     terminal.until_it_shows(" lost ");

@@ -39,7 +39,7 @@ fn nobody_on_the_bus_ends_with_3_and_says_what_to_do() {
     assert_eq!(output.json()["healthy"], false);
 }
 
-/// C-3: `000#` is a valid frame.
+/// C-3: the command `decode` prints the names of frames. The frame `000#`, which has no data, is valid.
 #[test]
 fn decode_prints_names_of_frames() {
     let output = ucom_with(&["decode"], "000#\n141#2100011934126E38\n2A1#\n").ends(0);
@@ -137,7 +137,7 @@ fn files_are_kept_and_nothing_is_made_up() {
     assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
 }
 
-/// If a program requests JSON, the command also reports wrong usage as JSON.
+/// If JSON is requested, wrong usage is also reported as JSON.
 #[test]
 fn wrong_usage_is_json_where_that_is_asked_for() {
     for words in [&["--json", "scann"][..], &["ci", "2,3", "x=1", "--json"], &["info", "--json", "99"]] {

@@ -6,7 +6,8 @@ use crate::common;
 
 use common::{Sim, ended_by, ucom};
 
-/// If a user follows the hint of the file check while boards run, the command resets no board.
+/// The hint of the file check suggests `--overwrite`. If a user follows this hint while boards run, the command
+/// resets no board.
 #[test]
 fn writing_over_a_file_never_resets_a_running_chain() {
     let sim = Sim::numbered(&["--boards", "2"]);

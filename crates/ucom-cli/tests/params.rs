@@ -34,7 +34,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
         refused["error"]["message"],
         "board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg"
     );
-    // Without the signal table, the value 61 would be a raw word, which means 0.61 degrees.
+    // Without a unit, the number 61 is refused: it could mean 61 degrees, or the raw word 61, which is 0.61 degrees.
     let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     let message = bare["error"]["message"].as_str().unwrap();
     assert!(message.contains("the unit is missing: give `61deg`"), "{bare}");
@@ -54,8 +54,8 @@ fn d11_values_have_the_units_of_the_signal_table() {
     for words in [["par", "1", "kd=2mA s/deg"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
-    // The signal `min_position` has a scale but no unit in the table. The command refuses a bare number for a signal
-    // without a unit, because without the table the number would be the raw word.
+    // The table contains a scale but no unit for `min_position`. A bare number is refused, because it would be a raw
+    // word if the table were missing.
     let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
     assert!(output["error"]["message"].as_str().unwrap().contains("but no unit for this signal"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
@@ -130,7 +130,8 @@ fn outputs_are_opened_before_anything_is_sent() {
         let output = sim.ucom(words).ends(2);
         assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
-    // The boards that are started send a heartbeat every second (D-50). No command in this test has sent a frame.
+    // The started boards send a heartbeat every second (D-50). There is no other frame on the bus, because no command
+    // in this test has sent a frame.
     let sent: Vec<_> =
         peer.all(100).into_iter().filter(|frame| !["681#", "682#"].contains(&frame.as_str())).collect();
     assert_eq!(sent, [""; 0]);
@@ -226,7 +227,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
 #[test]
 fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     let (sim, _) = started();
-    // After the command `io`, the signal names of the board are known.
+    // This command reads the signal names of the board into the cache.
     sim.ucom(&["io", "1"]).ends(0);
     sim.ucom(&["stop", "all"]).ends(0);
     let file = |value: &str| {
@@ -279,6 +280,6 @@ fn a_run_of_all_boards_misses_those_of_the_file() {
     let output = sim.json(&["run", "all", "--params", &file, "--for", "0.2"], 4);
     assert!(output["error"]["message"].as_str().unwrap().contains("31"), "{output}");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
-    // If the command line lists boards, only the listed boards run.
+    // If the command line lists boards, the other boards of the file do not need to answer.
     sim.ucom(&["run", "1", "--params", &file, "--for", "0.2"]).ends(0);
 }

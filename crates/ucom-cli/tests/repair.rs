@@ -23,9 +23,9 @@ fn rebooted() -> Sim {
     }
 }
 
-/// 5.4: the pin is switched off three times. The board then gets its number, and its identity is read. After the
-/// repair, the pin is switched on and read back. The command reads the flash number of the board from the
-/// inventory.
+/// Section 5.4: the command first switches the outgoing init pin (OPINIT) of board 2 off, three times. The board then
+/// gets its number, and its identity is read. At the end, the pin is switched on and read back. The command reads the
+/// flash number of the board from the inventory.
 #[test]
 fn d21_a_board_gets_its_number_back() {
     let sim = rebooted();

@@ -60,14 +60,14 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     assert_eq!(code, Some(0), "{err}");
     assert!(err.contains("new operator's token in") && err.contains("`cat "), "{err}");
     assert!(!err.contains(&http(&ready).operator) && !err.contains("#token="), "{err}");
-    // The tokens are the same at the next start of the agent.
+    // The agent uses the same tokens after it is started again.
     let (child, again) = serve(dir.path(), &["--sim"]);
     assert_eq!(http(&again).operator, http(&ready).operator);
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
-    // In this test, the user requests the dashboard link. The agent still does not print the link, because the program that reads the
-    // output may store it.
+    // The option `--link` requests the dashboard link. The agent still does not print the link, because a program
+    // reads its output and may store the link.
     let (child, again) = serve(dir.path(), &["--sim", "--link"]);
     signal(&child, "-INT");
     let (code, err) = over(child);

@@ -57,7 +57,7 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire after"),
         "{doctor}"
     );
-    // After `init` has assigned new numbers, the same commands succeed.
+    // After `init` has assigned a separate number to each board, the same commands succeed.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }

@@ -180,7 +180,7 @@ fn running(page: &mut Page) {
         let mut sim = numbered(&["--boards", "2"]);
         let child = sim.start(run);
         sim.peer().wait("382#");
-        // The start of the boards needs this time to complete.
+        // The wait is long enough for the start of all boards.
         std::thread::sleep(Duration::from_millis(1_000));
         sim.fault("power-loss board=1");
         result_last(of_a_moment(sim.all_of(child)))

@@ -59,25 +59,25 @@ fn d46_refusals_change_nothing() {
     let sim = chain("3");
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
-    // The board has another flash number than the user expects.
+    // The flash number of the board is 0x21, but the user expects 0x77.
     let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
     sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
-    // To update several boards, the command requires the identity of each board.
+    // An update of several boards needs their identities from the inventory, so it is refused without an inventory.
     let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
-    // The command refuses to update a board that runs.
+    // While a board runs, the command updates no board.
     let run = sim.spawn(&["--json", "run", "3"]);
     sim.peer().wait("603#01000000");
     sim.ucom(&["update", "1", &file]).ends(4);
     ended_by(run, "-INT").ends(0);
     assert_eq!(program_id(&sim, "1"), before);
-    // No board has the number 9.
+    // No board has the number 9, so the board does not answer.
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
 }
 
@@ -85,7 +85,7 @@ fn d46_refusals_change_nothing() {
 #[test]
 fn d46_errors_before_and_after_the_erase() {
     let mut sim = chain("2");
-    // The image is larger than the application area.
+    // The image is larger than the application area, so the board reports an error before the erase.
     let file = sim.file("large.bin", &image(100 * 1024, 3));
     let before = program_id(&sim, "1");
     let update = sim.json(&["update", "1", &file], 1);
@@ -297,7 +297,7 @@ fn d40_two_images_by_plan() {
             images[0]["program_id"] == report["program_id"]
                 && images[1]["program_id"] != report["program_id"]
         );
-        // Either an image is missing, or the command line contains an option of another plan.
+        // Each of these commands is refused: an image is missing, or an option belongs to another plan.
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
         assert!(output.err.contains(option) && output.err.contains(plan), "{}", output.err);
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
@@ -369,7 +369,7 @@ fn all_is_the_inventory_too() {
     assert_eq!(outcomes(&report), ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
     assert!(output.err.contains("has no number"), "{}", output.err);
-    // Other commands also list the missing boards.
+    // The command `start all` also reports the missing boards.
     let output = sim.ucom(&["start", "all"]).ends(0);
     assert!(
         output.err.contains("0x42") || output.err.matches("has no number").count() == 2,

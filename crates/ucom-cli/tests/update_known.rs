@@ -58,12 +58,12 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
     let text = sim.ucom(&["update", "1", &high]).ends(0).out;
     assert!(text.contains("same Program ID and date"), "{text}");
-    // The boards get new numbers, and each record stays with its board.
+    // After `init`, each record still belongs to the same board, so the image is still up to date.
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept.contains("# cabinet 3") && kept.contains("address = 0x200"), "{kept}");
     sim.ucom(&["init"]).ends(0);
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
-    // The test removes the record from the inventory.
+    // The test restores the old inventory, which has no record of the image.
     std::fs::write(&path, &commented).unwrap();
     let mut peer = sim.peer();
     for (more, code) in [(&[][..], 4), (&["--unverified"], 0), (&["--dry-run"], 4)] {
@@ -75,7 +75,7 @@ fn d62_another_address_is_written() {
     let text = sim.ucom(&["update", "1", &high]).ends(4).out;
     assert!(text.contains("--rewrite") && !text.contains("--force"), "{text}");
     assert_eq!(of(&sim.json(&["update", "1", &high, "--rewrite"], 0)), ("verified", true));
-    // The inventory file does not exist.
+    // Without an inventory file, there is no record of the image.
     let nowhere = sim.path("nowhere.toml");
     let words = ["update", "1", &high, "--inventory", &nowhere];
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));
@@ -91,7 +91,8 @@ fn d62_a_killed_update_leaves_no_record() {
     assert!(kept());
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &sim.file("next.bin", &image(60 * 1024, 2))]);
-    // The first READY frame answers the first block of the first cycle. The erase begins only in the second cycle.
+    // The first READY frame answers the first block of the first cycle. At this time nothing is erased, because the
+    // erase begins in the second cycle.
     peer.wait("181#");
     ended_by(update, "-KILL");
     assert!(!kept());
@@ -108,7 +109,8 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &next]);
-    // When the test removes the inventory, the command has already read it, but has not yet checked for another PC.
+    // At this frame, the command has already read the inventory, but has not yet checked for another PC. The test
+    // then removes the inventory.
     peer.wait("201#");
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);

@@ -23,13 +23,13 @@ fn only_questions(frames: &[String]) {
     }
 }
 
-/// If the shell still contains a variable of another command, no board is changed, and one line reports that the variable is
-/// ignored.
+/// A variable of another command may still be set in the shell. In this case no board is changed, and one line
+/// reports that the variable is ignored.
 #[test]
 fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "1"]).ends(0);
-    // After the command `io all`, the signal names are known, so the following commands send the same requests.
+    // This command stores the signal names, so that none of the following commands has to request them.
     sim.ucom(&["io", "all"]);
     let file = sim.file("bus.log", b"(1.000000) can0 201#\n(1.010000) can0 000#\n");
     let parameters =
@@ -54,8 +54,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
         let output = with(&sim, (variable, value), words).ends(code);
         let line = format!("{variable}={value} is ignored: `ucom");
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
-        // `frames` does not contain heartbeats, nor the frames of `ci`, which checks whether the control loop runs and writes its
-        // input. If the control loop does not run, these frames do not move the board.
+        // `frames` contains neither heartbeats nor the frames of `ci`. The command `ci` checks whether the control
+        // loop runs, and writes its input. If the control loop does not run, these frames do not move the board.
         let of_ci = |f: &String| {
             f == "601#00000000" || ["680#", "681#", "341#"].iter().any(|start| f.starts_with(start))
         };
@@ -146,7 +146,7 @@ fn a_variable_in_effect_is_shown() {
     let programs = sim.ucom(&["--json", "scan"]).ends(0);
     assert!(programs.json()["boards"].is_array());
     assert_eq!(programs.events()[0]["text"], shown.trim_end(), "{}", programs.err);
-    // The value of an environment variable cannot send control codes to the terminal.
+    // Control codes in the value of a variable are not sent to the terminal.
     let odd = with(&sim, ("UCOM_EDGES", "a\u{1b}[2J\n.toml"), &["io", "1"]).err;
     assert!(odd.lines().next().unwrap().contains(r"UCOM_EDGES=a\u{1b}[2J\n.toml"), "{odd}");
 }

@@ -2,12 +2,12 @@
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Variables that have an effect, and variables of earlier versions that no longer have an effect.
+/// Variables that have an effect, and retired variables of earlier versions.
 pub(crate) const VARIABLES: Variables = Variables {
     json: "UCOM_JSON",
     retired: &[
-        // In earlier versions, variables of this kind made a command reset, number, program, start or move boards,
-        // override a check, or overwrite a file.
+        // These retired variables made a command reset, number, program, start or move boards, override a check, or
+        // overwrite a file.
         Retired::less("UCOM_FORCE", "", "force"),
         Retired::less("UCOM_FORCE", "", "overwrite"),
         Retired::less("UCOM_ACTIVE", "run", "active"),
@@ -33,8 +33,8 @@ pub(crate) const VARIABLES: Variables = Variables {
         Retired::less("UCOM_SET", "status", "set"),
         Retired::less("UCOM_START", "update", "start"),
         Retired::less("UCOM_UNVERIFIED", "update", "unverified"),
-        // In earlier versions, variables of this kind limited a command, or determined the data that the command sent. Without the
-        // variable, the command would do something else than in earlier versions.
+        // These retired variables limited a command, or determined the data that the command sent. If such a variable
+        // were ignored, the command would do something else than in earlier versions.
         Retired::other("UCOM_ADDRESSES", "update", "addresses"),
         Retired::other("UCOM_CI", "run", "ci"),
         Retired::other("UCOM_COUNT", "", "count"),
@@ -63,8 +63,8 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option must not get a variable that changes boards. The list contains every variable, and the reason why the variable
-    /// is permitted.
+    /// A new option must not get a variable that changes boards. Therefore this list contains each permitted
+    /// variable, with the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};

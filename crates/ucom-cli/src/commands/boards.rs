@@ -183,8 +183,8 @@ pub(super) fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(),
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     let Stopped { boards: all, failed } = driver.stop_each(&args.boards, level)?;
-    // Board numbers that two boards share do not prevent a stop. The command only reports them after the stop, because both boards
-    // have received the stop command.
+    // Two boards with the same number do not prevent a stop, because both boards receive the stop command. The
+    // command reports these boards after the stop.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both boards received the Stop\n  {}", error.hint()));

@@ -50,7 +50,7 @@ pub(super) fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });
     match shared {
-        // The result on stdout already contains the failure.
+        // The result on stdout already contains the failure, so only a note is printed.
         Some(failure) => {
             out.note(format!("{}\n  {}", failure.message, failure.next));
             Err(Failure::shown(failure.kind))

@@ -15,8 +15,7 @@ use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 
-/// Returns the date of the test programs, 2026-01-01. The date of the test programs differs from
-/// the dates of the boards.
+/// Returns the date of the test programs, 2026-01-01, which differs from the dates of the programs on the boards.
 fn date(profile: &Profile) -> u16 {
     // If the profile treats the date as a plain number, any number is valid.
     profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)

@@ -58,8 +58,7 @@ pub(super) fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(
         other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports == 0 {
-        // Without measurements, the file would contain only default values. Default values in the file would look like the
-        // measured profile of the boards.
+        // Without measurements, the file would contain only default values, which would look like measured values.
         let what = "no board answers: nothing was measured, and no profile was written";
         return Err(
             Failure::new(ErrorKind::NoLink, "no-boards", what).next("find the cause with ucom doctor")

@@ -35,12 +35,12 @@ pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
     let numbers = driver.numbers(&args.boards)?;
     for known in cache.all(&mut driver, &signals, &numbers, |_| false)? {
         let board = known.board;
-        // Only a started application can report its initial inputs.
+        // The initial inputs are requested only for a listing, and only a started application can report them.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
         };
-        // A board that has sent its inputs has also sent its signal names.
+        // If the board has sent its initial inputs, its current signal names are also known.
         let known = match driver.master.description(board) {
             Some(names) if initial.is_some() => known.renamed(names, &signals, driver.master.profile()),
             _ => known,
@@ -200,7 +200,7 @@ fn move_for(
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
         driver.master.watch(board, None, true);
-        // If the run fails, the procedure has already undone its own changes.
+        // A failed run has already undone its own changes. Only the earlier changes are undone here.
         driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
         Ok(prepared)
     })?;
@@ -223,8 +223,8 @@ fn move_for(
         }
     }
     followed.ask_no_more(&mut driver.master);
-    // The following stop is not part of a procedure, because Ctrl-C would cancel a procedure. In the command `ci --for`, Ctrl-C
-    // requests the stop.
+    // The following stop is not part of a procedure, because Ctrl-C would cancel a procedure, and the user may have
+    // pressed Ctrl-C to stop the board.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();

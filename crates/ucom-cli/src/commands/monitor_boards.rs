@@ -134,7 +134,8 @@ fn words(board: &Board) -> Cell<'static> {
 fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
     match (board.life, board.alive_age_s(now)) {
         (Life::Unarmed, _) | (_, None) => match board.last {
-            // The board sends frames only when a PC requests them. The displayed values are therefore as old as the board's last answer.
+            // The board sends frames only when a PC requests them, so the displayed values are as old as its last
+            // answer.
             Some((at, _)) if now.saturating_sub(at) as f64 * 1e-6 >= OLD_S => {
                 Cell::from(format!("{:.0} s old", now.saturating_sub(at) as f64 * 1e-6)).dark_gray()
             }

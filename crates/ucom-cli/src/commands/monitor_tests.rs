@@ -128,7 +128,7 @@ fn no_board_vanishes() {
             };
             assert!(all.iter().any(row), "{size:?}: board {number}\n{place}");
         }
-        // The view never cuts off facts or column heads.
+        // The view omits a fact or a column that does not fit, instead of cutting it off.
         assert!(size.0 >= 60 || !place.contains("socketcand"), "{place}");
         assert!(!place.contains("descriptio ") && !place.contains("descriptio│"), "{place}");
         assert!(size.1 > 12 || keys.contains("↑↓ 1-"), "{size:?}: {keys}");

@@ -43,7 +43,8 @@ pub(super) fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
             match event {
-                // Another PC normally runs the boards, because this command starts no control loop.
+                // This command starts no control loop, so another PC normally runs the boards. This event is
+                // therefore not reported.
                 Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;

@@ -96,7 +96,8 @@ pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result
         let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
-            // The program that reads stdout has read enough, as in `ucom record - | head`.
+            // On stdout, a write error means that the reader has disconnected, as in `ucom record - | head`. This
+            // ends the recording.
             Err(RecordingError::Io { source: e, .. }) if stdout => {
                 Output::lose(&e);
                 break;

@@ -10,8 +10,8 @@ use ucom_host::session::SessionError;
 use crate::args::{LinkArgs, RepairArgs};
 use crate::shape::{board_table, board_value};
 
-/// Gives one board its lost number again. The flash number of the board must equal the flash number on the command line, or else
-/// the flash number in the inventory.
+/// Gives one board its lost number again. The board must have the flash number on the command line. Without this
+/// option, it must have the flash number in the inventory.
 pub(super) fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let board = args.board;
     let flash_number = match args.flash_id {

@@ -40,7 +40,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
         })?),
         None => None,
     };
-    // The command reads the identities of the boards first, because this does not need a started application.
+    // The identities are read first, because this is possible without a started application.
     if let Some(file) = &file {
         file.identities(&mut driver)?;
     }
@@ -49,7 +49,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     let (report, prepared) = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
-        // The failed procedure has already undone its own changes.
+        // A failed run has already undone its own changes. Only the earlier changes are undone here.
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
     })?;
@@ -133,7 +133,7 @@ fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), 
     Ok(())
 }
 
-/// Supervises boards until Ctrl-C, until a typed `stop`, for the requested time, or until the last control
+/// Supervises boards until Ctrl-C, until the user types `stop`, for the requested time, or until the last control
 /// loop ends.
 fn supervise(
     driver: &mut Driver,
@@ -166,7 +166,7 @@ fn supervise(
         for notice in followed.look(&mut driver.master, now_us) {
             print(driver, notice);
         }
-        // An error during the run is a fault and not a refusal.
+        // At this point the boards run, so this error is a fault and not a refusal.
         nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {

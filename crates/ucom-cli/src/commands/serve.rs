@@ -62,7 +62,7 @@ pub(super) fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(
     })?;
     let address = listener.local_addr()?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
-    // The simulated chain must exist longer than the owner of its bus.
+    // The simulated chain is created before the owner of its bus, so that it is dropped after the owner.
     let simulated = args.sim.then(|| Simulated::start(args.boards, config.profile, out)).transpose()?;
     let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
     let owner = Owner::open(&bus, config)?;
@@ -138,7 +138,7 @@ impl Drop for Simulated {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // If the simulation thread has panicked, the panic was already printed.
+            // A panic of the simulation thread was already printed, so it is ignored here.
             drop(thread.join());
         }
     }

@@ -71,7 +71,7 @@ pub(super) fn obey(
             };
             let boards: Vec<u8> = prepared.known.keys().copied().collect();
             if !on {
-                // The failure of each board was already reported.
+                // The errors of all boards were already reported, so only the first error is returned.
                 let failed = driver.outputs_safe(&boards, true).failed;
                 return failed.into_iter().next().map_or(Ok(()), |(_, failure)| Err(failure.into()));
             }

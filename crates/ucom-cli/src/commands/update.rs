@@ -79,8 +79,7 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
     (0..32).filter(|board| inventory.get(*board).is_some())
 }
 
-/// Processes Ctrl-C during the identification of the boards. After Ctrl-C during the identification, the report says that no board was
-/// changed.
+/// Reports that Ctrl-C during the identification of the boards has changed no board, and returns the failure.
 fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     let inventory = Inventory::read(&args.inventory).ok();
     let left = UpdateOutcome::Cancelled;

@@ -51,7 +51,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     let format = args.raw.then_some(Format::Bin);
     let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
-        // The texts of some errors already contain the file name.
+        // The file name is added, unless the text of the error already contains it.
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
         failure.next(advice(&e))

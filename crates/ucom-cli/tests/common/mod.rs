@@ -103,7 +103,7 @@ impl Sim {
     pub(crate) fn fault(&mut self, line: &str) {
         let stdin = self.child.stdin.as_mut().expect("stdin");
         writeln!(stdin, "{line}").expect("the simulator reads");
-        // The simulator polls its stdin every 50 ms.
+        // The simulator reads its stdin every 50 ms, so the fault has begun after 150 ms.
         std::thread::sleep(Duration::from_millis(150));
     }
 

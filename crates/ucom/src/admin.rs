@@ -11,9 +11,9 @@ pub struct Admin {
     pub run: bool,
     /// `true` if the outputs of the board are enabled; never `true` without `run`.
     pub active: bool,
-    /// `true` if the module sends its texts.
+    /// `true` if the board sends its debug texts.
     pub debug: bool,
-    /// `true` if all texts of the board are sent.
+    /// `true` if the board sends all of its debug texts.
     pub global_debug: bool,
 }
 

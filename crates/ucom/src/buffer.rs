@@ -70,8 +70,8 @@ impl BufferPackage {
         Some(Self { offset: endian.word([o0, o1]), count: (len - 2) / 2, words })
     }
 
-    /// Copies the words of the package into a buffer and returns the number of copied words. Words at or beyond the end of the buffer are
-    /// ignored. A package that starts at or beyond the end of the buffer is refused.
+    /// Copies the words of the package into a buffer and returns the number of copied words. Words at or beyond the
+    /// end of the buffer are ignored. Returns an error if the package starts at or beyond the end of the buffer.
     pub fn apply(&self, buffer: &mut [u16]) -> Result<usize, BeyondBuffer> {
         let dimension = buffer.len();
         let beyond = BeyondBuffer { offset: self.offset, dimension };
@@ -121,7 +121,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// C-5: the test covers dimensions 0 to 7 and the highest offsets.
+    /// C-5: splits buffers of 0 to 7 words and of 65 535 words into packages. The packages restore the buffer.
     #[test]
     fn d15_c5_packages_of_a_buffer() {
         for dimension in [0u16, 1, 2, 3, 4, 6, 7, 65535] {
@@ -175,7 +175,8 @@ mod tests {
     }
 
     proptest! {
-        /// D-15: a package is decoded with the values that were sent, and a word outside the buffer is never changed.
+        /// D-15: decoding a package returns the values that were sent. Applying a package never changes a word
+        /// outside the buffer.
         #[test]
         fn d15_round_trip(offset: u16, count in 1..=3u8, mut words: [u16; 3], big: bool, size in 0..9usize) {
             words[usize::from(count)..].fill(0);

@@ -45,7 +45,8 @@ mod tests {
         }
         let remote = CanFrame::new_remote(id, 0).unwrap();
         assert_eq!(Frame::from_can(&remote), Err(Foreign::Remote));
-        // A 29-bit identifier is foreign even if its value fits into 11 bits.
+        // A frame with a 29-bit identifier does not belong to this protocol, even if the value of the identifier fits
+        // into 11 bits.
         let extended = CanFrame::new(ExtendedId::new(0x281).unwrap(), &data).unwrap();
         assert_eq!(Frame::from_can(&extended), Err(Foreign::Extended));
         let bit5 = CanFrame::new(StandardId::new(0x2A1).unwrap(), &data).unwrap();

@@ -26,7 +26,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the number of the error code in a frame.
+            /// Returns the number that frames contain for the error code.
             pub const fn number(self) -> u8 {
                 match self {
                     $(Self::$code => $number,)+

@@ -43,7 +43,7 @@ impl fmt::Display for Sequence {
     }
 }
 
-/// Sender of a function.
+/// Side that sends a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sender {
     /// Only the PC sends the function.
@@ -85,31 +85,31 @@ macro_rules! functions {
 }
 
 functions! {
-    /// Reset: outputs safe, number forgotten, boards answer with DSP_REPORT0..3.
+    /// Resets a board: outputs safe, number deleted, DSP_REPORT0..3 as answer.
     Reset = 0, "PC_RESET", Pc;
-    /// Special reset before an update: exloader with programming enabled, the number stays.
+    /// Special reset before an update: exloader with programming enabled, number kept.
     XReset = 1, "PC_XRESET", Pc;
     /// Error code of a board.
     Error = 2, "DSP_ERROR", Board;
-    /// A board has taken a number.
+    /// Confirmation that a board has accepted its number.
     InitAck = 3, "DSP_INITACK", Board;
-    /// The image is written and verified.
+    /// Report that the image is written and verified.
     ProgFinished = 4, "DSP_PROGFINISHED", Board;
     /// Numbers, status, program and description of a board.
     DspInfo = 5, "DSP_INFO", Board;
-    /// A block of program data is taken, the next may come.
+    /// Confirmation of a block of program data; the PC may send the next block.
     DspReady = 6, "DSP_READY", Board;
     /// Sets bits of the status byte.
     SetStatus = 7, "PC_SETSTATUS", Pc;
-    /// Asks for DSP_INFO.
+    /// Requests DSP_INFO.
     Info = 8, "PC_INFO", Pc;
-    /// Asks every board for its DSP_REPORT, without a reset.
+    /// Requests the DSP_REPORT of every board, without a reset.
     AskReport = 9, "PC_REPORT", Pc;
-    /// Gives the number in the identifier to the next board of the chain.
+    /// Assigns the number in the identifier to the next board of the chain.
     Init = 10, "PC_INIT", Pc;
     /// Eight bytes of program data.
     Prog = 11, "PC_PROG", Pc;
-    /// The exloader starts the application.
+    /// Makes the exloader start the application.
     Start = 12, "PC_START", Pc;
     /// Sets controller inputs.
     Ci = 13, "MCA_PC_CI", Pc;
@@ -117,25 +117,25 @@ functions! {
     So = 14, "MCA_DSP_SO", Board;
     /// Sets parameters.
     Par = 15, "MCA_PC_PAR", Pc;
-    /// A board is there; flash ids 0..31.
+    /// Presence report of a board with a flash id in 0..31.
     Report0 = 16, "DSP_REPORT0", Board;
-    /// A board is there; flash ids 32..63.
+    /// Presence report of a board with a flash id in 32..63.
     Report1 = 17, "DSP_REPORT1", Board;
-    /// A board is there; flash ids 64..95.
+    /// Presence report of a board with a flash id in 64..95.
     Report2 = 18, "DSP_REPORT2", Board;
-    /// A board is there; flash ids 96..127.
+    /// Presence report of a board with a flash id in 96..127.
     Report3 = 19, "DSP_REPORT3", Board;
-    /// The application is up and serves the MCA_ functions.
+    /// Report that the application has started and serves the MCA_ functions.
     McaReady = 20, "MCA_DSP_READY", Board;
-    /// The control loop starts.
+    /// Starts the control loop.
     McaStart = 21, "MCA_PC_START", Pc;
-    /// Asks for, and carries, the descriptions of inputs, outputs and parameters.
+    /// Request for the descriptions of inputs, outputs and parameters, and the answer with these descriptions.
     DumpIo = 22, "MCA_DUMP_IO_DESCRIPTION", Both;
-    /// Asks for the initial controller inputs.
+    /// Requests the initial controller inputs.
     DumpCi = 23, "MCA_DUMP_CI", Pc;
     /// The flags run, active, debug and global debug, set by the PC and reported by the board.
     Admin = 24, "MCA_ADMIN_DATA", Both;
-    /// A text for people.
+    /// Debug text for a human reader.
     Debug = 25, "MCA_DEBUG_MSG", Board;
     /// Heartbeat.
     Alive = 26, "MCA_ALIVE", Both;
@@ -209,8 +209,8 @@ impl fmt::Display for Function {
 mod tests {
     use super::*;
 
-    /// C-1: the identifiers of all 28 functions with 32 numbers follow the published formula. Each identifier decodes to its function and
-    /// sequence number.
+    /// C-1: the identifiers of all 28 functions with all 32 sequence numbers follow the published formula. Each
+    /// identifier decodes to its function and sequence number.
     #[test]
     fn d01_c1_identifiers_follow_the_formula() {
         for (number, function) in Function::ALL.into_iter().enumerate() {

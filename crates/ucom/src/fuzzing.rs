@@ -2,8 +2,8 @@
 
 use crate::{Frame, FromBoard, Profile, ToBoard};
 
-/// Decodes a frame both as the PC and as a board. If the frame is a message, the target encodes the message again and compares the
-/// identifiers.
+/// Decodes a frame both as the PC and as a board. If the frame is a valid message, encodes the message again and
+/// compares the identifiers.
 pub fn frame(data: &[u8]) {
     let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
     let Some(frame) = Frame::new(u16::from_be_bytes(*id) & 0x7FF, payload) else { return };

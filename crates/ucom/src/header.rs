@@ -1,4 +1,4 @@
-//! The header block, which is the first block of each cycle (D-41).
+//! Header block, which is the first block of each of the two cycles of an update (D-41).
 
 use core::fmt;
 
@@ -17,7 +17,7 @@ pub enum Memory {
     Program,
     /// Data flash of the board.
     Data,
-    /// RAM of the board, which is used for an exloader.
+    /// RAM of the board, into which an exloader is loaded.
     Ram,
 }
 
@@ -45,7 +45,7 @@ impl Memory {
 /// The contents of the header block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Number of the cycle, 1 or 2. Boards refuse a header with another cycle number.
+    /// Number of the update cycle, 1 or 2. Boards refuse a header with another cycle number.
     pub cycle: u16,
     /// Number of the target memory, see [`Memory::from_number`].
     pub memory: u16,
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The golden header block of the protocol page, byte for byte.
+    /// D-41: the code builds and parses exactly the header block that the protocol page shows.
     #[test]
     fn d41_header_golden() {
         let mut header = Header {

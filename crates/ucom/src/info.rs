@@ -83,7 +83,7 @@ impl Dimensions {
 mod tests {
     use super::*;
 
-    /// D-10: the information of the first board of the golden chain decodes in both byte orders.
+    /// D-10: the first DSP_INFO frame of the example board decodes to the same values in both byte orders.
     #[test]
     fn d10_info_in_both_orders() {
         let info = BoardInfo {

@@ -84,7 +84,7 @@ pub struct Node<F, P, S, A> {
     counters: Counters,
     random: u32,
     now_us: u64,
-    /// Time at which the board begins to listen after a reset; `None` while it listens.
+    /// Time at which the board begins to listen after a reset; `None` while the board listens.
     boot_until: Option<u64>,
     number: Option<Sequence>,
     /// Number that the board accepts with an INITACK that is not sent yet. The status bit INIT is set when the INITACK has been sent
@@ -94,7 +94,7 @@ pub struct Node<F, P, S, A> {
     opinit: bool,
     prog: bool,
     app: App,
-    /// Flags of MCA_ADMIN_DATA. The flag `run` is not stored here: it is `app == Running`.
+    /// Flag of MCA_ADMIN_DATA, like the next two fields. The flag `run` has no field: it equals `app == Running`.
     active: bool,
     debug: bool,
     global_debug: bool,
@@ -122,8 +122,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             application,
             config,
             counters: Counters::default(),
-            // Boards with the same configured seed must generate different random numbers. Otherwise, boards with equal back-off times
-            // would collide.
+            // Boards with the same configured seed must generate different random numbers. Otherwise, they would
+            // choose equal back-off times, and their frames would collide.
             random: (config.seed ^ u32::from(config.flash_number).wrapping_mul(0x9E37_79B9)).max(1),
             now_us,
             boot_until: None,
@@ -187,7 +187,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            // If the board has lost the number of this INITACK, the INITACK does not confirm a new number.
+            // The INITACK counts only if it contains the number that the board is accepting now. The board may have
+            // lost the earlier number while the frame waited.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }

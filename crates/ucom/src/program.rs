@@ -181,7 +181,8 @@ impl DateForm {
                 (year, month, days as u8 + 1)
             }
             Self::Bcd => {
-                // Digits above 9 are refused below, because encoding the decoded date returns other 16 bits.
+                // If a digit is above 9, the date is refused below, because encoding the decoded date does not return
+                // the original 16 bits.
                 let number = |byte: u16| 10 * (byte >> 4) + (byte & 15);
                 (2000 + number(date >> 8), number(date & 0xFF) as u8, 1)
             }
@@ -278,8 +279,8 @@ mod tests {
         }
     }
 
-    /// The test compares the dates with a calendar that counts day by day. Each 16-bit value is one day later than the previous value; the
-    /// last value means 2179-06-05.
+    /// The test compares the dates with a calendar that counts day by day from 2000-01-01. The last value, 0xFFFE,
+    /// means 2179-06-05.
     #[test]
     fn d45_days_in_a_row() {
         let (mut year, mut month, mut day) = (2000, 1, 1);

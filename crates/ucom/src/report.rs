@@ -59,7 +59,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// D-07: all boards can answer one broadcast without collisions.
+    /// D-07: each flash id has its own identifier, so all boards can answer one broadcast without collisions.
     #[test]
     fn d07_each_flash_id_has_an_identifier_of_its_own() {
         let id = |flash: u16| {
@@ -68,7 +68,7 @@ mod tests {
         };
         let ids: BTreeSet<u16> = (0..128).map(id).collect();
         assert_eq!(ids.len(), 128);
-        // The flash ids are those of the five boards in the acceptance table.
+        // These are the flash ids of the five boards in the acceptance table of the protocol page.
         let five = [0x21, 0x42, 0x63, 0x04, 0x7F].map(id);
         assert_eq!(five, [0x441, 0x482, 0x4C3, 0x404, 0x4DF]);
         for flash in 0..256 {

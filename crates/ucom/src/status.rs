@@ -3,7 +3,7 @@
 use core::fmt;
 use core::ops::{BitAnd, BitOr, Not};
 
-/// Status of a board; each bit has its own meaning.
+/// Status byte of a board. The constants of this type name its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Status(pub u8);
 

@@ -278,7 +278,7 @@ mod tests {
         assert_eq!(assembler.push(0, &payload(b"9"), &profile), Assembled::Complete(Latin1(b"123456789")));
     }
 
-    /// `string.max` truncates a text even in the middle of a package.
+    /// D-13: `string.max` truncates a text even in the middle of a package.
     #[test]
     fn d13_longest_string() {
         let profile = Profile { string_max: 12, ..Profile::default() };
@@ -291,7 +291,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-13: the assembler returns any text without trailing NULs unchanged.
+        /// D-13: the assembler returns any text without trailing NULs exactly as it was sent.
         #[test]
         fn d13_round_trip(mut text in proptest::collection::vec(any::<u8>(), 0..=512), i in 0..4usize) {
             while text.last() == Some(&0) {

@@ -46,8 +46,8 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: if both sides send a function, the sender distinguishes the two messages. The lengths of the two messages also distinguish them if
-/// possible.
+/// D-05: if both sides send a function, the two messages have the same identifier. The sender determines which
+/// message a frame contains, and the lengths also differ if possible.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));
@@ -79,7 +79,7 @@ fn d37_flags_other_than_0_and_1() {
     assert_eq!(to("601#02000000"), Err(DecodeError::Value(Function::Admin)));
 }
 
-/// The frames of the golden vectors decode to the expected messages.
+/// D-15, D-24: the example frames of the protocol page decode to the expected messages.
 #[test]
 fn d15_d24_golden_frames() {
     let profile = Profile::default();

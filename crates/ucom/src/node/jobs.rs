@@ -4,7 +4,8 @@ use crate::frame::Payload;
 use crate::profile::Profile;
 use crate::string::string_package;
 
-/// Progress of an answer: no frame is sent yet, or the number of the next package of the string with the index `string`.
+/// Position in an answer of several frames: either before the first frame, or at a package of the string with the
+/// index `string`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     First,
@@ -19,7 +20,8 @@ pub(super) struct Jobs {
     pub dump_io: Option<Place>,
     /// Earliest time at which the next frame of the IO description may be sent.
     pub dump_io_at: u64,
-    /// Earliest time of another IO description, if the PC requested it again during the current answer.
+    /// Earliest time of a second IO description; `None` if the PC has not requested another one during the current
+    /// answer.
     pub dump_io_again: Option<u64>,
     /// Offset of the next package of the initial controller inputs.
     pub dump_ci: Option<u16>,

@@ -30,8 +30,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             return;
         }
         if !self.prog {
-            // Program data that are sent by broadcast are for a group of boards (D-46). A board outside the group
-            // ignores these program data.
+            // If program data arrive by broadcast, they are for a group of boards (D-46). A board without PROG is not
+            // in this group and ignores the data.
             if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
@@ -156,7 +156,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        // If the second cycle contains another image, the Program ID of that image replaces the Program ID of the first image.
+        // The header of the second cycle gets the Program ID of the first cycle. If the second cycle contains another
+        // image, its own Program ID replaces this value later.
         let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
@@ -275,8 +276,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Ok(())
     }
 
-    /// Returns the validity record of the new application. For images for program and data memory, the record describes the program
-    /// memory, although data memory is written last.
+    /// Returns the validity record of the new application. If an update writes program and data memory, the record
+    /// describes the program memory, although the data memory is written last.
     fn new_record(&self) -> Option<Record> {
         let header = match self.config.profile.prog_plan {
             Plan::PmemXmem => self.programming.first?,

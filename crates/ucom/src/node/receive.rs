@@ -23,7 +23,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Ok((_, message)) => self.act(to, message),
             Err(error) if error.is_length() => self.wrong_length(function, to),
             Err(DecodeError::Foreign(_)) => self.count_foreign(),
-            // The frame is a message of another board, or one of its flags is neither 0 nor 1.
+            // The frame is a message that only boards send, or one of its flags is neither 0 nor 1.
             Err(_) => self.ignore(),
         }
     }
@@ -98,7 +98,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             ToBoard::Prog(data) => self.program(data, self.is_broadcast(to)),
             ToBoard::Start => self.start(),
             ToBoard::Alive => self.pc_is_alive(to),
-            // The board serves functions that need the application only while the application runs.
+            // The messages below need the application. The board ignores them unless the application runs.
             _ if !served => self.ignore(),
             ToBoard::Ci(package) => self.receive_ci(&package),
             ToBoard::Par(package) => self.receive_par(&package),

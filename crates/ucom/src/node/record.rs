@@ -53,7 +53,7 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// D-45: erased flash does not contain a valid record. A record is also invalid if one of its bytes was not written.
+    /// D-45: erased flash does not contain a valid record. A record that was only partly written is also invalid.
     #[test]
     fn d45_half_a_record_is_none() {
         let record = Record { program_id: 0x4B3F, date: 0x3AC1, address: 0x1000, words: 500 };

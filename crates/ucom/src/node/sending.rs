@@ -48,7 +48,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if let Some(report) = self.due_report() {
             return Some(FromBoard::Report(report).encode(self.own_number(), &profile));
         }
-        // A board without a sequence number sends no other frames.
+        // A board without a sequence number sends none of the frames below.
         let number = self.number?;
         let message = self.single_message().or_else(|| self.next_of_answers())?;
         Some(message.encode(number, &profile))

@@ -35,7 +35,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         let now = self.now_us;
         let due = |at: Option<u64>| at.is_some_and(|at| at <= now);
         if self.boot_until.is_some() {
-            // An erase that the reset interrupted may still be in progress.
+            // A flash erase that began before the reset may still be in progress.
             if due(self.boot_until) && self.flash.state(now) != FlashState::Busy {
                 self.booted();
             }
@@ -95,7 +95,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Returns the next due time after `at` that is in the future, skipping the times that were missed.
+/// Returns the next due time after `at` that is later than `now`, and skips due times that were missed.
 fn next_beat(at: Option<u64>, period_us: u64, now: u64) -> u64 {
     let period = period_us.max(1);
     let at = at.unwrap_or(now);

@@ -11,7 +11,7 @@ use crate::program::Digest;
 pub(super) enum Work {
     /// The board waits for frames.
     None,
-    /// The board has received a complete block and processes the block at this time.
+    /// The board has received a complete block, and will process it at this time (µs).
     Block(u64),
     /// The board will clear the validity record before it erases the flash.
     ClearRecord,
@@ -36,7 +36,7 @@ pub(super) struct Cycle {
     pub writes: bool,
     /// Number of bytes of the image that were received so far.
     pub done: u32,
-    /// Digest of the received data. Later, the board uses it for the data that it reads back.
+    /// Digest of the received data; later, digest of the data that the board reads back from flash.
     pub digest: Digest,
 }
 

@@ -76,7 +76,7 @@ fn d_t5_init_again() {
     assert_eq!(after, before);
 }
 
-/// D-T6, D-22: PC_SETSTATUS applies the formula literally.
+/// D-T6, D-22: PC_SETSTATUS applies the published formula `(old & ~mask) | value` literally.
 #[test]
 fn d_t6_set_status_is_literal() {
     let mut bus = Bus::initialised();
@@ -95,7 +95,7 @@ fn d_t7_mirror_bits_stay() {
         bus.send(text);
         assert_eq!(bus.status(1), 0x1B, "{text}");
     }
-    // PC_SETSTATUS cannot write the state bits while the control loop runs, either.
+    // PC_SETSTATUS also cannot write the state bits while the control loop runs.
     let mut bus = Bus::running();
     for text in ["1C1#2000", "1C1#1010", "1C1#0010"] {
         bus.send(text);
@@ -153,7 +153,7 @@ fn d_t10_io_description() {
             "581#020004000300 581#0200 581#55436F4D32206865 581#61642070616E 581#0100 581#706F735F736F6C6C"
         )
     );
-    // The test counts the packages independently of the board's code. A header of 2 bytes precedes each string.
+    // Counts the packages without the board's code. A package with a header of 2 bytes precedes each string.
     let mut strings = 0;
     let mut rest = received[1..].iter();
     while let Some(header) = rest.next() {
@@ -283,10 +283,11 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(chain(&[("680#", 290), ("041#", 1)]), (0x5D, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#4000", 1)]), (0x19, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#0404", 1)]), (0x5D, frames("0C1#01")));
-    // The application starts only once for each number that the board gets: it does not start again if the board
-    // gets this number again.
+    // The application starts only once after the board has got a number, even if the PC assigns the same number
+    // again.
     assert_eq!(chain(&[("680#", 600), ("1C1#8000", 10), ("281#", 10)]).0, 0x59);
-    // The application does not start before the hold-off time has passed. A board without an application sends error 11.
+    // The application does not start before the hold-off time of 500 ms has passed. A board without an application
+    // sends error 11.
     let mut bus = Bus::one();
     bus.boards[0].store.autostart = true;
     bus.send("281#");
@@ -301,7 +302,8 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(bus.boards[0].status(), Status(0x59));
 }
 
-/// D-T20, D-24, D-06: a second PC_INIT arrives before the acknowledgement of the first PC_INIT has been sent.
+/// D-T20, D-24, D-06: a second PC_INIT arrives before the acknowledgement of the first PC_INIT has been sent. The
+/// board reports an error and keeps the first number.
 #[test]
 fn d_t20_init_while_the_acknowledgement_waits() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());
@@ -319,7 +321,8 @@ fn d_t20_init_while_the_acknowledgement_waits() {
     assert_eq!(bus.boards[1].number(), None);
 }
 
-/// D-T21, D-07: two boards with the same flash number send the same identifier with the same data.
+/// D-T21, D-07: two boards with the same flash id send the same identifier with the same data, so they look like one
+/// board.
 #[test]
 fn d_t21_equal_flash_ids_look_like_one_board() {
     let mut bus = Bus::new(&[0x21, 0x121], Profile::default());

@@ -134,7 +134,8 @@ fn d_t18_mistakes_in_a_transfer() {
         let before = bus.errors.len();
         mistake(&mut bus);
         bus.run(5);
-        // The PC sends these forty frames before it receives the error.
+        // These forty frames simulate program data that the PC sends before it receives the error. The board ignores
+        // these frames.
         for _ in 0..40 {
             bus.send("2C1#FFFFFFFFFFFFFFFF");
         }

@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: on a shared identifier, a board sends an answer 2 ms after the request, and a message without a request after 1 to 8 ms. Different
-/// boards send their messages at different times.
+/// D-05: on a shared identifier, a board sends an answer 2 ms after the request, and a message without a request
+/// after a random time of 1 to 8 ms. The random times of different boards differ.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();
@@ -207,7 +207,7 @@ fn d35_control_cycles() {
     assert_eq!(bus.boards[0].application.steps, steps);
 }
 
-/// Problems of the CAN controller cause the errors 6 and 8.
+/// The board reports a receive overrun of the CAN controller as error 8, and a frame that was not sent as error 6.
 #[test]
 fn controller_troubles_are_reported() {
     let mut bus = Bus::initialised();
@@ -222,7 +222,7 @@ fn controller_troubles_are_reported() {
     assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
 }
 
-/// `sent` and `not_sent` have an effect only if their frame is the frame in the CAN controller.
+/// The board ignores `sent` and `not_sent` for every frame except the frame that is in the CAN controller.
 #[test]
 fn other_frames_than_the_one_on_its_way_are_ignored() {
     let mut bus = Bus::initialised();
@@ -259,8 +259,8 @@ fn d38_texts_of_a_program_that_is_not_up() {
     assert_eq!(bus.boards[0].counters().texts_dropped, 1, "up, and nobody wants it");
 }
 
-/// D-37: only a change of the flag `active` enables the outputs. If the application has made its outputs safe, they stay safe when the PC
-/// repeats its flags.
+/// D-37: only a change of the flag `active` from 0 to 1 enables the outputs. If the application has made its outputs
+/// safe, they stay safe when the PC repeats its flags.
 #[test]
 fn d37_repeated_flags_enable_nothing() {
     let mut bus = Bus::started();
@@ -279,7 +279,8 @@ fn d37_repeated_flags_enable_nothing() {
 fn a_program_is_stopped_once() {
     for text in ["000#", "041#", "1C1#0800", "1C1#0404"] {
         let mut bus = Bus::initialised();
-        // Only a call of `stop` would change the field `running`.
+        // The application is not running, but the test sets the field `running`. A wrong call of `stop` would clear
+        // this field.
         bus.boards[0].application.running = true;
         bus.send(text);
         assert!(bus.boards[0].application.running, "{text}");
@@ -303,7 +304,8 @@ fn d50_a_repeated_start_is_no_heartbeat() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-14, D-36: the end of the application ends its dumps, but does not end the board's own description.
+/// D-14, D-36: the end of the application ends its dumps, but the board still completes its own description
+/// (DSP_INFO).
 #[test]
 fn d14_info_survives_the_application() {
     let mut bus = Bus::started();

@@ -16,7 +16,8 @@ pub(super) struct Bus {
     pub received: Vec<(u64, Frame)>,
     /// All DSP_ERROR frames since the start of the test.
     pub errors: Vec<Frame>,
-    /// Condition for frames that the bus delays; the boards that sent these frames wait for `sent`.
+    /// Function that returns `true` for frames that the bus delays. The boards that sent these frames wait for
+    /// `sent`.
     pub hold: fn(&Frame) -> bool,
     pub held: Vec<(usize, Frame)>,
     /// Index (from 0) of the frame that is lost between the PC and the boards.
@@ -42,7 +43,7 @@ pub(super) fn application() -> MemoryApplication {
     )
 }
 
-/// Record of the application of the golden vectors: Program ID 0x1234, date 2008-03-14.
+/// Record of the application in the examples of the protocol page: Program ID 0x1234, date 2008-03-14.
 pub(super) const GOLDEN: Record = Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 };
 
 impl Bus {
@@ -136,8 +137,8 @@ impl Bus {
 
     pub(super) fn run_us(&mut self, us: u64) {
         let end = self.now + us;
-        // Number of consecutive steps of the test bus without a frame. The limit of quiet steps is much larger than the number of wake-ups
-        // that can be due at one time.
+        // Number of consecutive steps without a frame on the bus. The test fails at a limit that is much larger than
+        // the number of wake-ups that can be due at one time.
         let mut quiet = 0;
         loop {
             let now = self.now;
@@ -186,7 +187,7 @@ impl Bus {
         self.check();
     }
 
-    /// Sends the delayed frames now.
+    /// Sends the delayed frames, and delays no further frames.
     pub(super) fn release(&mut self) {
         self.hold = |_| false;
         for (i, frame) in std::mem::take(&mut self.held) {
@@ -252,7 +253,7 @@ pub(super) fn frames(text: &str) -> Vec<Frame> {
     text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
 }
 
-/// Returns the image of the golden vectors, which has 1000 bytes.
+/// Returns the image in the examples of the protocol page, which has 1000 bytes.
 pub(super) fn image() -> Vec<u8> {
     (0..1000).map(|i| (37 * i + 11) as u8).collect()
 }

@@ -22,14 +22,14 @@ fn d07_report_modes() {
     assert_eq!(bus.ask("240#", 100), frames("401#21 400#42"));
 }
 
-/// Section 5.3: two boards get the same number if a board activates its pin without a command and the PC repeats
-/// PC_INIT without a check.
+/// Section 5.3: two boards get the same number under two conditions. A board activates its pin without a command, and
+/// the PC repeats PC_INIT without a check.
 #[test]
 fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
         let mut bus = Bus::new(&[0x21, 0x42, 0x63], with(|p| p.chain_auto_opinit = auto));
         bus.number(1);
-        // In this test, the PC does not receive INITACK(2).
+        // In this test, the PC behaves as if INITACK(2) was lost.
         bus.ask("282#", 20);
         if blind {
             bus.ask("282#", 20);
@@ -54,14 +54,14 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.info(1), None);
     assert_eq!(bus.ask("281#", 20), frames("0C1#01"));
     assert_eq!(bus.status(1), 0x1D);
-    // D-25: the new number does not start the application during an update.
+    // D-25: with ASTART set, a new number normally starts the application, but not during an update.
     bus.boards[0].store.autostart = true;
     bus.send("041#");
     bus.ask("281#", 2000);
     assert_eq!(bus.status(1), 0x5D);
 }
 
-/// D-10, D-13: the test uses boards with the other byte order and with the other count of string packages.
+/// D-10, D-13: the test uses boards with big-endian words and with a string count that includes the header.
 #[test]
 fn d10_d13_words_and_counts() {
     let profile = with(|p| {

@@ -4,7 +4,7 @@ use ucom::Profile;
 
 use super::bus::{Bus, MS, frames};
 
-/// Frames that reset and number a chain of three boards.
+/// Checks the frames that reset a chain of three boards and assign numbers to the boards.
 #[test]
 fn golden_chain_of_three() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());
@@ -27,7 +27,7 @@ fn golden_chain_of_three() {
     }
 }
 
-/// Frames that start an application and its control loop.
+/// Checks the frames that start an application and its control loop.
 #[test]
 fn golden_start_and_run() {
     let mut bus = Bus::initialised();

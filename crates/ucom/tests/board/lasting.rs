@@ -6,7 +6,7 @@ use ucom_sim::memory::{MemoryFlash, WirePins};
 
 use super::bus::application;
 
-/// Stored value of ASTART, and the number of writes to it.
+/// Non-volatile memory that stores ASTART and counts the writes.
 #[derive(Default)]
 struct Counted {
     autostart: bool,
@@ -47,7 +47,7 @@ fn d22_autostart_is_kept_on_changes_only() {
         ("1C1#0200", true, 1),
         ("1C1#4000", false, 2),
         ("1C1#4000", false, 2),
-        // A PC_SETSTATUS that clears INIT and sets ASTART also stores ASTART.
+        // This PC_SETSTATUS clears INIT (mask 0x08) and sets ASTART (value 0x40). The board also stores ASTART.
         ("1C1#0840", true, 3),
     ] {
         board.receive(now, &text.parse::<Frame>().unwrap());

@@ -5,7 +5,7 @@ use ucom::Profile;
 
 use super::bus::{Bus, MS, frames};
 
-/// Event that makes a board send its flags or its descriptions.
+/// Action of the test: a wait in µs, or a frame that makes a board send its flags or descriptions.
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Wait(u64),
@@ -24,7 +24,8 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
         "1C1#8000",
     ]);
     let short = (0_u64..3_000).prop_map(Act::Wait);
-    // If the PC sends no frame during this time, the board itself may report that the PC is lost.
+    // Long waits are near 1.5 s, the time limit for the PC's heartbeat. If the limit passes while the control loop
+    // runs, the board sends its flags without a request.
     let long = (1_490_000_u64..1_512_000).prop_map(Act::Wait);
     let act = prop_oneof![3 => send.prop_map(Act::Send), 4 => short, 1 => long];
     prop::collection::vec(act, 1..40)
@@ -44,15 +45,16 @@ proptest! {
                 Act::Send(text) => {
                     bus.send(text);
                     let id = u16::from_str_radix(&text[..3], 16).unwrap();
-                    // The test records MCA_PC_START with its own identifier, which only the PC uses. The answer to MCA_PC_START is
-                    // MCA_ADMIN_DATA.
+                    // The test also records MCA_PC_START, whose identifier only the PC uses. The board answers
+                    // MCA_PC_START with MCA_ADMIN_DATA.
                     asked.push((bus.now, id));
                 }
             }
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // A dump of the IO description begins with the dimensions. The remaining frames of a dump in progress follow at once (D-14).
+            // The minimum time applies to the flags and to the first frame of an IO description, which contains the
+            // dimensions. The remaining frames of an answer in progress follow at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());
@@ -77,7 +79,7 @@ fn d14_an_answer_ends_when_its_text_changes() {
                 bus.boards[0].store.description = long.clone().into_bytes();
                 bus.boards[0].application.texts.application = long.clone().into_bytes();
                 bus.send(request);
-                // The text of the board changes after `after` frames of the answer have been sent.
+                // The test changes the text of the board after the board has sent `after` frames of the answer.
                 while bus.received.iter().filter(|(_, f)| f.id() == id).count() < after {
                     bus.run_us(50);
                 }

@@ -45,7 +45,7 @@ fn in_state(phase: Phase) -> Bus {
 /// State and frames of a board after an event.
 struct Seen {
     phase: Phase,
-    /// Frames that the board sent within 9 ms, before the first transfer of the outputs.
+    /// Frames that the board sent within 9 ms, without the periodic outputs.
     sent: Vec<Frame>,
 }
 

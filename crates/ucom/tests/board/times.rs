@@ -1,4 +1,5 @@
-//! Tests of the exact times of one board. The board does not act a microsecond too early, and `next_deadline` returns the exact time.
+//! Tests of the exact times of one board. The board must not act a microsecond too early, and `next_deadline` must
+//! return the exact time.
 
 use ucom::Frame;
 use ucom::node::{Phase, Store};
@@ -9,12 +10,12 @@ fn frame(text: &str) -> Frame {
     text.parse().unwrap()
 }
 
-/// Returns the board on a bus, and the current time.
+/// Takes the only board off the bus, and returns the board and the current time.
 fn board(mut bus: Bus) -> (Board, u64) {
     (bus.boards.remove(0), bus.now)
 }
 
-/// Immediately confirms each frame that the board returns. The function returns all these frames.
+/// Confirms all frames of the board immediately, and returns these frames.
 fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     let mut left = Vec::new();
     while let Some(frame) = board.poll(now) {
@@ -25,7 +26,7 @@ fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     left
 }
 
-/// D-07: a board does not accept frames before its boot is complete.
+/// D-07: a board ignores frames until its boot is complete.
 #[test]
 fn d07_boot_time() {
     for after in ["power-up", "PC_RESET"] {
@@ -116,7 +117,7 @@ fn d25_hold_off() {
         assert_eq!(board.phase(), phase, "{}", at - now);
     }
     assert_eq!(board.next_deadline(), start + MS, "the application is asked again");
-    // Without ASTART, the application does not start by itself.
+    // Without ASTART, the application does not start automatically.
     let (mut board, now) = self::board(Bus::one());
     board.receive(now, &frame("281#"));
     assert_eq!(flush(&mut board, now), frames("0C1#01"));
@@ -136,7 +137,7 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(board.next_deadline(), alive + 1000 * MS);
     let now = alive;
     board.receive(now, &frame("541#"));
-    // The board answers the start command 2 ms later, after the first control cycle.
+    // The first control cycle is due 1 ms after the start command. The board answers the start command after 2 ms.
     assert_eq!(board.next_deadline(), now + MS);
     assert_eq!((flush(&mut board, now + MS - 1), board.application.steps), (vec![], 0));
     assert_eq!((flush(&mut board, now + MS), board.application.steps), (vec![], 1));
@@ -150,7 +151,7 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(flush(&mut board, now + 10 * MS).len(), 2, "all outputs");
     assert_eq!(flush(&mut board, now + 20 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 20 * MS).len(), 2);
-    // During the following time, no frame of the PC arrives.
+    // From here on, the PC sends no frame, so the heartbeat of the PC is missing after 1500 ms.
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
     board.poll(now + 1500 * MS);
@@ -169,8 +170,8 @@ fn d50_heartbeat_of_the_pc() {
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// If a frame becomes due while another frame is in the CAN controller, the board returns the due frame as soon as the other frame has been
-/// sent.
+/// A frame becomes due while another frame is in the CAN controller. The board returns the due frame as soon as the
+/// other frame has been sent.
 #[test]
 fn what_waits_goes_when_the_frame_before_has_left() {
     let programming = || {
@@ -218,7 +219,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
         assert!(board.next_deadline() <= now, "{what}: {} at {now}", board.next_deadline());
         assert_eq!(board.poll(now), Some(frame(expected)), "{what}");
     }
-    // The acknowledgement is the frame that waits, and the frame before it is an error.
+    // In this case, INITACK waits while a DSP_ERROR frame is in the CAN controller.
     let mut bus = Bus::initialised();
     bus.hold = |_| true;
     bus.send("1C1#00");
@@ -227,7 +228,8 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     let (mut waiting, now) = board(bus);
     waiting.sent(now, &frame("081#07"));
     assert_eq!((waiting.next_deadline(), waiting.poll(now)), (0, Some(acknowledge)));
-    // The test also checks the two answers of a board to a transfer.
+    // In these cases, the answers to program data (DSP_READY and DSP_PROGFINISHED) wait while INITACK is in the CAN
+    // controller.
     let (whole, last) = last_block();
     let first = super::bus::blocks(&[1; 64], &ucom::Profile::default())[0];
     for (mut bus, data, expected) in [(programming(), first, "181#"), (whole, last, "101#")] {
@@ -335,7 +337,8 @@ fn d44_steps_after_the_last_block() {
         }
     };
     assert_eq!(finished, frame("101#"));
-    // The board processes and writes the block, reads three pieces of the image back, and then begins and completes the record.
+    // Waits in µs: 400 before the block is processed, 500 to write the block, three pieces of the image read back
+    // without a wait, and twice 500 until the record is complete.
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
 }
 

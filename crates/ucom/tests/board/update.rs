@@ -12,8 +12,8 @@ pub(super) fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
-/// Sends all blocks of an update and waits for any answer after each block. The function returns `true` if the board has sent
-/// DSP_PROGFINISHED.
+/// Sends all blocks of an update, and waits up to 100 ms for an answer after each block. Returns `true` if the board
+/// has sent DSP_PROGFINISHED.
 pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
@@ -47,7 +47,7 @@ fn d45_power_loss_at_every_flash_operation() {
     let mut whole = Bus::initialised();
     assert!(update(&mut whole, &all));
     let operations = whole.boards[0].flash.operations;
-    // The seven flash operations clear the record, erase the area, write four blocks and write the record.
+    // The seven flash operations are: clear the record, erase the area, write four blocks, write the record.
     assert_eq!(operations, 7);
     for cut in 0..operations {
         let mut bus = Bus::initialised();
@@ -110,7 +110,8 @@ fn d43_every_frame_lost_once() {
         // The next attempt to update the board succeeds.
         assert!(update(&mut bus, &all), "again after {}", lost - first);
     }
-    // The loss of an answer does not change the work of the board.
+    // If an answer of the board is lost, the board still processes all blocks. No half-written image is valid
+    // afterwards.
     for lost in first_answer..whole.frames_from_boards {
         let mut bus = Bus::initialised();
         bus.lose_from_boards = Some(lost);
@@ -281,7 +282,7 @@ fn d41_no_header() {
     assert_no_half_image(&bus, &image, "");
     let id = ucom::checksum(Checksum::Crc16, Endian::Little, &image);
     assert_eq!(bus.boards[0].record().unwrap().program_id, id);
-    // The board detects a difference between the images of the two cycles.
+    // The two cycles transfer different images. The board detects the difference and sends error 1.
     bus.send("041#");
     let mut other = image.clone();
     other[3] ^= 1;

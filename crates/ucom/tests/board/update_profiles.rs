@@ -24,7 +24,8 @@ fn headerless_in(flash: MemoryFlash, plan: Plan, headerless_words: u32) -> Bus {
     bus
 }
 
-/// D-40, D-41: without header blocks, the plan determines the memories of the cycles, and the image whose Program ID is recorded.
+/// D-40, D-41: without header blocks, the plan determines the memory of each cycle. The plan also determines the
+/// image whose Program ID is in the record.
 #[test]
 fn d41_no_header_in_every_plan() {
     let (one, two) = ([0x5A; 200].to_vec(), small());
@@ -105,8 +106,8 @@ fn d43_silence_lasts_until_programming_is_enabled_again() {
     assert_eq!(bus.block(&all[0], 5), frames("181#"));
 }
 
-/// D-40, D-41: headers that a board accepts in the first cycle of each plan, and the error codes for headers that it
-/// refuses.
+/// D-40, D-41: headers of the first cycle. For each plan, the board either accepts the header (`181#`) or answers
+/// with an error code (`081#`).
 #[test]
 fn d41_headers_of_the_first_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -139,7 +140,8 @@ fn d41_headers_of_the_first_cycle() {
     }
 }
 
-/// D-40, D-41: headers that a board accepts or refuses in the second cycle, after a valid first cycle.
+/// D-40, D-41: headers of the second cycle, after a valid first cycle. The board either accepts or refuses each
+/// header.
 #[test]
 fn d41_headers_of_the_second_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -180,14 +182,15 @@ fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     (bus, all)
 }
 
-/// Delivers all frames of a block to the board at the same time.
+/// Delivers all frames of a block to the board without a pause between the frames.
 fn receive_at_once(bus: &mut Bus, block: &[u8; 64]) {
     for data in block.chunks_exact(8) {
         bus.boards[0].receive(bus.now, &ucom::Frame::new(0x2C1, data).unwrap());
     }
 }
 
-/// D-43: if the CAN controller fails to send DSP_READY, the block buffer is free and the PC may send a block again.
+/// D-43: if the CAN controller fails to send DSP_READY, the block buffer becomes free, and the board accepts the next
+/// block.
 #[test]
 fn d43_ready_that_was_given_up() {
     let (mut bus, all) = ready_held();
@@ -201,8 +204,8 @@ fn d43_ready_that_was_given_up() {
     assert_eq!(bus.block(&all[2], 10), frames("181#"));
 }
 
-/// D-43: if the DSP_READY of a cancelled transfer is sent while the board processes the first block of the next transfer, the board still
-/// accepts that block.
+/// D-43: the DSP_READY of a cancelled transfer is sent while the board processes the first block of the next
+/// transfer. The board still accepts that block.
 #[test]
 fn d43_ready_of_the_transfer_before() {
     let (mut bus, all) = ready_held();
@@ -224,8 +227,8 @@ fn d42_block_time_without_header() {
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
 
-/// D-23, D-42: if a transfer is cancelled, the board does not send a DSP_READY that still waits. Otherwise, the PC would assign this
-/// DSP_READY to the next transfer.
+/// D-23, D-42: if a transfer is cancelled, the board drops a waiting DSP_READY. Otherwise, the PC would take this
+/// frame for an answer of the next transfer.
 #[test]
 fn d42_no_ready_of_a_transfer_that_is_no_more() {
     let all = blocks(&small(), &Profile::default());

@@ -39,7 +39,7 @@ const LATENCY_MAX: u64 = 1_000;
 
 /// Time during which the measurement checks after every instruction if interrupts are masked, ms.
 const MASK_MS: u64 = 150;
-/// Number of stack bytes that the program must never use.
+/// Number of bytes of the stack memory that must remain unused.
 const STACK_SPARE: u32 = 4_096;
 
 fn main() -> ExitCode {
@@ -93,7 +93,8 @@ fn run() -> Result<(), Box<dyn Error>> {
     let observers = &machine.chip().observers;
     println!("  with a host at {} Bd on each line, the arm moving:", version.baud);
     handlers(observers)?;
-    // Only code that masks interrupts can delay the tick.
+    // Only code that masks interrupts can delay the tick. The emulator counts one clock cycle of the core for each
+    // instruction.
     let late = mask * 1_000_000_000 / u64::from(version.core_hz);
     println!("    interrupts are masked for at most {mask} instructions = {late} ns");
     if late > LATENCY_MAX {
@@ -110,7 +111,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     let word = elf.segments.iter().find(|(at, _)| *at == 0x0800_0000).ok_or("no vector table")?;
     let top = u32::from_le_bytes(word.1[..4].try_into()?);
-    // The stack begins at the lowest address of the tightly coupled memory.
+    // The lowest address of the stack is the start of the tightly coupled memory.
     Ok((top, 0x2000_0000))
 }
 
@@ -135,8 +136,8 @@ fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Prints the stack use of each context, including the exception frames. Handlers of a higher priority can interrupt
-/// each context.
+/// Prints the stack use of each context (main program and handlers), including the exception frames. Handlers of a
+/// higher priority can interrupt each context.
 fn stacks(observers: &Observers, (top, bottom): (u32, u32)) -> Result<(), Box<dyn Error>> {
     let size = top - bottom;
     let mut sum = top - observers.lowest_sp[0];

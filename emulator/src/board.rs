@@ -40,7 +40,8 @@ pub struct BoardConfig {
     pub safety_pins: (Pin, Pin),
     /// Seed of the initial contents of RAM.
     pub seed: u64,
-    /// Initial contents of flash bank 2; data of the firmware for bank 2 overwrite these contents.
+    /// Initial contents of flash bank 2. If the firmware file contains data for bank 2, these data replace the
+    /// initial contents.
     pub bank2: Bank2,
 }
 
@@ -71,7 +72,7 @@ impl CanPeers for Nodes {
         for (delay, answer) in self.answers.drain(..) {
             let frame =
                 Id::standard(u32::from(answer.id)).and_then(|id| CanFrame::fd_padded(id, answer.data()));
-            // Every frame of the joint bus has a valid identifier and length.
+            // This cannot fail, because every frame of the joint bus has a valid identifier and length.
             let Ok(frame) = frame else { continue };
             answers.push((end + u64::from(delay) * MICROSECOND, frame.with_brs(true)));
         }

@@ -44,14 +44,14 @@ pub struct Access {
     pub value: u32,
 }
 
-/// State of the core that is used by the hook that runs before every instruction.
+/// State of the core for the hook that runs before every instruction.
 #[derive(Default)]
 pub struct Core {
     /// Number of instructions that the core has executed.
     pub instructions: u64,
-    /// Instruction count at which the hook does further checks.
+    /// Instruction count from which the hook performs its full checks before each instruction.
     pub look_at: u64,
-    /// Instruction count before which the machine must stop.
+    /// Instruction count at which the machine must stop.
     pub stop_at: u64,
     /// Address of the last instruction that the core started.
     pub pc: u32,
@@ -59,7 +59,8 @@ pub struct Core {
     pub it_block: Range<u32>,
     /// `true` if a stop of the machine was requested.
     pub stopping: bool,
-    /// `true` if the main loop must handle a change before the next instruction.
+    /// `true` if interrupt lines or events may have changed, so that the main loop must check them before the next
+    /// instruction.
     pub attention: bool,
     /// `true` if only the mask registers block a pending exception.
     pub masked: bool,
@@ -112,7 +113,7 @@ pub struct Chip {
     pub unknown: BTreeMap<u32, Access>,
     /// Accesses to peripherals whose clock is off.
     pub unclocked: BTreeMap<u32, Access>,
-    /// `true` if the usable D2 SRAM has changed.
+    /// `true` if the firmware may have switched blocks of D2 SRAM on or off, so that the memory must be mapped again.
     pub remap: bool,
     base_time: Time,
     base_instructions: u64,
@@ -183,7 +184,7 @@ impl Chip {
         }
     }
 
-    /// Applies the clock frequencies that the registers now configure.
+    /// Passes the clock frequencies that the RCC registers configure to the peripherals.
     fn update_clocks(&mut self) {
         let clocks = self.rcc.clocks();
         let now = self.now();

@@ -2,23 +2,23 @@
 //! properties for each address.
 //!
 //! Unicorn executes `SEV` without effect and does not report changes of the stack pointer. Unicorn also skips the
-//! instructions of an IT block whose condition is false. When the machine executes an address for the first time, it
-//! therefore recognises these instructions by their first half-word.
+//! instructions of an IT block whose condition is false. Therefore, the machine recognises these instructions by
+//! their code when it executes an address for the first time.
 
 /// Class of an address that has not been checked yet.
 pub const UNKNOWN: u16 = 0;
 /// Class of an instruction without special handling.
 pub const PLAIN: u16 = 1;
-/// Instruction that sets the event register.
+/// Class of an instruction that sets the event register (SEV).
 pub const SEV: u16 = 2;
-/// Instruction that may lower the stack pointer.
+/// Class of an instruction that may lower the stack pointer.
 pub const LOWERS_SP: u16 = 4;
 /// Mark of an address that an observer watches.
 pub const WATCHED: u16 = 8;
-/// Instruction that begins an IT block. The machine counts all instructions of the block together with this
-/// instruction, because the core fetches and issues every instruction regardless of its condition.
+/// Class of an instruction that begins an IT block. The machine counts all instructions of the block together with
+/// this instruction, because the core fetches and issues every instruction regardless of its condition.
 pub const IT: u16 = 16;
-/// Instruction inside an IT block.
+/// Mark of an instruction inside an IT block.
 pub const MEMBER: u16 = 32;
 /// Bit positions of two numbers in the class of an IT instruction: the number of instructions in the block, and the
 /// number of half-words of these instructions.
@@ -29,7 +29,8 @@ const FLASH: u32 = 0x0800_0000;
 const FLASH_SIZE: u32 = 0x20_0000;
 const ITCM_SIZE: u32 = 0x1_0000;
 
-/// Classes of the instructions in ITCM and flash. The machine classifies instructions in other memory each time.
+/// Classes of the instructions in ITCM and flash. Classes of other memory are not stored, so the machine classifies
+/// those instructions each time.
 pub struct Code {
     flash: Vec<u16>,
     itcm: Vec<u16>,
@@ -67,7 +68,8 @@ impl Code {
         }
     }
 
-    /// Makes the machine stop at an address. Returns `false` if code at this address cannot be watched.
+    /// Marks an address, so that the observers are called before the core executes its instruction. Returns `false`
+    /// if code at this address cannot be watched.
     pub fn watch(&mut self, address: u32) -> bool {
         match self.place(address) {
             Some(place) => {
@@ -78,7 +80,8 @@ impl Code {
         }
     }
 
-    /// Removes the stored classes of bytes that `Machine::poke` has written. Returns `true` if the bytes may be code.
+    /// Removes the stored classes of a range of addresses whose contents have changed. Returns `true` if the range
+    /// may contain code.
     pub fn forget(&mut self, address: u32, length: u32) -> bool {
         let mut code = false;
         for at in address..address.saturating_add(length) {
@@ -134,8 +137,8 @@ pub fn begins_block(members: u32, bytes: u32) -> u16 {
 /// Returns the number of instructions in the IT block that an instruction with this first half-word begins. Returns 0
 /// if the instruction does not begin an IT block.
 pub fn it_block(first: u16) -> u32 {
-    // The lowest set bit of the mask determines the end of the block. If no bit of the mask is set, the instruction is
-    // a hint.
+    // Bits 3..0 are the mask, whose lowest set bit determines the length of the block. If the mask is 0, the
+    // instruction is a hint such as NOP.
     if first & 0xFF00 == 0xBF00 && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 }
 }
 

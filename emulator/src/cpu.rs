@@ -54,7 +54,8 @@ impl Machine {
         uc.get_data_mut().flash.bank = bank;
         let mut machine = Self { uc, elf, sleep: Sleep::Awake };
         for (address, bytes) in machine.elf.segments.clone() {
-            // The machine ignores segments outside the memory of this board; the linker checks these segments.
+            // The machine ignores segments outside the memory of this board, because the linker has already checked
+            // for them.
             machine.poke(address, &bytes);
         }
         let reset = Reset { time: 0, cause: ResetCause::PowerOn, pc: 0 };
@@ -86,7 +87,8 @@ impl Machine {
         self.boot();
     }
 
-    /// Executes the first fetch after a reset: stack pointer and entry from the vector table in flash.
+    /// Sets the registers to their values after a reset. Reads the stack pointer and the entry address from the
+    /// vector table in flash.
     fn boot(&mut self) {
         use RegisterARM::*;
         for register in [R0, R1, R2, R3, R4, R5, R6, R7, R8, R9, R10, R11, R12] {
@@ -198,7 +200,7 @@ impl Machine {
             None => {}
         }
         match result {
-            // After WFI, Unicorn stops without an error.
+            // Unicorn stops without an error only after WFI.
             Ok(()) => self.sleep = Sleep::Interrupt,
             Err(uc_error::INSN_INVALID) => self.hint_or_undefined(last),
             Err(uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT) if pc >= EXC_RETURN & !1 => {
@@ -211,7 +213,8 @@ impl Machine {
         }
     }
 
-    /// Handles WFE and YIELD, which Unicorn reports as invalid instructions.
+    /// Handles WFE and YIELD, which Unicorn reports as invalid instructions. Any other invalid instruction causes a
+    /// fault.
     fn hint_or_undefined(&mut self, pc: u32) {
         let word = self.word(pc & !1).unwrap_or(0);
         let (first, second) = (word as u16, (word >> 16) as u16);
@@ -248,7 +251,8 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
         uc.get_data_mut().core.raised = Some(number);
         let _ = uc.emu_stop();
     });
-    // A hook on the complete memory would slow down every store.
+    // The hooks cover only the forbidden addresses, because a hook on the complete memory would slow down every
+    // store.
     let invalid = memory::FORBIDDEN.into_iter().all(|(first, last)| {
         let note = |uc: &mut Unicorn<'_, Chip>, _, address: u64, _, _| {
             uc.get_data_mut().core.fault_address = address as u32;
@@ -279,7 +283,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
         let core = &mut uc.get_data_mut().core;
         core.stopping = true;
         core.look_at = 0;
-        // The previous instruction is complete. The execution may stop only at this point.
+        // The previous instruction is complete, so the execution may stop here.
         let _ = uc.emu_stop();
         return;
     }

@@ -73,7 +73,7 @@ impl Stream {
 #[derive(Default)]
 pub struct Dma {
     streams: [Stream; STREAMS],
-    /// Number of transfers to or from addresses that DMA1 and DMA2 cannot access.
+    /// Number of transfers that failed because DMA1 and DMA2 cannot access the address.
     pub errors: u32,
 }
 
@@ -168,7 +168,7 @@ impl Dma {
         }
     }
 
-    /// Returns the running DMA stream that serves a request line.
+    /// Returns the index of the running DMA stream that serves a request line, if any.
     pub fn serving(&self, request: u32) -> Option<usize> {
         self.streams.iter().position(|s| s.cr & EN != 0 && s.request & 0x7F == request)
     }
@@ -215,7 +215,7 @@ impl Dma {
     /// Returns the level of the interrupt line of a DMA stream.
     pub fn line(&self, stream: usize) -> bool {
         let s = &self.streams[stream];
-        // The enable bits TEIE, HTIE and TCIE are in the same order as their flags.
+        // The enable bits TEIE, HTIE and TCIE are in the same order as their flags, but one bit lower.
         s.flags & (s.cr & 0x1C) << 1 != 0
     }
 }

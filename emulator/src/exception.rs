@@ -55,7 +55,7 @@ pub fn enter(machine: &mut Machine, exception: usize) {
     machine.set(PC, handler | 1);
     machine.chip().observers.note_sp(frame_at);
     if !stacked {
-        // The stack has overflowed the RAM that contains it.
+        // The stack frame could not be written, because the stack has overflowed its RAM.
         machine.chip().core.fault_address = frame_at;
         machine.fault(FaultKind::BadAccess, handler);
     }

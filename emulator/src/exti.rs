@@ -55,7 +55,7 @@ impl Exti {
         }
     }
 
-    /// Latches the edges after the levels of the pins of a port have changed; port 0 is A.
+    /// Sets the pending bits for the edges between two sets of pin levels of a port. Port 0 is port A.
     pub fn edges(&mut self, port: usize, before: u32, after: u32) {
         let falling = before & !after & self.ftsr;
         let rising = after & !before & self.rtsr;

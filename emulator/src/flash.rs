@@ -109,7 +109,7 @@ pub struct Flash {
     cr: u32,
     sr: u32,
     /// Number of correct keys that the program has written in sequence. After a wrong key, the value is `usize::MAX`,
-    /// and the flash rejects unlocking until a reset.
+    /// and the flash cannot be unlocked until a reset.
     keys: usize,
     running: Option<Operation>,
     /// Word that the program is writing: its index, its bytes, and a mask of the bytes written so far.
@@ -121,7 +121,7 @@ impl Default for Flash {
     fn default() -> Self {
         Self {
             bank: Bank2::default(),
-            // Typical values in the data sheet for programming 32 bits at once.
+            // Typical values from the data sheet, for programming 32 bits at a time.
             erase_time: 2 * SECOND,
             program_time: 130 * MICROSECOND,
             operations: Vec::new(),
@@ -151,7 +151,8 @@ impl Flash {
         self.open_since = None;
     }
 
-    /// Returns the contents of bank 2 after a power failure at `now`.
+    /// Returns the contents of bank 2 after a power failure at `now`. `seed` determines the random contents of the
+    /// words that an operation was changing.
     pub fn cut(&self, now: Time, seed: u64) -> Bank2 {
         let mut bank = self.bank.clone();
         if let Some(operation) = self.running.filter(|o| o.start < now) {

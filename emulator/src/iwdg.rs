@@ -12,7 +12,7 @@ pub struct Iwdg {
     window: u32,
     unlocked: bool,
     bites: Time,
-    /// Shortest time that remained until a reset when the firmware fed the watchdog.
+    /// Shortest remaining time until a reset at which the firmware has fed the watchdog.
     pub least_left: Time,
 }
 

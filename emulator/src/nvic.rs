@@ -46,7 +46,7 @@ pub struct Nvic {
     active: [bool; EXCEPTIONS],
     level: [bool; EXCEPTIONS],
     priority: [u8; EXCEPTIONS],
-    /// Exceptions that are pending and enabled, in any order.
+    /// Exceptions that are both pending and enabled, in any order.
     waiting: Vec<usize>,
     /// Value of AIRCR.PRIGROUP.
     pub prigroup: u32,
@@ -202,7 +202,7 @@ impl Nvic {
         self.next(masks).is_none() && self.next(Masks::default()).is_some()
     }
 
-    /// Returns `true` if WFI ends because an exception would run if PRIMASK were not set.
+    /// Returns `true` if a waiting exception ends WFI. PRIMASK has no effect on this decision.
     pub fn wakes(&self, masks: Masks) -> bool {
         self.next(Masks { primask: false, ..masks }).is_some()
     }

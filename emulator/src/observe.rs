@@ -127,10 +127,10 @@ pub struct Observers {
     pub handlers: Vec<Count>,
     /// Interrupt latencies, by exception number.
     pub latencies: Vec<Latency>,
-    /// Lowest stack pointer while exception n was running. Entry 0 is for code outside of exceptions.
+    /// Lowest stack pointer during each exception, by exception number. Entry 0 is for code outside of exceptions.
     pub lowest_sp: Vec<u32>,
-    /// Largest stack use (bytes) of one execution of exception n, including the frames of exceptions that
-    /// interrupted it. Entry 0 is not used.
+    /// Largest stack use of one execution of each exception, by exception number, bytes. The value includes the
+    /// frames of exceptions that interrupted the handler. Entry 0 is not used.
     pub deepest: Vec<u32>,
     /// Resets of the machine, oldest first.
     pub resets: Vec<Reset>,
@@ -177,8 +177,8 @@ impl Observers {
         self.deepest.fill(0);
     }
 
-    /// Handles a watched instruction. If a counted function begins at this instruction, returns the return address of
-    /// the function, which must be watched next.
+    /// Handles the execution of a watched address. If a counted function begins at this address, returns the return
+    /// address of the function, which must be watched next.
     pub fn at(&mut self, pc: u32, sp: u32, lr: u32, instructions: u64) -> Option<u32> {
         let depth = self.running.len();
         while let Some(i) = self.calls.iter().rposition(|c| c.back == pc && c.sp == sp && c.depth == depth) {

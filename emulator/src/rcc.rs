@@ -111,7 +111,7 @@ pub struct Rcc {
     hse_hz: u64,
     rsr: u32,
     clocks: Clocks,
-    /// Peripherals whose reset bit was set since the list was last read.
+    /// Peripherals whose reset bit the program has set since the list was last read.
     pub resets: Vec<Gate>,
 }
 
@@ -203,7 +203,7 @@ impl Rcc {
     }
 
     fn note_resets(&mut self, offset: u32, rising: u32) {
-        // The reset registers and the enable registers have the same order.
+        // The bits of a reset register have the same order as the bits of its enable register.
         let enable = match offset {
             0x80 => reg::AHB1ENR,
             0x88 => reg::AHB4ENR,

@@ -207,7 +207,8 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // `true` for strongly ordered memory and device memory. This code does not model read-only memory.
+        // `true` for strongly ordered memory and device memory. The model does not distinguish read-only from
+        // writable regions.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }

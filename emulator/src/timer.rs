@@ -26,7 +26,7 @@ pub struct Timer {
     /// Counter value at time `at`. While the timer runs, the counter counts up from this value.
     count: u32,
     at: Time,
-    /// Length of a period of the timer clock.
+    /// Period of the timer clock.
     clock: Time,
     /// Number of update events since reset.
     pub updates: u64,
@@ -126,15 +126,16 @@ impl Timer {
         if !self.runs() {
             return NEVER;
         }
-        // The model computes flags without an enabled interrupt when the program reads a register. Therefore, flags
-        // without an enabled interrupt do not need an event.
+        // Only flags whose interrupt is enabled need an event. The model computes all other flags when the program
+        // reads a register.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();
         }
         if !self.basic {
             for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
-                // The model detects a match after the overflow when it executes the overflow.
+                // If the counter overflows before the match, the overflow is the next event. The model computes the
+                // time of the match after the overflow.
                 ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
             }
         }
@@ -255,7 +256,8 @@ mod tests {
     use super::*;
     use crate::clock::{MICROSECOND, MILLISECOND};
 
-    /// Creates a timer that counts microseconds up to `reload`, compares with `compare`, and enables these interrupts.
+    /// Creates a timer that counts microseconds up to `reload` and compares with `compare`. `interrupts` is the value
+    /// of the register DIER.
     fn microsecond_timer(number: u32, reload: u32, compare: u32, interrupts: u32) -> Timer {
         let mut timer = Timer::new(number);
         timer.set_clock(200_000_000, 0);

@@ -16,7 +16,8 @@ const DMAT: u32 = 0x80;
 const FIFO: usize = 16;
 /// Number of bytes that the model examines in advance to find the next event.
 const LOOK_AHEAD: usize = 64;
-/// Largest difference between the two bit rates, in thousandths, at which the receiver still receives bytes correctly.
+/// Largest relative difference of the two bit rates at which the receiver still receives bytes correctly, in
+/// thousandths.
 const TOLERANCE: u64 = 40;
 
 /// A transmitted byte and the end time of its stop bit.
@@ -44,10 +45,10 @@ pub struct Usart {
     bit: Time,
     rx_fifo: VecDeque<u8>,
     last_rdr: u8,
-    /// Bytes that are being transmitted to the device.
+    /// Bytes on the serial line from the host to the board, with their end times.
     rx_wire: VecDeque<WireByte>,
     rx_wire_free: Time,
-    /// End of the last byte that the receiver received. The model derives the idle flag from this time.
+    /// End time of the last received byte. The model derives the idle flag from this time.
     idle_from: Option<Time>,
     timeout_from: Option<Time>,
     tx_fifo: VecDeque<u8>,
@@ -59,7 +60,7 @@ pub struct Usart {
     pub missed: u64,
     /// Number of receiver overruns.
     pub overruns: u64,
-    /// Number of bytes that the receiver cannot read because of their bit rate.
+    /// Number of bytes in both directions that were received wrongly, because the bit rates of board and host differ.
     pub garbled: u64,
     /// Number of bytes that the board has received.
     pub received: u64,
@@ -159,7 +160,7 @@ impl Usart {
     }
 
     /// Sends bytes from the host. The transmission of the first byte starts at `now`, or later if the serial line is
-    /// not free before.
+    /// still busy.
     pub fn host_write(&mut self, now: Time, bytes: &[u8]) {
         let length = 10 * SECOND / u64::from(self.host_baud.max(1));
         for &byte in bytes {
@@ -186,7 +187,7 @@ impl Usart {
             self.idle(next.end.saturating_sub(self.frame()));
             self.receive(next, dma, memory);
         }
-        // The silence on the line ends with the start bit of the byte that the host is transmitting.
+        // The silence on the line ends when the start bit of the next byte begins.
         let until = self.rx_wire.front().map_or(now, |b| now.min(b.end.saturating_sub(self.frame())));
         self.idle(until);
         self.drain_fifo(dma, memory);

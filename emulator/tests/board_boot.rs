@@ -221,7 +221,8 @@ fn the_second_core_is_parked_where_there_is_one() {
     }
 }
 
-/// The firmware writes each memory location before reading it.
+/// The firmware behaves the same for any RAM contents at power-on, because it writes each memory location before it
+/// reads it.
 #[test]
 fn what_memory_holds_at_power_on_does_not_matter() {
     let run = |seed| {

@@ -29,7 +29,8 @@ fn j10_registers_of_the_controller() {
         rig.run(20);
         let state = rig.board.machine.chip().fdcan.state();
         assert_eq!(state.rates, (1_000_000, 5_000_000), "{board}");
-        // The timing values are NSJW 2, NBRP 5, NTSEG1 12, NTSEG2 4, and TDC on, DBRP 1, DTSEG1 12, DTSEG2 4, DSJW 2.
+        // The values are NSJW 2, NBRP 5, NTSEG1 12, NTSEG2 4, TDC on, DBRP 1, DTSEG1 12, DTSEG2 4, DSJW 2. Each
+        // register field contains its value minus one.
         assert_eq!(state.nbtp, 1 << 25 | 4 << 16 | 11 << 8 | 3, "{board}");
         assert_eq!(state.dbtp, 1 << 23 | 11 << 8 | 3 << 4 | 1, "{board}");
         assert_eq!(state.tdcr, 13 << 8, "{board}: the sample point, 13 of 17, after the loop delay");
@@ -111,8 +112,8 @@ fn j10_only_expected_frames_arrive() {
     let ids: Vec<u16> = received.iter().map(|(_, f)| f.id).collect();
     assert_eq!(ids, expected().into_iter().collect::<Vec<_>>(), "each once");
     assert!(received.iter().all(|(n, f)| *n < fd + 10 && f.data() == [f.id as u8; 16]));
-    // The filters cannot distinguish classic frames from CAN FD frames. The driver therefore drops and counts classic
-    // frames (J-15).
+    // The filters cannot distinguish classic frames from CAN FD frames. Therefore, the driver drops and counts the
+    // classic frames with the 21 expected identifiers (J-15).
     assert!(classic > fd && rig.flight.wrong_format == 21, "{}", rig.flight.wrong_format);
     let fdcan = &rig.board.machine.chip().fdcan;
     assert_eq!((fdcan.stored, fdcan.state().lost), (42, 0));
@@ -174,7 +175,8 @@ fn j14_after_bus_off_no_stale_frame() {
     rig.wait_for_hold(15_000);
 }
 
-/// Returns the number of ticks from the bus fault to the state Error, and the CAN error word at that time.
+/// Injects a bus fault. Returns the number of ticks from the fault to the state Error, and the CAN error word of the
+/// status.
 fn ticks_to_error(rig: &mut Rig, kind: FaultKind) -> (u64, u32) {
     let before = rig.ticks;
     rig.inject(kind);
@@ -237,7 +239,7 @@ fn j15_short_answers_are_no_answers() {
     rig.board.machine.chip().fdcan.wire.peers = Some(Box::new(Mute));
     let short = [0, 1, 7, 8, 12].map(|len| vec![0xFF; len]);
     let mut received = 0;
-    // After a reset, nodes may be silent for 2 s.
+    // After a reset, nodes may be silent for 2 s without an error. The test therefore runs for 2.6 s.
     for ms in 0..2_600 {
         if ms >= 20 {
             let id = Id::standard(0x200 + ms % 7).expect("11 bits");

@@ -1,6 +1,6 @@
 //! J-07: tests with any bytes on the serial lines and any frames on the joint bus. The program does not hang, no tick
-//! is missed, and no reset occurs. In every tick, the outputs of the board equal the outputs of a controller on the PC
-//! with the same inputs (`rig`).
+//! is missed, and no reset occurs. In every tick, the outputs of the board equal the outputs of a controller on the
+//! PC with the same inputs; the module `rig` checks this.
 mod rig;
 
 use std::path::Path;
@@ -18,7 +18,7 @@ fn fast() -> Rig {
     Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() })
 }
 
-/// Returns all inputs that are stored for a fuzz target, with their file names.
+/// Returns all stored inputs of a fuzz target, with their file names.
 fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz"));
     let mut inputs = Vec::new();
@@ -40,7 +40,7 @@ fn unharmed(mut rig: Rig) {
     for port in PORTS {
         rig.wait("the line falls silent", 60_000, |rig| rig.board.pending(port) == 0);
     }
-    // The last bytes may be the beginning of a frame, so the host sends a gap to end this frame.
+    // The last bytes may be the beginning of a frame. A gap of 20 ms ends this frame.
     rig.run(20);
     rig.wait("every record", 60_000, |rig| {
         for host in &mut rig.hosts {
@@ -65,9 +65,9 @@ fn unharmed(mut rig: Rig) {
     assert!(late < 1_000, "{late} ns");
 }
 
-/// J-03, J-04, J-05: the records on the line equal the records of a parser that receives all bytes. The test counts two
-/// kinds of exceptions: noise records that were merged, and records that were lost because more than 64 records were
-/// waiting.
+/// J-03, J-04, J-05: the records on the line equal the records of a parser on the PC that receives the same bytes.
+/// Two differences are allowed: the board may merge noise records, and it may lose records while more than 64 records
+/// are waiting.
 #[test]
 fn j03_records_of_kept_streams_are_those_of_the_reference() {
     let mut rig = fast();
@@ -88,14 +88,16 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
                     Event::Bad(bad) => (bad.frame_type, bad.status, bad.length),
                 });
             }
-            // At this bit rate, the transmission of a record takes a millisecond.
+            // At this bit rate, the board sends a record every millisecond. Therefore, 80 ms are enough for the 64
+            // records that can wait.
             rig.run(80);
         }
         rig.run(10);
         let records = rig.hosts[index(port)].records.iter();
         let records: Vec<_> = records.map(|r| (r.frame_type, r.status, r.length)).collect();
         let lost = rig.telemetry().records_lost as usize - lost_before;
-        // The board merges noise with the record of waiting noise. The board does not merge records of other kinds.
+        // If a noise record is still waiting, the board adds new noise to this record. The board does not merge other
+        // records.
         let noise = |record: &&(u8, FrameStatus, u16)| record.0 == 0;
         let count = |all: &[(u8, FrameStatus, u16)]| all.iter().filter(|record| !noise(record)).count();
         assert!(count(&records) + lost >= count(&expected), "{name}: {records:?} instead of {expected:?}");
@@ -111,7 +113,8 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
     unharmed(rig);
 }
 
-/// A controller that is able to execute frames receives valid frames with random contents.
+/// J-07: the board executes the stored inputs of the fuzz target `frame_bodies`, which are valid frames with
+/// arbitrary contents.
 #[test]
 fn j07_kept_frames_with_any_body() {
     let mut rig = fast();
@@ -125,8 +128,8 @@ fn j07_kept_frames_with_any_body() {
     unharmed(rig);
 }
 
-/// Both serial lines are under full load, with the 15 MBd firmware and with the firmware of another board at the
-/// default bit rate.
+/// J-07: random bytes put both serial lines under full load, with the 15 MBd firmware and with the firmware of
+/// another board at the default bit rate.
 #[test]
 fn j07_random_bytes() {
     for (seed, mut rig, bytes) in [(1, fast(), 150_000), (2, Rig::new(BOARDS[2]), 6_000)] {
@@ -143,7 +146,7 @@ fn j07_random_bytes() {
     }
 }
 
-/// The board receives frames with a valid CRC, and with a random type, length and body.
+/// J-07: the board receives frames with a valid CRC, and with a random type, length and body.
 #[test]
 fn j07_random_frames_of_hosts() {
     let mut rng = fastrand::Rng::with_seed(3);
@@ -158,7 +161,7 @@ fn j07_random_frames_of_hosts() {
     unharmed(rig);
 }
 
-/// J-15: the test sends random frames that can occur on a CAN bus between the frames of the real nodes.
+/// J-15: random CAN frames arrive on the joint bus between the frames of the simulated nodes.
 #[test]
 fn j15_random_frames_on_the_joint_bus() {
     for seed in 4..7 {

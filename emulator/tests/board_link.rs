@@ -33,20 +33,19 @@ fn no_losses(rig: &mut Rig) {
     }
 }
 
-/// J-03, J-05: the host sends the first three bytes of a frame, waits a whole number of ms, and sends the remaining
-/// bytes of the frame.
+/// J-03, J-05: the host sends the first three bytes of a frame, waits a whole number of milliseconds, and sends the
+/// remaining bytes. A gap below 5 ms does not end the frame, and a longer gap ends it.
 #[test]
 fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // The second part of the frame is long. Therefore the line does not become idle right after the gap, and the
-        // idle line does not wake the program.
+        // The second part of the frame is long, so that the line does not become idle right after the gap. Therefore
+        // no idle interrupt wakes the links at that time.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
-        // The silence is 0.2 ms shorter than the time between the two parts of the frame, because of the transmission
-        // time of the first bytes. The test sends both parts of the frame 0, 300 or 600 µs after the start of a
-        // millisecond.
+        // The first bytes take part of the time `ms`, so the line is silent for about 0.2 ms less. The test sends
+        // both parts of the frame at `us` = 0, 300 or 600 µs after the start of a millisecond.
         let moments = [0, 300, 600].into_iter().flat_map(|us| [1, 3, 4, 5, 6, 8, 12].map(|ms| (us, ms)));
         for (us, ms) in moments {
             let later = |rig: &mut Rig| {
@@ -139,7 +138,7 @@ fn j04_every_port_gets_its_own_records() {
             host.records.clear();
         }
         for (port, frames) in PORTS.into_iter().zip(asked) {
-            // In each round, the frames begin at a different time within a tick.
+            // In each round, the host sends the frames in a different order.
             for (_, frame) in frames.iter().cycle().skip(round).take(frames.len()) {
                 rig.write(port, frame);
             }
@@ -168,16 +167,16 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // The delay consists of six received bytes, at most one tick, and 175 sent bytes, at 86.8 µs per byte. If the
-        // board sent a periodic status just before the record, the record is sent later.
+        // Without waiting, the record takes six received bytes and 175 sent bytes at 87 µs each, and about one tick.
+        // If the board sent a periodic status just before the record, the record takes up to 15.3 ms longer.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");
     }
 }
 
-/// J-03, J-07: noise of any kind causes only one or two error records. The board does not lose frames that follow the
-/// noise, with or without a gap.
+/// J-03, J-07: noise of any kind causes at most two error records. The board loses no frame that follows the noise,
+/// with or without a gap.
 #[test]
 fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -189,8 +188,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     for (n, noise) in [&every[..], &header, &headers, &zeros, &[0x9B]].into_iter().enumerate() {
         for (gap, port) in [(8, A), (8, B), (0, A), (0, B)] {
             if gap == 0 && noise == header {
-                // After a header that announces 59 974 bytes, the parser waits for a gap before it parses the bytes
-                // after the header.
+                // The header announces a frame of 59 974 bytes. The parser waits for a gap on the line before it
+                // parses the bytes after this header.
                 rig.write(port, noise);
             }
             rig.hosts[index(port)].records.clear();

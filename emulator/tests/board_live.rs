@@ -103,7 +103,8 @@ fn interrupt(child: &Child) {
     assert!(status.is_ok_and(|status| status.success()), "kill");
 }
 
-/// Returns a trajectory of 5 s that starts slightly off the zero pose, moves the arm away and returns it to the start.
+/// Returns a trajectory of 5 s, which starts slightly off the zero pose, moves the arm away and returns it to the
+/// start.
 fn motion() -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=250 {
@@ -123,7 +124,8 @@ fn a_session_at_the_command_line() {
     let mut live = Live::start(jtc.into(), &Path::new(&firmware).join("nucleo-h745zi-q.elf"));
     let status = live.jtc(&["status"]).ends(0);
     assert!(status.out.contains(r#""missing_parameters":["friction"#), "{}", status.out);
-    // The emulated board executes exactly this firmware file.
+    // `jtc firmware verify` confirms that the board executes this firmware file, and refuses the file of another
+    // board.
     let image =
         |board: &str| Path::new(&firmware).join(format!("{board}.elf")).to_string_lossy().into_owned();
     let verified = live.jtc(&["firmware", "verify", "--image", &image("nucleo-h745zi-q")]).ends(0);
@@ -163,7 +165,8 @@ fn a_session_at_the_command_line() {
     let doctor = live.jtc(&["doctor"]).ends(0);
     assert!(doctor.out.contains(r#""healthy":true"#), "{}", doctor.out);
 
-    // The board was never reset. The process of the emulated board ends when it receives a signal.
+    // The emulator ends with exit code 0 when it receives a signal. Its standard error is empty, so the board was
+    // never reset.
     interrupt(&live.board);
     assert_eq!(live.board.wait().expect("it ends").code(), Some(0));
     let mut errors = String::new();

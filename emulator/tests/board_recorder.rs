@@ -47,8 +47,8 @@ fn replayed(rig: &Rig) -> Vec<Telemetry> {
         .collect()
 }
 
-/// The log of the board equals the log of the recorder on the PC in every word. A replay on the PC computes the same
-/// values as the board, for at least two seconds before the error and 0.3 s after it.
+/// J-56: the log of the board equals the log of the recorder on the PC in every word. A replay on the PC computes the
+/// same values as the board. The replay covers at least two seconds before the error and 0.3 s after it.
 #[test]
 fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     let mut rig = moving();
@@ -67,7 +67,7 @@ fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     assert!(error - first >= 2_000 && last == error + 300, "{first} {error} {last}");
     for then in seen.iter().filter(|then| then.tick <= last) {
         let now = replayed.iter().find(|now| now.tick == then.tick).expect("each tick");
-        // The comparison excludes `records_lost`, because the link sets this value.
+        // The comparison excludes `records_lost`, because the serial link sets this value, and not the controller.
         assert_eq!(Telemetry { records_lost: 0, ..*now }, Telemetry { records_lost: 0, ..*then });
     }
 }
@@ -101,7 +101,7 @@ fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
         .collect();
     assert!(ticks.last().is_some_and(|tick| last - tick <= 500), "{ticks:?} {last}");
 
-    // Reads a complete block of the log with frames. The test compares each byte with the answers of the shadow
+    // The host reads a complete block of the log. The test compares each byte with the answers of the shadow
     // controller.
     for offset in (0..BLOCK_BYTES).step_by(232) {
         rig.ask(HOST, &fixed::get_log(0, offset as u16));

@@ -133,8 +133,8 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     let mut torques = Vec::new();
     let mut seen = 0;
     for _ in 0..20 {
-        // The rig runs in small steps up to the next millisecond, so that it can stop the machine between reset and
-        // start.
+        // The rig runs in steps of 10 µs up to the next millisecond, so that it can stop the machine between reset
+        // and start.
         for _ in 0..99 {
             let safety = rig.board.safety_output();
             let next = rig.board.machine.now() + 10 * MICROSECOND;
@@ -200,7 +200,7 @@ fn latched_until_cleared(mut rig: Rig, cause: u32) {
     assert_eq!(rig.board.safety_output(), Some(true));
 }
 
-/// Returns the largest difference between a joint position and the same joint position in `since`, rad.
+/// Returns the largest distance of a joint from its position in `since`, rad.
 fn moved(rig: &Rig, since: &[f64; 6]) -> f64 {
     rig.board.plant().truth().q.iter().zip(since).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
 }
@@ -219,8 +219,8 @@ fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
 /// J-12: if a tick does not end, or does not begin, the watchdog resets the board within 6 ms.
 #[test]
 fn j12_a_tick_that_hangs_resets_the_board() {
-    // If `hang` is `true`, `b .` replaces the control step. If `hang` is `false`, the test masks the interrupt of TIM7
-    // in the NVIC.
+    // If `hang` is `true`, the endless loop `b .` replaces the control step. If `hang` is `false`, the test masks the
+    // interrupt of TIM7 in the NVIC.
     for hang in [true, false] {
         let mut rig = holding();
         let pose = rig.board.plant().truth().q;
@@ -286,7 +286,7 @@ fn j12_a_hard_fault_takes_the_torque_away() {
     }
 }
 
-/// The tick loads from an unmapped address through an invalid pointer.
+/// J-12: the tick loads from an unmapped address, which causes a hard fault.
 #[test]
 fn j12_a_null_pointer_is_a_hard_fault() {
     let mut rig = holding();
@@ -313,8 +313,8 @@ fn branch(from: u32, to: u32) -> [u8; 4] {
 #[test]
 fn j12_a_panic_takes_the_torque_away() {
     let mut rig = holding();
-    // Functions that panic. If such a function has a source location as an argument, the location is one of the first
-    // arguments.
+    // Functions that panic. If such a function takes a source location as an argument, the location is one of the
+    // first four arguments.
     const PANICS: [&str; 4] = [
         "core::option::unwrap_failed",
         "core::panicking::panic_bounds_check",
@@ -323,8 +323,8 @@ fn j12_a_panic_takes_the_torque_away() {
     ];
     let elf = rig.board.machine.elf();
     let panic = PANICS.iter().find_map(|name| elf.symbol(name).ok()).expect("a function that panics").address;
-    // The test writes the following to free flash: code that sets the four arguments, the branch, a `Location` and a
-    // name.
+    // The test writes code to free flash. The code sets the four arguments and branches to the function that panics.
+    // A `Location` and a name follow the code.
     const STUB: u32 = 0x080F_0000;
     let mut stub = vec![0x03, 0x48, 0x01, 0x46, 0x02, 0x46, 0x03, 0x46];
     stub.extend(branch(STUB + 8, panic));

@@ -1,5 +1,5 @@
-//! Complete sessions with a host and an arm, in virtual time. In every tick, the values that a controller on the PC
-//! computes must be bit-identical to the values of the board (`rig`).
+//! Complete sessions with a host and an arm, in virtual time. In every tick, the values of the board must be
+//! bit-identical to the values that a controller on the PC computes. The module `rig` checks this.
 mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -12,7 +12,7 @@ use rig::{BOARDS, Rig, fast_elf};
 const HOST: Port = Port::Usart2;
 const GOAL: [f64; 6] = [0.5, 0.4, -0.5, 0.4, -0.3, 0.6];
 
-/// Returns a motion to another position and back. The motion takes 4 s, with 1001 points every 4 ms.
+/// Returns a motion to another position and back. The motion takes 4 s and has 1001 points, 4 ms apart.
 fn motion() -> Vec<RawPoint> {
     let points = frames::there_and_back(&[0.0; 6], &GOAL, 2.0, 1, 4);
     assert_eq!(points.len(), 1001);
@@ -126,8 +126,9 @@ fn a_whole_session() {
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
-/// The arm lowers a load of 3.3 kg at the last link. The arm model of the controller includes this load. The Stop
-/// arrives in the position that requires 95 % of the torque limit of the shoulder.
+/// J-33: a Stop brings an arm with a load of 3.3 kg at the last link to rest within about half a second. The arm
+/// model of the controller includes this load. The Stop arrives while the arm lowers the load, in the position that
+/// requires 95 % of the torque limit of the shoulder.
 #[test]
 fn j33_a_loaded_arm_stands_within_half_a_second() {
     const SHOULDER: usize = 1;
@@ -193,7 +194,8 @@ fn j40_torques_have_the_same_bits_as_on_a_pc() {
         moved.insert(rig.flight.torque.map(f64::to_bits));
     }
     assert!(moved.len() > 1_000, "{} different torques", moved.len());
-    // A stuck joint yields, and the other joints stop on the path (J-66).
+    // Joint 2 gets stuck, because its friction is 30 times higher. The stuck joint yields, and the other joints stop
+    // on the path (J-66).
     rig.inject(jtc_sim::FaultKind::Friction { joint: jtc_bus::Joint::ALL[1], factor: 30.0 });
     rig.wait("a held stop", 2_000, |rig| rig.state() == ControllerState::HoldPos);
     rig.run(200);
@@ -225,7 +227,8 @@ fn a_short_session_at_15_mbd() {
     follow(&mut rig, TrajectoryState::Finish, 2_500);
 }
 
-/// Older drives use another velocity scale, handle one message per interrupt and answer during transitions.
+/// J-12: the board enables and holds an arm with older drives, without errors. Older drives use another velocity
+/// scale, handle one message per interrupt and answer during transitions.
 #[test]
 fn j12_older_drives_are_not_left_behind() {
     let sim = SimConfig {
@@ -270,7 +273,8 @@ fn j12_one_broadcast_a_tick_and_its_answers() {
     }
     let period = openjtc_emulator::clock::MILLISECOND;
     for pair in starts.windows(2) {
-        // The number of instructions between the start of the tick and the transmit request varies.
+        // The number of instructions between the start of the tick and the transmit request varies. Therefore the
+        // period between two broadcasts may differ from 1 ms by up to 30 µs.
         let off = (pair[1] - pair[0]).abs_diff(period);
         assert!(off < 30 * openjtc_emulator::clock::MICROSECOND, "{off}");
     }

@@ -44,7 +44,7 @@ fn loaded(machine: &Machine) -> Option<(Vec<u8>, u32)> {
     (address != 0).then(|| (machine.memory(address, length as usize).expect("memory"), sequence))
 }
 
-/// Requests a store in the same way as a frame of a host.
+/// Requests a store through the mailbox, like a store request of a host.
 fn ask(machine: &mut Machine, image: &[u8]) {
     let at = machine.elf().symbol("ARM_STORE").expect("the mailbox").address;
     let staging = mailbox(machine).staging;
@@ -277,8 +277,8 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     (rig.board.machine.cut_power(0), cuts)
 }
 
-/// A reset by the button or the watchdog in the middle of a flash operation has the same effect on the flash as a loss
-/// of power.
+/// J-54: after a reset by the button or the watchdog during a flash operation, the board finds the old image, as
+/// after a loss of power.
 #[test]
 fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));
@@ -340,8 +340,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // An erase operation takes a long time. The firmware writes words within milliseconds, and writing of the
-            // current or the next word fails.
+            // The error must hit an erase operation while it is running. For programming, one started operation is
+            // sufficient: the writing of the current word or the next word then fails.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
         });
@@ -356,8 +356,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// The flash does not report the following failures: the flash no longer accepts keys, a word reads back differently,
-/// or an erase operation never ends.
+/// J-54: the firmware detects failures that the flash does not report: the flash no longer accepts keys, a word reads
+/// back differently, or an erase operation never ends.
 #[test]
 fn j54_a_store_that_cannot_work_ends() {
     let fails = |mut rig: Rig, failure: u32| {

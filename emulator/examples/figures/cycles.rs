@@ -11,7 +11,7 @@ use openjtc_emulator::{BoardConfig, Elf, Machine, RegisterARM};
 use crate::rig::{Rig, Version};
 use crate::session::Session;
 
-/// Measured functions: name, symbol, and maximum number of clock cycles.
+/// Measured functions: name in the output, symbol, and maximum number of clock cycles.
 const PARTS: [(&str, &str, u64); 2] = [
     ("control step in Operate", "control_step", 12_000),
     ("tick of the flight recorder", "record_step", 500),
@@ -49,7 +49,8 @@ fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
         let until = machine.now() + n * cycle;
         machine.run_until(until);
     };
-    // The tick marks the flight record as filled with inputs shortly before the step begins.
+    // The tick sets the phase of the flight record to 1 (inputs recorded) shortly before it calls the measured
+    // function.
     let phase = |machine: &Machine| machine.word(flight + 8);
     while phase(machine) != Some(1) {
         steps(machine, 10);
@@ -87,8 +88,9 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// Returns the executed instructions in order and without jumps, as input for an assembler. The machine executes an IT
-/// block in one step. The result includes all instructions of the block, because the hardware fetches all of them.
+/// Returns the executed instructions in order, with jumps as branches to a nearby address, as input for an assembler.
+/// The machine executes an IT block in one step. The result includes all instructions of the block, because the
+/// hardware fetches all of them.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -119,8 +121,8 @@ fn without_target(code: &str) -> String {
         let register = operands.split(',').next().unwrap_or_default();
         return format!("{name} {register}, #4");
     }
-    // The model of llvm-mca does not contain the comparison with zero. A comparison of two registers takes equally
-    // long.
+    // The model of llvm-mca does not contain the floating-point comparison with zero. A comparison of two registers
+    // takes equally long.
     if let Some(register) = operands.strip_suffix(", #0").filter(|_| name.starts_with("vcmp")) {
         return format!("{name} {register}, {}", register.trim());
     }

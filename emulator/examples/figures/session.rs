@@ -40,7 +40,7 @@ impl Steps {
     }
 }
 
-/// Time that is longer than any ramp of the controller's path time, ms.
+/// Time longer than any ramp of a start, pause or stop of a trajectory, ms.
 const RAMP: u32 = 250;
 
 /// A test rig that counts the instructions of control steps.
@@ -55,8 +55,8 @@ pub struct Session {
     serving: BTreeMap<(u8, u8), Steps>,
     /// Instruction counts of steps along the path at full speed, without a status and without a host event.
     on_path: Steps,
-    /// Index of the trajectory point of the last step, and number of consecutive steps in which the path time advanced
-    /// by exactly one millisecond per tick.
+    /// Index of the trajectory point of the last step. The next field is the number of consecutive steps in which the
+    /// path time advanced by exactly 1 ms.
     point: u32,
     steady: u32,
     traffic: Vec<Vec<u8>>,
@@ -69,11 +69,12 @@ impl Session {
         let counter = rig.board.machine.count("control_step")?;
         let recorder = rig.board.machine.count("record_step")?;
         let mut long = vec![0; 60_000];
-        // The segment must not be segment 0, which would stop the arm (J-30).
+        // The segment is not segment 0, because a valid segment 0 would replace the trajectory and stop the arm
+        // (J-30).
         let n = trajectory(&mut long, (1, 1, 2), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
         long.truncate(n);
-        // Traffic that a host could send at any time: frames that are rejected, valid frames, and invalid bytes with
-        // many frame headers.
+        // Traffic that a host could send at any time: a rejected segment, valid frames, and invalid bytes that
+        // contain many frame headers.
         let traffic = vec![
             long,
             fixed::CLEAR_OCCURRED_ERRORS.to_vec(),
@@ -123,8 +124,8 @@ impl Session {
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
-    /// Pushes a joint during Teaching. The controller brings the arm to rest during this motion, without a command
-    /// (J-25).
+    /// Pushes a joint with 100 N·m during Teaching. The controller then ends Teaching and stops the arm without a
+    /// command (J-25).
     fn lead_too_fast(&mut self) {
         let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
         self.rig.board.inject(push);
@@ -174,8 +175,8 @@ impl Session {
             self.calls = count.calls;
             self.recorded.add(self.rig.board.machine.counted(self.recorder).last);
             let (state, point) = (self.rig.flight.state, self.rig.flight.point);
-            // If a tick handles several host events, the step is counted for the last event; the default value means no
-            // event.
+            // If a tick handles several host events, the step is counted for the last event. A kind of 0 means that
+            // no event occurred.
             let event = self.rig.flight.events.last().copied().unwrap_or_default();
             self.steady = if point == self.point + 1 { self.steady + 1 } else { 0 };
             self.point = point;
@@ -246,7 +247,8 @@ impl Session {
                 let before = machine.instructions();
                 machine.run_until(machine.now() + cycle);
                 if machine.instructions() == before {
-                    // While the core sleeps, the machine may check slightly late for the exception that wakes the core.
+                    // The core has executed no instruction, so it sleeps. The loop then advances by 100 cycles at a
+                    // time, and may detect the end of the sleep slightly late.
                     machine.run_until(machine.now() + 100 * cycle);
                 }
                 let tick = machine.chip().core.contexts.contains(&TIM7);

@@ -1,5 +1,5 @@
-//! Loads and stores of the core. This module finds the peripheral register of each access, and does the necessary
-//! checks after the access.
+//! Loads and stores of the core. This module selects the peripheral register of each access, and starts the checks of
+//! interrupt lines and events after the access.
 use std::collections::BTreeMap;
 
 use super::map::{
@@ -84,7 +84,8 @@ impl Chip {
         if address >= 0xE000_0000 {
             let at = self.moment();
             let word = if size < 4 {
-                // The program can write priorities byte by byte.
+                // The program may write a part of a register. For example, it can write interrupt priorities byte by
+                // byte.
                 let mask = ((1u32 << (8 * size)) - 1) << shift;
                 self.scs.read(word_address, &self.nvic, at) & !mask | value << shift
             } else {
@@ -222,8 +223,8 @@ impl Chip {
         }
     }
 
-    /// This function must be called after an access that may have changed interrupt lines or events. The main loop then
-    /// checks lines and events before the next instruction.
+    /// Makes the main loop check interrupt lines and events before the next instruction. The model calls this
+    /// function after each access that may have changed them.
     fn changed(&mut self) {
         self.update_lines();
         self.core.attention = true;

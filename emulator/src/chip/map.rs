@@ -18,7 +18,7 @@ pub const EXTICR_END: u32 = 0x5800_0418;
 pub const MPU: core::ops::Range<u32> = 0xE000_ED90..0xE000_EDC0;
 const HSEM: u32 = 0x5802_6400;
 
-/// Register of a peripheral that has a model and a clock gate.
+/// Register of a peripheral that the emulator models and that has its own clock enable bit.
 pub enum Place {
     Timer(usize, u32),
     Usart(usize, u32),
@@ -75,7 +75,7 @@ pub fn ready_bits(address: u32, plain: &Plain) -> u32 {
         0x5802_480C => 1 << 16,
         0x5802_4818 => 1 << 13,
         0x5800_0420 => 1 << 8,
-        // If a read locks a semaphore, the semaphore belongs to core 1.
+        // The registers HSEM_RLR return that core 1 (ID 3) has locked the semaphore, so every read-lock succeeds.
         0x5802_6480..0x5802_6500 => 0x8000_0300,
         _ => 0,
     }

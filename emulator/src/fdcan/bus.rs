@@ -51,7 +51,7 @@ pub struct BusEntry {
 /// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFault {
-    /// Number of the next frames on the bus that an error destroys.
+    /// Number of frames that an error still destroys, beginning with the next frame on the bus.
     pub destroy_next: u32,
     /// `true` if errors destroy all frames.
     pub destroy_all: bool,
@@ -68,7 +68,7 @@ struct Queued {
 pub struct Transmission {
     /// Start, end and contents of the frame.
     pub entry: BusEntry,
-    /// Transmit buffer of the CAN controller; `None` if another node is sending.
+    /// Index of the transmit buffer of the CAN controller; `None` if another node is sending.
     pub buffer: Option<u32>,
 }
 
@@ -107,7 +107,8 @@ impl Wire {
         self.log.clear();
     }
 
-    /// Removes the frame that the CAN controller is sending, because the controller stops during the transmission.
+    /// Removes the frame that the CAN controller is sending, if any. The controller calls this function when it
+    /// stops.
     pub fn drop_controller(&mut self) {
         if self.on_wire.as_ref().is_some_and(|t| t.buffer.is_some()) {
             self.on_wire = None;
@@ -143,8 +144,8 @@ impl Wire {
         self.on_wire.is_some()
     }
 
-    /// Returns the earliest time, not later than `now`, at which a frame can start. `own` is the time at which the CAN
-    /// controller could start its own frame.
+    /// Returns the time at which the next frame starts. Returns `None` if the bus is busy, or if no frame can start
+    /// at or before `now`. `own` is the time at which the CAN controller could start its own frame.
     pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
         let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
         let start = first.max(self.free);
@@ -179,7 +180,7 @@ impl Wire {
             (Outcome::Good, length)
         };
         if outcome != Outcome::Good && !from_controller {
-            // The sender will send the frame again.
+            // The node sends the frame again after the error.
             self.queue.push(Queued { ready: start + length, frame });
         }
         let entry = BusEntry { start, end: start + length, frame, from_controller, outcome };
@@ -217,8 +218,8 @@ pub fn frame_time(frame: &CanFrame) -> Time {
     {
         return from_ns(u64::from(jtc_bus::duration_ns(&joint)));
     }
-    // The joint bus does not transmit frames of this kind. For these frames, the model assumes one stuff bit per ten
-    // bits.
+    // Frames that do not belong to the protocol of the joint bus reach this code. For these frames, the model assumes
+    // one stuff bit per ten bits.
     let id_bits = if frame.is_extended() { 38 } else { 19 };
     let data_bits = 8 * frame.data().len() as u64;
     let bits = if !frame.is_fd() {

@@ -20,7 +20,7 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// Returns the time at which the oldest pending request was made.
+    /// Returns the time of the oldest pending request; `NEVER` if no request is pending.
     pub fn since(&self) -> Time {
         let bits = (0..32).filter(|&b| self.requests >> b & 1 == 1);
         bits.map(|b| self.times[b]).min().unwrap_or(NEVER)

@@ -78,7 +78,8 @@ impl Bank2 {
         self.cells[(address - BANK2) as usize / WORD] = Cell::Unreadable;
     }
 
-    /// Simulates a loss of power in the middle of a flash operation, after which the affected words may have any value.
+    /// Simulates a loss of power during a flash operation. Afterwards, the affected words may have any value or may
+    /// be unreadable.
     pub fn tear(&mut self, kind: OperationKind, word: &[u8; WORD], rng: &mut fastrand::Rng) {
         match kind {
             OperationKind::Erase { sector } => {

@@ -42,8 +42,8 @@ impl CanPeers for Listener {
     }
 }
 
-/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz. FDCAN1 has two filters for receive
-/// buffers 0 and 1, and two transmit buffers. `prescaler` is the prescaler of the nominal phase.
+/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s, with PLL2 at 85 MHz as its clock. FDCAN1 has two filters
+/// for receive buffers 0 and 1, and two transmit buffers. `prescaler` is the prescaler of the nominal phase.
 fn with_prescaler(prescaler: u32, peers: Option<Listener>) -> Machine {
     let mut machine = machine(SLEEP, &[]);
     let rcc = 0x5802_4400;
@@ -158,7 +158,7 @@ fn bus_off_ends_129_times_11_bits_after_init_is_cleared() {
     run(&mut machine, 10 * MILLISECOND);
     assert_eq!(machine.read_register(CCCR) & 1, 1, "INIT is set by bus-off");
     assert_ne!(machine.read_register(PSR) & BUS_OFF, 0);
-    // Each of the 32 errors adds 8 to the transmit error counter, so the counter is 256.
+    // The bus-off limit is 256. Each of the 32 errors adds 8 to the transmit error counter.
     assert_eq!(machine.chip().fdcan.wire.log().len(), 32);
     machine.chip().fdcan.wire.fault.destroy_all = false;
     machine.write_register(TXBCR, 1);

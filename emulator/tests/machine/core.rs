@@ -27,7 +27,8 @@ fn f64_results_have_the_bits_of_the_pc() {
         .take(ROUNDS)
         .collect();
     let mut machine = machine(FLOATS, &[]);
-    // The program runs once for each pair of numbers, because it writes its results over the memory of the next pair.
+    // The machine runs the program once for each pair of numbers, because the results of the program would overwrite
+    // the next pair.
     for [a, b] in pairs {
         let mut one = 1u64.to_le_bytes().to_vec();
         one.extend(a.to_le_bytes());
@@ -50,8 +51,8 @@ fn f64_results_have_the_bits_of_the_pc() {
 #[test]
 fn an_exception_preserves_what_the_program_has() {
     let mut machine = machine(PRESERVE, &[(FIRST_LINE, CLOBBER)]);
-    // Checks the flags and registers of the main program. The test enables the floating-point unit without an
-    // instruction of the program.
+    // Checks the flags and registers that the main program stores after the interrupt. The program uses the
+    // floating-point unit without enabling it, which the emulator permits.
     machine.run_until(5 * MICROSECOND);
     assert_eq!(result(&machine, 0), 1, "the handler ran once");
     let after: Vec<u32> = (0..9).map(|i| machine.word(RESULT + 0x100 + 4 * i).unwrap()).collect();
@@ -85,8 +86,8 @@ fn primask_holds_an_interrupt_until_the_very_instruction_that_clears_it() {
     machine.run_until(5 * MICROSECOND);
     assert_eq!((result(&machine, 1), result(&machine, 2)), (0, 1));
     let latency = machine.chip().observers.latencies[FIRST_LINE];
-    // The interrupt is pending at the end of the store instruction. The core then executes four nop, a load, a store
-    // and cpsie before the handler.
+    // The interrupt becomes pending at the end of the store instruction. Before the handler, the core executes seven
+    // instructions: four nop, a load, a store and cpsie.
     assert_eq!((latency.entries, latency.worst), (1, 7 * CYCLE));
 }
 

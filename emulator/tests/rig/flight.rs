@@ -28,7 +28,7 @@ pub struct Flight {
     pub safety_output: bool,
     /// Number of host events whose processing the controller has finished.
     pub host_done: usize,
-    /// Number of the serial line for which the status contains a response record.
+    /// Index of the serial line whose status contains a response record, if any.
     pub record_line: Option<usize>,
     /// `true` if the board sent a status in this tick.
     pub status: bool,
@@ -43,9 +43,9 @@ pub struct Flight {
 pub struct Event {
     /// Kind of the event: 1 is a frame, 2 an invalid frame, 3 noise.
     pub kind: u8,
-    /// `true` if the board received an urgent command after the event.
+    /// `true` if the board received an urgent command (Stop or Pause) after the event.
     pub overtaken: bool,
-    /// `true` if the event arrived on a line without extensions.
+    /// `true` if the event arrived on a plain line, whose host does not use the extensions (J-51).
     pub plain: bool,
     pub line: u8,
     pub frame_type: u8,

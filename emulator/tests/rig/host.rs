@@ -27,7 +27,7 @@ pub struct Host {
     pub records: Vec<Response>,
     /// Number of bytes that the host received.
     pub received: u64,
-    /// Time of a board reset; `None` when no received byte can be older than the reset.
+    /// Time of the last board reset, as long as bytes from before the reset may still arrive; otherwise `None`.
     reset: Option<Time>,
 }
 

@@ -34,7 +34,7 @@ const TIM7: usize = FIRST_LINE + 55;
 /// Ports of both serial lines, in the order of the flight record.
 pub const PORTS: [Port; 2] = [Port::Usart2, Port::Usart3];
 
-/// Returns the index of a port in arrays of both ports.
+/// Returns the index of a port in arrays that have one element for each port.
 pub fn index(port: Port) -> usize {
     match port {
         Port::Usart2 => 0,
@@ -204,19 +204,21 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // The frame belongs to the tick that is running now. The rig reads the record of this tick later.
+                // The frame belongs to the current tick, whose record the rig reads later.
                 continue;
             };
             self.to_pass.drain(..=at);
         }
     }
 
-    /// Returns the flight record. If a tick extends over two milliseconds, this function waits for the end of the tick.
+    /// Returns the flight record. If a tick is still running at the end of the millisecond, this function first waits
+    /// for the end of the tick.
     fn complete_flight(&mut self) -> Option<Flight> {
-        // The longest tick takes a third of a millisecond. This tick receives a model and computes all values that
-        // depend on the model.
+        // 80 steps of 5 µs are enough for the longest tick, which takes a third of a millisecond. In this tick, the
+        // controller receives an arm model and computes all values that depend on the model.
         for _ in 0..80 {
-            // A half-written flight record is not valid. The start of a tick may also be due at this time.
+            // During a tick, the flight record may be only half written. The record is also too old if the next tick
+            // is already due.
             if !self.in_tick() {
                 let flight = self.read_flight()?;
                 let due = self.ticks > 0 && !self.may_hang && flight.tick == self.ticks;

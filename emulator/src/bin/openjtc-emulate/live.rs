@@ -13,9 +13,10 @@ use crate::pty::{Pty, PtyError};
 
 /// Largest number of host bytes that may wait for transmission on the serial line.
 const WAITING_MAX: usize = 4096;
-/// Longest time for which the loop waits until the host reads, if virtual time does not follow the real-time clock.
+/// Longest time for which the loop waits until the host reads, if virtual time runs as fast as possible.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay after which virtual time still catches up with the real-time clock.
+/// Largest delay of virtual time, relative to the real-time clock, that the loop makes up. After a larger delay,
+/// virtual time stays late.
 const CATCH_UP: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(1);
 
@@ -92,8 +93,8 @@ impl Live {
                     continue;
                 }
                 if due > CATCH_UP {
-                    // After a longer delay, virtual time does not catch up with the real-time clock. Virtual time
-                    // continues from this moment.
+                    // Virtual time is more than `CATCH_UP` late. The loop does not make up this delay, and continues
+                    // from this moment at normal speed.
                     (start, start_ms) = (Instant::now(), self.board.now_ms());
                 }
             }
@@ -138,8 +139,8 @@ impl Live {
     }
 
     /// Pauses virtual time briefly if the operating system may still delay bytes of a frame. Without the pause, the
-    /// board would measure the delay as a gap in the frame. Does not pause while host bytes still wait for
-    /// transmission. Returns `true` after a pause.
+    /// board would measure the delay as a gap in the frame. Does not pause while bytes of the host still wait for
+    /// transmission on the serial line. Returns `true` after a pause.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);

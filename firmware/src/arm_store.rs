@@ -19,7 +19,8 @@ use crate::bank2;
 /// Memory for one image of an arm.
 pub type Buffer = [u8; IMAGE_MAX];
 
-/// According to the data sheet, a sector takes at most 4 s to erase, and a word at most 0.5 ms to program.
+/// Time limits with a margin. According to the data sheet, a sector takes at most 4 s to erase, and a word at most
+/// 0.5 ms to program.
 const ERASE_MAX: Duration = Duration::from_secs(8);
 const PROGRAM_MAX: Duration = Duration::from_millis(50);
 
@@ -61,7 +62,7 @@ pub static ARM_STORE: Mailbox = Mailbox {
     loaded: [const { AtomicU32::new(0) }; 3],
 };
 
-/// Buffer for an image to be stored. The code that has taken the buffer out owns the buffer.
+/// Buffer for an image to be stored; `None` while another part of the program has taken the buffer out and owns it.
 static STAGING: Mutex<Cell<Option<&'static mut Buffer>>> = Mutex::new(Cell::new(None));
 /// Image that was found in flash at program start.
 static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));

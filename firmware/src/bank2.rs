@@ -22,7 +22,8 @@ const SECTOR_BYTES: u32 = 128 * 1024;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// Code for programming of 32 bits at once, which is permitted at every supply voltage of the boards.
 const PSIZE: u8 = 0b10;
-/// BFHFNMIGN in the register CCR of the core.
+/// Bit BFHFNMIGN of the register CCR. If it is set, the core ignores bus faults of loads and stores while faults are
+/// masked.
 const IGNORE_BUS_FAULTS: u32 = 1 << 8;
 
 /// Bits of FLASH_SR2 that report errors: write protection, sequence, strobe, inconsistency, operation, read
@@ -58,7 +59,7 @@ pub fn busy() -> bool {
     sr.bsy() || sr.qw()
 }
 
-/// Ends programming or erasing, so that later writes do not become part of that operation.
+/// Ends programming or erasing, so that later writes do not belong to that operation.
 pub fn end() {
     bank().cr().write(|w| w.set_psize(PSIZE));
 }

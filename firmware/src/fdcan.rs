@@ -187,8 +187,8 @@ impl Fdcan {
     /// this time no frame is sent, and the drives apply their last commanded torque.
     fn recover(&mut self) -> bool {
         let control = CAN.cccr().read();
-        // If INIT is set, the CAN controller has stopped itself. If ASM is set, the CAN controller could not access its
-        // message memory, and now only listens.
+        // If INIT is set, the CAN controller has stopped itself. If ASM is set, the CAN controller could not access
+        // its message memory, so it only listens.
         if control.init() || control.asm() {
             CAN.cccr().modify(|w| w.set_init(true));
             wait(PATIENCE_IN_TICK, || CAN.cccr().read().init());
@@ -288,7 +288,8 @@ fn request(n: usize, frame: &Frame) -> bool {
 /// Sends zero torque to the drives after a program failure, if the joint bus still works. Stops trying after about one
 /// millisecond. A fault handler calls this function when the state of all other parts of the program is unknown.
 pub fn last_frame() {
-    /// Largest number of reads. A frame takes 0.1 ms, and the drives may send up to seven answers before this frame.
+    /// Largest number of reads while the function waits for the transmission. A frame takes 0.1 ms, and the drives
+    /// may send up to seven answers before this frame.
     const LOOKS: u32 = 20_000;
     if !embassy_stm32::pac::RCC.apb1henr().read().fdcanen() || CAN.cccr().read().init() {
         return;

@@ -51,7 +51,8 @@ impl FlightFrame {
 #[repr(C)]
 pub struct FlightEvent {
     /// Kind of the event: 0 is no event, 1 a valid frame, 2 an invalid frame, 3 noise. Bit 6 is set if the event
-    /// arrived on a line without extensions. Bit 7 is set if the controller received Stop or Pause after the event.
+    /// arrived on a plain line, whose host does not use the extensions (J-51). Bit 7 is set if the controller
+    /// received Stop or Pause after the event.
     pub kind: u8,
     /// Serial line on which the event arrived: 0 is RS422, 1 is USB.
     pub line: u8,
@@ -149,8 +150,7 @@ pub struct Flight {
     pub errors: u16,
     /// Number of host events whose processing the controller has finished.
     pub host_done: u8,
-    /// Number of the serial line for which the status contains a response record; 0xFF if the status contains no
-    /// record.
+    /// Index of the serial line whose status contains a response record; 0xFF if no status contains a record.
     pub record_line: u8,
     /// Commanded torques, N·m.
     pub torque: [f64; JOINTS],

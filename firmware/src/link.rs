@@ -28,7 +28,7 @@ const ROUNDS: usize = 64;
 /// length of the ring, and DMA continues while the link loop reads.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
-/// Number of passes of the link loop. The tick reads this number to detect that the link loop has stopped.
+/// Number of wake-ups of the link loop. The tick reads this number to detect that the link loop has stopped.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
 /// Number of bytes that each line had received at the last tick, modulo 2³².
@@ -70,7 +70,8 @@ impl SlotIn {
 }
 
 impl SlotOut {
-    /// Returns the batch until all events of the batch are processed.
+    /// Returns the current batch. If all events of the last batch are processed, takes the next batch from the link
+    /// loop. Returns `None` if no batch is waiting.
     pub fn batch(&mut self) -> Option<&EventBatch> {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
@@ -114,8 +115,8 @@ impl Link {
     /// Takes the received bytes out of the DMA ring and searches them for an event. Returns `true` if this function
     /// must be called again at once.
     fn receive(&mut self) -> bool {
-        // The clock is read before the bytes. If the clock were read after the bytes, and a byte arrived between the
-        // two reads, the measured silence before this byte would be too long.
+        // The clock is read before the bytes. Otherwise, a byte could arrive between the two reads, and the measured
+        // silence before this byte would be too long.
         let now = Instant::now().as_micros();
         self.catch_up();
         let waiting = self.uart.waiting();

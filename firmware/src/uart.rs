@@ -65,7 +65,7 @@ impl Line {
 #[derive(Clone, Copy)]
 struct Stream {
     registers: St,
-    /// Register that clears the flags of the DMA stream, and bit mask of these flags.
+    /// Register that clears the flags of the DMA stream. The next field is the bit mask of these flags.
     clear: Reg<Ixr, W>,
     flags: Ixr,
     multiplexer: Reg<Ccr, RW>,
@@ -142,7 +142,7 @@ pub fn open(
     });
     usart.cr1().write(|w| {
         w.set_over8(if baud.over8 { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
-        // Because the USART has a FIFO, DMA may be delayed by the transmission time of 16 bytes.
+        // With the FIFO, no byte is lost if DMA is late by less than the transmission time of 16 bytes.
         w.set_fifoen(true);
         w.set_te(true);
         w.set_re(true);

@@ -43,8 +43,8 @@ impl SafetyInput {
 
     /// Returns `true` if the safety input had a falling edge since the last call.
     fn take_edge(&mut self) -> bool {
-        // The code uses a bit mask because the compiler would check the bounds of an index, and the tick must not
-        // contain a panic path.
+        // The code uses a bit mask instead of a bit index. For an index, the compiler would add a bounds check with a
+        // panic, and the tick must not contain a panic path.
         let edges = pac::EXTI.pr(0).read().0 & self.mask;
         // A write of 1 clears the bit of this EXTI line; the bits of other EXTI lines do not change.
         pac::EXTI.pr(0).write(|w| w.0 = edges);

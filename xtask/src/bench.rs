@@ -60,7 +60,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
-    // The command measures the longest tick only once, because the minimum of several maxima would not be a maximum.
+    // The command measures the Stops only once, because the best of several worst cases would not be a worst case.
     figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
@@ -110,8 +110,7 @@ fn keep_best(figures: &mut Figures, samples: Figures) {
     }
 }
 
-/// Copies the timing program of jtc-dynamics and returns the path of the copy, because other crates have an example
-/// with the same name.
+/// Builds the timing program of jtc-dynamics, copies the program to `work` and returns the path of the copy.
 fn dynamics_program(work: &Path) -> Result<PathBuf> {
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-dynamics", "--example", "time"]))?;
     let program = work.join("dynamics_time");
@@ -119,8 +118,8 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Failed measurements. Each entry contains the name prefixes of the figures that the measurement yields, and the cause
-/// of the failure.
+/// Failed measurements. Each entry contains the name prefixes of the figures that are missing, and the cause of the
+/// failure.
 #[derive(Default)]
 pub(crate) struct Failed(Vec<(&'static [&'static str], String)>);
 
@@ -154,7 +153,8 @@ impl Failed {
     }
 }
 
-/// Name prefixes of the figures that the command measures together with the anchors.
+/// Name prefixes of the figures that the command measures together with the anchors (reference values of other
+/// software).
 const ANCHORS: &[&str] = &["ours.", "pinocchio", "casadi", "mujoco", "kdl", "rbdl", "libm_sin_cos_6"];
 
 /// Program that measures the performance of a crate.

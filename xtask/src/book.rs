@@ -143,7 +143,8 @@ fn blocks(page: &str) -> Vec<(usize, Block)> {
             generated = comment.ends_with(" begin") || (generated && !comment.ends_with(" end"));
         } else if let Some(kind) = line.strip_prefix("```") {
             fenced = true;
-            // The tests of the Python package run all Python blocks.
+            // This module checks only these kinds of blocks, because the tests of the Python package run all Python
+            // blocks.
             if ["console", "sh"].contains(&kind) {
                 let own = above.contains("program:");
                 found.push((

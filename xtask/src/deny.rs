@@ -65,7 +65,7 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-/// Runs cargo-deny itself. If cargo-deny is missing, the function installs it in the build folder.
+/// Runs cargo-deny. If cargo-deny is missing, the function first installs it in the build folder.
 pub(crate) fn with_cargo_deny() -> Result<()> {
     let folder = shell::target().join("tools");
     let program = folder.join("bin/cargo-deny");

@@ -21,7 +21,8 @@ fn direct(manifest: &str) -> BTreeSet<String> {
             }
         } else if inside && let Some((key, _)) = line.split_once('=') {
             let name = key.trim().split('.').next().unwrap_or_default();
-            // Comments and continuation lines of a value do not contain names of dependencies.
+            // This condition excludes comments and continuation lines of a value, which are not names of
+            // dependencies.
             let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if !name.is_empty() && name.chars().all(is_name) {
                 names.insert(name.to_owned());

@@ -68,8 +68,8 @@ fn has_libclang() -> bool {
     std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
 }
 
-/// Returns a cargo command in `emulator/`. Warnings are errors, also for crates from `crates/`, because their features
-/// in `emulator/` differ from their features in the workspace.
+/// Returns a cargo command in `emulator/`. Warnings are errors, also for the crates of `crates/`. These crates have
+/// other features here than in the workspace, so they may cause other warnings.
 fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = shell::cargo(arguments);
     cargo.current_dir(shell::root().join("emulator"));

@@ -102,7 +102,7 @@ pub(crate) fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     Ok(report)
 }
 
-/// Returns the chain of calls that leads to a function.
+/// Returns the chain of calls that leads to a function, as text.
 fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32) -> String {
     let name = &program.functions[&at].name;
     match from.get(&at) {
@@ -155,7 +155,7 @@ impl<'a> Program<'a> {
             if let Some(kind) = name.strip_prefix('$') {
                 program.data.insert(address, kind.starts_with('d'));
             } else if symbol.kind() == SymbolKind::Text {
-                // The lowest bit of the address marks Thumb code.
+                // The lowest bit marks Thumb code and is not part of the address.
                 let (start, end) = (address & !1, (address & !1) + symbol.size() as u32);
                 let name = format!("{:#}", rustc_demangle::demangle(name));
                 let panics = PANICS.iter().any(|part| name.contains(part));
@@ -166,7 +166,8 @@ impl<'a> Program<'a> {
                     section,
                 });
                 function.end = function.end.max(end);
-                // The linker merges equal functions into one function with several names.
+                // The linker merges equal functions into one function with several names. If one of the names belongs
+                // to a function that panics, the code keeps this name.
                 if panics && !function.panics {
                     (function.name, function.panics) = (name, true);
                 }
@@ -228,7 +229,8 @@ impl<'a> Program<'a> {
                 let Some(first) = self.halfword(function.section, address) else { break };
                 let second = self.halfword(function.section, address + 2).unwrap_or(0);
                 if is_data {
-                    // If data in the code contain the address of a function, the lowest bit of this address is set.
+                    // Data in the code may contain the address of a function. In such an address, the lowest bit is
+                    // set (Thumb).
                     let word = u32::from(second) << 16 | u32::from(first);
                     if address.is_multiple_of(4) && word & 1 == 1 && self.functions.contains_key(&(word & !1))
                     {
@@ -246,7 +248,7 @@ impl<'a> Program<'a> {
                         call = true;
                         found(address, self.function_at(to).map_or(End::Nowhere(to), End::Function));
                     }
-                    // For long distances, the linker uses a jump to a constant address.
+                    // For long distances, the linker loads a constant address into a register and jumps to it.
                     Flow::Indirect(register) => match halves[usize::from(register)] {
                         Some((at, to)) if at + 4 == address => {
                             found(address, self.function_at(to & !1).map_or(End::Nowhere(to), End::Function));
@@ -265,7 +267,8 @@ impl<'a> Program<'a> {
                             }
                         }
                     }
-                    // The processor never executes a trap after a call that does not return.
+                    // The compiler puts a trap after a call that does not return. The processor never executes this
+                    // trap.
                     Flow::Trap if !after_call => found(address, End::Trap),
                     Flow::Trap | Flow::Other => {}
                 }

@@ -1,4 +1,5 @@
-//! Runs work in parallel, mostly programs. Most of the checks of a test run wait and use little processor time.
+//! Runs work in parallel, mostly programs. Most checks of a test run spend their time waiting and use little
+//! processor time.
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read as _, Seek as _};

@@ -33,7 +33,7 @@ impl Prebuild {
     /// build began earlier, it would delay the steps.
     pub(crate) fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
-            // An error of this call means that an earlier build has failed and the thread has ended.
+            // This call fails only if an earlier build has failed and the thread has ended.
             let _ = sender.send(());
         }
     }
@@ -41,7 +41,7 @@ impl Prebuild {
 
 impl Drop for Prebuild {
     fn drop(&mut self) {
-        // If the workspace was not built, this assignment ends the wait of the thread.
+        // If the workspace was not built, this assignment makes the background thread stop waiting.
         self.workspace_is_built = None;
         if let Some(thread) = self.making.take() {
             // A panic of the background thread has no effect on the checks, so the code ignores it.

@@ -185,7 +185,7 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
     Ok(failures)
 }
 
-/// If a line is a result line, adds the numbers of the line to the counts.
+/// Adds the numbers of a result line to the counts. Ignores all other lines.
 pub(crate) fn count_results(line: &str, counts: &mut Counts) {
     let Some(rest) = line.strip_prefix("test result: ") else { return };
     counts.passed += count(rest, "passed");

@@ -48,7 +48,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
             let mut doc = cargo(&["doc", "--release", "--workspace", "--no-deps"]);
             passed(run(doc.env("RUSTDOCFLAGS", "-D warnings")))
         });
-        // The next steps run the programs that were built in the background.
+        // Waits for the builds in the background, because the next steps run their programs.
         drop(prebuild);
         tally.step("book: made, every link leads somewhere", || passed(book::made()));
         let scratch = Scratch::new("demo")?;

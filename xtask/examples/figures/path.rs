@@ -5,8 +5,8 @@ use jtc_wire::RawPoint;
 /// Time between trajectory points, ms.
 pub(crate) const STEP_MS: u16 = 10;
 
-/// Returns `points` points of a smooth motion of all joints in whole periods of about 10 s. The motion begins and ends at
-/// rest, at position zero.
+/// Returns a smooth motion of all joints with `points` points. The motion consists of whole periods of about 10 s,
+/// and begins and ends at rest at position zero.
 pub(crate) fn smooth(points: usize) -> Vec<Point> {
     const AMPLITUDE: [f64; 6] = [0.8, -0.5, 0.9, 0.7, -0.8, 1.0];
     let seconds = points.saturating_sub(1) as f64 * f64::from(STEP_MS) * 1e-3;

@@ -97,7 +97,7 @@ pub(crate) fn write(path: &Path, seconds: u32) -> Result<()> {
     let mut recorder = Recorder::create(path, &info)?;
     for i in 0..seconds * 1000 {
         recorder.write(&sample(i))?;
-        // The recorder of a running motion also writes to the file at this interval.
+        // Writes the buffered samples to the file every 200 ms, like the recorder of a running motion.
         if i % 200 == 199 {
             recorder.flush()?;
         }

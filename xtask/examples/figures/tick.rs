@@ -95,8 +95,8 @@ fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
 pub(crate) fn figures() -> Result<()> {
     let frames = script()?;
     let seen = record(&frames);
-    // The program uses the minimum of all rounds, because the minimum does not include the time of other programs on
-    // the computer.
+    // For each tick, the program uses the minimum over all rounds, because the minimum does not include the time of
+    // other programs on the computer.
     let mut least = vec![f64::INFINITY; seen.len()];
     for _ in 0..ROUNDS {
         let mut controller = controller();

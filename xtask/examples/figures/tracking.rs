@@ -12,7 +12,7 @@ use jtc_wire::RawPoint;
 use crate::world::{Result, executing};
 use crate::{path, print};
 
-/// Sums over all milliseconds of an execution.
+/// Position errors of an execution for each joint: sums of the squares, largest errors, and number of samples.
 #[derive(Clone, Copy, Default)]
 struct Errors {
     squares: [f64; 6],

@@ -27,8 +27,8 @@ struct Bench {
     chain: ChainSim,
     /// All frames of the bus, in the order in which they were sent.
     received: Vec<CanFrame>,
-    /// Time at which the last frame of program data ended on the bus. The next field is the total time that the boards needed to
-    /// answer frames of program data, ns.
+    /// Time at which the last frame of program data ended on the bus. The next field is the total response time of
+    /// the boards to program data, ns.
     asked_at: Option<u64>,
     turn_round_ns: u64,
 }
@@ -183,14 +183,15 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     print(&format!("{name}_s"), cost.seconds);
     print(&format!("{name}_bus_s"), cost.busy_seconds);
     print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
-    // The result is the time that the PC adds to the bus time. The calculation subtracts the response times of the boards and
-    // the wait for the restart.
+    // The share is the duration of the update divided by its bus time. The duration excludes the response times of
+    // the boards and the wait for the restart.
     let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
     print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
     Ok(())
 }
 
-/// Prints the number of frames that the library decodes per second. The measured frames number a chain of boards.
+/// Prints the number of frames that the library decodes per second. The frames come from the procedure that gives
+/// numbers to a chain of boards.
 fn decode(received: &[CanFrame]) -> Result<()> {
     let profile = Profile::default();
     let frames: Vec<Frame> = received

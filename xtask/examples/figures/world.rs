@@ -17,8 +17,8 @@ pub(crate) fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     Ok(session)
 }
 
-/// Uploads and starts `points` with the host of the simulator. Some measurements cannot use the session of the library, because
-/// the session does not upload points that fail its check, such as points without velocities.
+/// Uploads and starts `points` with the host of the simulator. Some measurements need points that fail the check of
+/// the library's session, such as points without velocities. That session does not upload such points.
 pub(crate) fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;

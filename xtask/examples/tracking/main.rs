@@ -111,7 +111,7 @@ impl Condition {
         },
     ];
 
-    /// Returns the condition with these errors of the masses and the friction in the model.
+    /// Returns the same condition with these relative errors of the masses and the friction in the model.
     fn believing(self, mass: f64, friction: f64) -> Self {
         Self { error: ModelError { mass, friction, ..self.error }, ..self }
     }
@@ -192,8 +192,8 @@ fn median(all: &[Figures]) -> Figures {
     }
 }
 
-/// Returns the errors of our controller with a partly correct model and with a completely correct model. Each entry
-/// contains a heading, and the error of each joint in mrad.
+/// Returns the errors of our controller with an inaccurate model, with correct friction, with correct masses, and
+/// with both correct. Each entry contains a heading, and the error of each joint in mrad.
 fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
     let sharp = match condition.friction {
         FrictionModel::Smooth { width } => width,

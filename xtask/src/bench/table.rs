@@ -5,7 +5,7 @@ use crate::size;
 /// Target value of a performance figure.
 #[derive(Clone, Copy)]
 enum Target {
-    /// The value of our software must be at most factor × anchor.
+    /// The value of our software must be at most this factor times the smallest anchor (reference value).
     Share(f64),
     /// The value of our software must be at most this value.
     AtMost(f64),
@@ -332,7 +332,8 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The table contains all figures, except the figures of one failed measurement.
+    /// The table contains all figures, except the figures of one failed measurement. The rows of these figures show
+    /// the cause, and all other rows show their values.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));

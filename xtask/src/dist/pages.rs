@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use super::tree::Tree;
 use crate::shell::{self, Scratch};
 
-/// Pages that `program` prints. The program must run on this computer.
+/// Manual pages and completions that a program prints. The program must run on this computer.
 pub(super) struct Pages {
     /// Manual pages by their file names, such as `jtc-serve.1`.
     pub manual: Vec<(String, Vec<u8>)>,

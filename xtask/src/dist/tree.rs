@@ -80,7 +80,7 @@ fn header(kind: tar::EntryType, mode: u32, size: u64, time: u64) -> tar::Header 
     header.set_mtime(time);
     header.set_uid(0);
     header.set_gid(0);
-    // The names of user 0 and group 0 fit into their header fields.
+    // These calls cannot fail, because the names fit into their header fields.
     let _ = header.set_username("root");
     let _ = header.set_groupname("root");
     header

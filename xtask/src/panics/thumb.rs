@@ -37,12 +37,12 @@ fn narrow(address: u32, code: u32) -> Flow {
     let to = |offset: u32| Flow::Direct(address.wrapping_add(4).wrapping_add(offset));
     let register = (code >> 3 & 0xF) as u8;
     match code {
-        // BX and BLX instructions. A BX instruction is a return if it uses the link register.
+        // BX and BLX instructions. A BX with the link register is a return.
         0x4700..=0x47FF if register == 14 && code & 0x80 == 0 => Flow::Other,
         0x4700..=0x47FF => Flow::Indirect(register),
-        // MOV instruction to the program counter. This MOV instruction is a return if it uses the link register.
+        // MOV instruction that writes the program counter. A MOV from the link register is a return.
         0x4687..=0x46FF if code & 0x87 == 0x87 && register != 14 => Flow::Indirect(register),
-        // ADD instruction to the program counter.
+        // ADD instruction that writes the program counter.
         0x4487..=0x44FF if code & 0x87 == 0x87 => Flow::Indirect(15),
         0xB100..=0xBBFF if code & 0x0500 == 0x0100 => to((code >> 9 & 1) << 6 | (code >> 3 & 0x1F) << 1),
         0xDE00..=0xDEFF => Flow::Trap,
@@ -75,7 +75,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             0xF2C0 => Flow::High(register, immediate as u16),
             _ => Flow::Other,
         },
-        // LDR to the program counter from any memory except the stack. An LDR from the stack is a return.
+        // LDR that loads the program counter from any memory except the stack. An LDR from the stack is a return.
         _ if first & 0xFF70 == 0xF850 && second >> 12 == 15 && first & 0xF != 13 => Flow::Indirect(15),
         _ => Flow::Other,
     }

@@ -12,7 +12,7 @@ pub(super) struct Text {
 impl Text {
     /// Returns the number of the line that contains this byte of `words`.
     pub(super) fn line_at(&self, offset: usize) -> usize {
-        // The pattern of a mark may begin at the end of the previous sentence.
+        // The pattern of a mark may begin at the end of the previous sentence, up to two bytes before the line.
         let before = |(start, _): &&(usize, usize)| *start <= offset + 2;
         self.lines.iter().rev().find(before).map_or(1, |(_, number)| *number)
     }

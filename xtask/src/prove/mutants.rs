@@ -35,7 +35,7 @@ const LONGEST: f64 = 0.2;
 #[derive(Default)]
 struct Tally {
     killed: usize,
-    /// Number of mutants for which a test did not end. Such a test counts as a failed test.
+    /// Number of mutants for which a test did not end. Such a test counts as failed.
     endless: usize,
     equivalent: usize,
     unexplained: Vec<String>,

@@ -19,10 +19,10 @@ const NO_TEST: &str = "this_filter_selects_no_test";
 const GUARD: &str = "pub fn a(id: u32) -> bool {\n";
 /// Last line of a function.
 const END: &str = "\n}\n";
-/// Code of the function in programs that measure tests. The function of cargo-gamma needs more time.
+/// Body of the function [`GUARD`] in the programs that measure tests. The original body of cargo-gamma is slower.
 const COMPARE: &str = "    ACTIVE.load(Ordering::Relaxed) == id";
-/// Code of the function in programs that record the mutants that a test reaches. The function writes the number of each mutant to
-/// standard error when the program reaches the mutant for the first time.
+/// Body of the function [`GUARD`] in the programs that record which mutants a test reaches. The function writes the
+/// number of each mutant to standard error when the program reaches the mutant for the first time.
 const RECORD: &str = "    static REACHED: [AtomicBool; 65536] = [const { AtomicBool::new(false) }; 65536];
     unsafe extern \"C\" {
         fn write(file: i32, bytes: *const u8, count: usize) -> isize;
@@ -57,7 +57,7 @@ pub(super) struct Program {
 /// Test programs of a crate, and the mutants in them.
 pub(super) struct Build {
     pub programs: Vec<Program>,
-    /// Variants of `programs`, in their order, that record the mutants that a test reaches.
+    /// Test programs in the order of `programs`, built so that they record the mutants that a test reaches.
     pub recording: Vec<Program>,
     pub mutants: Vec<Mutant>,
 }
@@ -68,7 +68,7 @@ pub(super) fn install() -> Result<()> {
         let mut install = cargo(&["install", "cargo-gamma", "--locked", "--version", VERSION, "--root"]);
         run(install.arg(target().join("tools")))?;
     }
-    // cargo-gamma calls cargo offline, and needs the dependencies of every platform.
+    // Downloads the dependencies for every platform, because cargo-gamma calls cargo offline.
     run(&mut cargo(&["fetch", "--locked"]))
 }
 
@@ -105,7 +105,7 @@ fn read(path: &Path) -> Result<Value> {
     Ok(serde_json::from_str(&text)?)
 }
 
-/// Reads what cargo-gamma knows about its last run in this checkout.
+/// Reads the session file of the last run of cargo-gamma in this checkout.
 fn session() -> Result<Value> {
     let cache = target().join("cargo-gamma/cache");
     let sessions = files(&cache, &["json"]).into_iter().filter(|path| path.ends_with("testing-session.json"));
@@ -163,7 +163,8 @@ fn copy(workspace: &Path, runtime: &Path) -> Result<PathBuf> {
     Ok(copy)
 }
 
-/// Builds the test programs of the packages with this code in the function [`GUARD`]. The target folder is `name`.
+/// Builds the test programs of the packages, with `code` as the body of the function [`GUARD`]. The target folder is
+/// `name`.
 fn programs(copy: &Path, code: &str, packages: &[&str], name: &str) -> Result<Vec<Program>> {
     let runtime = copy.join("runtime/src/runtime.rs");
     let text = read_to_string(&runtime).with_context(|| format!("cannot read {}", runtime.display()))?;
@@ -187,7 +188,7 @@ fn programs(copy: &Path, code: &str, packages: &[&str], name: &str) -> Result<Ve
     Ok(programs.into_values().collect())
 }
 
-/// Returns the source of the runtime with this code in the function [`GUARD`].
+/// Returns the source of the runtime, with `code` as the body of the function [`GUARD`].
 fn with_guard(source: &str, code: &str) -> Option<String> {
     let (before, rest) = source.split_once(GUARD)?;
     let (_, after) = rest.split_once(END)?;

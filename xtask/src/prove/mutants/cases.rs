@@ -14,7 +14,7 @@ use crate::shell;
 
 /// Time limit of a test program without a mutant, in addition to the longest duration of a test.
 const START: Duration = Duration::from_secs(5);
-/// Time between two looks at a test program that runs.
+/// Interval at which the function checks if a running test program has ended.
 const POLL: Duration = Duration::from_millis(1);
 
 /// A test of a test program.
@@ -33,7 +33,7 @@ pub(super) struct Case {
 pub(super) enum End {
     Passed,
     Failed,
-    /// The program was ended at its time limit.
+    /// The test program reached its time limit and was stopped.
     Late,
 }
 
@@ -61,7 +61,7 @@ pub(super) fn measure(build: &Build, longest: f64) -> Result<Vec<Case>> {
         if seconds > longest {
             return Ok(None);
         }
-        // The programs that record need about twice the time.
+        // The recording programs take about twice as long, so their time limit is four times as long.
         let output = alone(&build.recording[index], &name, 4 * limit)?;
         Ok(output.map(|output| Case { program: index, name, seconds, reached: reached(&output) }))
     });
@@ -90,9 +90,9 @@ fn reached(output: &str) -> BTreeSet<u32> {
 pub(super) fn run(program: &Program, arguments: &[&str], ordinal: Option<u32>) -> Command {
     let mut command = Command::new(&program.path);
     command.current_dir(&program.folder).args(arguments);
-    // Options such as --fail-fast are not stable yet.
+    // This variable permits test options that are not stable yet, such as --fail-fast.
     command.env("RUSTC_BOOTSTRAP", "1");
-    // A property that failed needs no smaller example, and leaves no file.
+    // After a failed property test, proptest does not search for a smaller example, and writes no file.
     command.env("PROPTEST_MAX_SHRINK_ITERS", "0").env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "true");
     match ordinal {
         Some(ordinal) => command.env("GAMMA_ACTIVE", ordinal.to_string()),
@@ -101,7 +101,8 @@ pub(super) fn run(program: &Program, arguments: &[&str], ordinal: Option<u32>) -
     command
 }
 
-/// Runs a command until it ends or its time limit has passed. Returns the output that goes to a pipe.
+/// Runs a command until it ends or its time limit has passed. Returns how the command ended, and the output that the
+/// caller has redirected to a pipe.
 pub(super) fn wait(command: &mut Command, limit: Duration) -> Result<(End, String)> {
     let start = Instant::now();
     let mut child = command.stdin(Stdio::null()).spawn().context("cannot start a test program")?;

@@ -1,5 +1,5 @@
-//! Runs the tests on one mutant at a time, and ends at the first test that fails. The tests that found neighbouring
-//! mutants run first.
+//! Runs the tests on one mutant at a time, until a test fails. Tests that found other mutants of the same file run
+//! first.
 use std::collections::BTreeMap;
 use std::process::Stdio;
 use std::sync::{Mutex, PoisonError};
@@ -12,13 +12,13 @@ use super::cases::{Case, End, run, wait};
 use super::outcomes::{Outcome, Outcomes};
 use crate::parallel::{process, processors};
 
-/// Number of tests that found mutants of the same file and run first.
+/// Largest number of tests that run first, because they found other mutants of the same file.
 const FIRST: usize = 8;
-/// Largest duration and number of the tests that run in one program.
+/// Largest total duration (s) and largest number of the tests that run in one program.
 const GROUP_SECONDS: f64 = 1.2;
 const GROUP_COUNT: usize = 60;
-/// Time limit of a program: this duration, and this multiple of the duration without a mutant. A program that does not end
-/// runs again with [`PATIENCE`] times the limit, because other programs may have slowed it down.
+/// Time limit of a program: this duration, plus a multiple of the duration without a mutant. A program that does not
+/// end runs again with [`PATIENCE`] times the limit, because other programs may have slowed it down.
 const LIMIT_SECONDS: f64 = 6.0;
 const LIMIT_FACTOR: f64 = 8.0;
 const PATIENCE: f64 = 4.0;
@@ -26,20 +26,20 @@ const PATIENCE: f64 = 4.0;
 /// Tests that have found mutants.
 #[derive(Default)]
 struct Finders {
-    /// Indices of the tests that found mutants of a file, the latest one last.
+    /// Indices of the tests that found mutants of a file, with the latest test last.
     of_file: BTreeMap<String, Vec<usize>>,
     /// Number of mutants that each test has found.
     counts: BTreeMap<usize, usize>,
 }
 
-/// Runs the tests on each mutant that is left in `outcomes`.
+/// Runs the tests on each mutant that has no outcome yet or has survived.
 ///
 /// # Errors
 ///
 /// Returns an error if the tests fail without a mutant.
 pub(super) fn judge(build: &Build, cases: &[Case], outcomes: Outcomes) -> Result<()> {
     outcomes.list(&build.mutants)?;
-    // The tests that passed alone must also pass together.
+    // Checks that the tests, which passed alone, also pass in groups without a mutant.
     let all: Vec<usize> = (0..cases.len()).collect();
     for group in split(cases, &all) {
         ensure!(
@@ -94,7 +94,7 @@ fn groups(cases: &[Case], fit: Vec<usize>, mutant: &Mutant, finders: &Finders) -
     [latest, own, others].into_iter().flat_map(|tests| split(cases, &tests)).collect()
 }
 
-/// Splits tests into groups of the same program. The groups of a program keep the order of its tests.
+/// Splits tests into groups. All tests of a group belong to the same program and keep their order.
 fn split(cases: &[Case], tests: &[usize]) -> Vec<Vec<usize>> {
     let mut programs: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
     for &n in tests {

@@ -1,5 +1,5 @@
-//! Stores the outcomes of mutants. An interrupted mutation test can go on, and a test that was added needs to run on
-//! the survivors only.
+//! Stores the outcomes of mutants. After an interruption, the mutation test continues with the remaining mutants.
+//! After a test was added, only the surviving mutants need to be tested again.
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, read_to_string, remove_file, write};
 use std::io::Write as _;
@@ -13,7 +13,8 @@ use crate::prove::evidence::Named;
 
 /// Name of the file with the mutants of the crate.
 const MUTANTS: &str = "mutants.json";
-/// Name of the file with the outcomes, a line each. A later line replaces an earlier line.
+/// Name of the file with the outcomes, one line for each outcome. A later line replaces an earlier line for the same
+/// mutant.
 const OUTCOMES: &str = "outcomes.txt";
 /// Name of the file with the commit that was tested.
 const COMMIT: &str = "commit";

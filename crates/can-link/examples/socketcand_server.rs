@@ -1,9 +1,9 @@
 //! A socketcand server with three buses, for any client program: `cargo run --example socketcand_server --
 //! 127.0.0.1:29536`.
 //!
-//! - `can0`: every frame is answered with a frame that has the same payload and the next identifier;
-//! - `can1`: connects only the clients;
-//! - `busy`: continuously sends frames with the identifier 7F0 and a running number.
+//! - `can0`: the server answers every frame with a frame that has the same payload and the next identifier;
+//! - `can1`: has no members except the clients, which exchange frames with each other;
+//! - `busy`: the server continuously sends frames with the identifier 7F0 and a running number.
 
 use std::time::Duration;
 

@@ -99,7 +99,7 @@ mod tests {
 
     use crate::frame::any_frame;
 
-    /// Written by python-can 4.6.1 for `Message(arbitration_id=0x205, is_extended_id=False, is_fd=True,
+    /// Datagram that python-can 4.6.1 writes for `Message(arbitration_id=0x205, is_extended_id=False, is_fd=True,
     /// bitrate_switch=True, data=range(12), timestamp=1.5)`.
     const BY_PYTHON_CAN: &[u8] = b"\x8b\xa9timestamp\xcb?\xf8\0\0\0\0\0\0\xaearbitration_id\xcd\x02\x05\
         \xaeis_extended_id\xc2\xafis_remote_frame\xc2\xaeis_error_frame\xc2\xa7channel\xc0\xa3dlc\x0c\

@@ -39,11 +39,11 @@ impl SocketCanBus {
             hint: hint(&source, interface),
             source,
         };
-        // The code first opens a socket for all interfaces (index 0), because a kernel without CAN returns another
-        // error than a wrong name does.
+        // A socket for all interfaces (index 0) can be opened only if the kernel supports CAN. This call separates
+        // missing CAN support from a wrong interface name.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
-        // At this point the kernel reports a disabled interface (down).
+        // The kernel reports an interface that is down as a pending error of the socket.
         if let Some(error) = socket.as_raw_socket().take_error().map_err(failed)? {
             return Err(failed(error));
         }
@@ -154,7 +154,7 @@ fn is_no_data(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// This test runs on any computer. If the kernel lacks CAN or this interface, the error contains the command that
+    /// Runs on any computer. If the kernel lacks CAN or this interface, the error must contain the command that
     /// solves the problem.
     #[test]
     fn what_cannot_be_opened_names_the_cause_and_what_to_do() {

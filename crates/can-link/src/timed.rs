@@ -59,7 +59,8 @@ pub struct TimedBus {
 struct Member {
     /// Queue of frames that the member must send (first in, first out).
     queue: VecDeque<CanFrame>,
-    /// Simulated faults of frames between the member and its queue, and of frames from the bus.
+    /// Simulated faults of the frames that the member sends (before the queue), and of the frames that it receives
+    /// from the bus.
     lines: Option<Box<(Line, Line)>>,
     counters: Counters,
     /// Earliest time at which the member may start a frame. An error passive member waits longer, so that other members
@@ -124,8 +125,8 @@ impl TimedBus {
         self.recovers_by_itself = recovers;
     }
 
-    /// Adds a member. The new member acknowledges frames, receives all frames that end from now on, and repeats a frame
-    /// if sending fails.
+    /// Adds a member. The new member acknowledges frames, receives all frames that end after this call, and repeats a
+    /// frame if sending fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -182,8 +183,8 @@ impl TimedBus {
         self.members[member.0].acknowledges = acknowledges;
     }
 
-    /// Sets simulated faults between a member and the bus, for example those of a gateway. The simulated faults of a
-    /// member do not affect the bus itself.
+    /// Sets simulated faults between a member and the bus, for example the faults of a gateway. The simulated faults
+    /// of a member do not affect the bus itself.
     pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let send = Line::new(schedule.send, seeds.u64(..));
@@ -237,8 +238,8 @@ impl TimedBus {
         self.members[member.0].counters.state()
     }
 
-    /// Starts the recovery of a member that is bus-off. The member has recovered after it has seen 11 recessive bits
-    /// 128 times (ISO 11898-1), which takes 1408 bit times on an idle bus.
+    /// Starts the recovery of a member that is bus-off. The member has recovered after 128 sequences of 11 recessive
+    /// bits (ISO 11898-1). On an idle bus, this takes 1408 bit times.
     pub fn recover(&mut self, member: MemberId) {
         let recessive_from = self.transfer.is_none().then_some(self.now);
         let member = &mut self.members[member.0];
@@ -343,8 +344,8 @@ impl TimedBus {
         }
     }
 
-    /// Updates the recoveries when a frame has ended. The delimiter before the end of frame was the first of the 11
-    /// recessive bits.
+    /// Updates the members' recovery from bus-off when a frame has ended. The acknowledge delimiter or error
+    /// delimiter of the frame was the first of the 11 recessive bits.
     fn wire_is_recessive(&mut self) {
         let from = self.free_from.saturating_sub(self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -352,8 +353,8 @@ impl TimedBus {
         }
     }
 
-    /// Updates the recoveries when a frame begins. A sequence of fewer than 11 recessive bits before the frame does not
-    /// count.
+    /// Updates the members' recovery from bus-off when a frame begins. A sequence of fewer than 11 recessive bits
+    /// before the frame does not count.
     fn wire_is_taken(&mut self) {
         let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {

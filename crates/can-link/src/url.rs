@@ -150,7 +150,8 @@ fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
     Ok(CanUrl::Slcan { device: device.to_owned(), rate, data_rate, baud })
 }
 
-/// Splits a host name or a bracketed IPv6 address from its port, if the text contains a port.
+/// Returns the host name or IPv6 address without brackets, and the port. If the text contains no port, the port is
+/// `default`.
 fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> {
     let port = |text: &str| match text.parse() {
         Ok(0) | Err(_) => Err("the port is out of range (1..65535)"),

@@ -122,7 +122,7 @@ impl VirtualHub {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// Adds a member, which receives all frames that are sent from now on.
+    /// Adds a member, which receives all frames that are sent after this call.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }
@@ -179,7 +179,7 @@ pub struct VirtualBus {
     membership: Arc<Membership>,
 }
 
-/// Membership of a member; the member leaves the bus when its last handle is dropped.
+/// Membership of a bus. The member leaves the bus when its last handle is dropped.
 struct Membership {
     shared: Arc<Shared>,
     number: u64,
@@ -305,7 +305,7 @@ impl CanBus for VirtualBus {
         }
     }
 
-    /// A bus inside a process has no transmission errors.
+    /// Returns the state error active with counters of 0, because a bus inside a process has no transmission errors.
     fn state(&mut self) -> ControllerState {
         ControllerState::of_counters(0, 0)
     }

@@ -134,7 +134,7 @@ impl SlcanAdapter {
 
     fn execute(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
         let Some((command, rest)) = line.split_at_checked(1) else {
-            // Hosts send an empty line to clear earlier input.
+            // An empty line is accepted, because hosts send empty lines to clear earlier input.
             return self.reply("\r");
         };
         let digit = rest.parse::<usize>().ok().filter(|_| rest.len() == 1);
@@ -198,7 +198,7 @@ pub enum AdapterError {
     Bus(CanError),
 }
 
-/// Converts the result of a read without data or a write without space to 0. Such a read or write is not an error.
+/// Returns 0 for a read without data and for a write without space. Such a read or write is not an error.
 fn waited(result: io::Result<usize>) -> io::Result<usize> {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     result.or_else(|error| match error.kind() {

@@ -16,7 +16,7 @@ const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
 const VERSION_QUESTIONS: u32 = 3;
 /// Longest wait for the answers of an adapter to other commands.
 const ANSWER: Duration = Duration::from_millis(500);
-/// Time after which all bytes that the adapter sent for an earlier user have arrived.
+/// Waiting time after which all bytes that the adapter sent to a previous program have arrived.
 const QUIET: Duration = Duration::from_millis(30);
 /// Longest time for which an adapter may refuse a frame because its queue is full, or delay its answer.
 const SEND_TIMEOUT: Duration = Duration::from_secs(2);
@@ -127,9 +127,9 @@ impl SlcanBus {
         Ok(bus)
     }
 
-    /// Closes a channel that an earlier user has not closed, and checks that an adapter answers.
+    /// Closes a channel that a previous program has left open, and checks that an adapter answers.
     fn check_presence(&mut self) -> Result<(), CanError> {
-        // The first carriage return ends a line that an earlier user has left incomplete.
+        // The first carriage return ends a line that a previous program has left incomplete.
         self.write(b"\rC\r")?;
         let end = Instant::now() + ANSWER;
         while self.take_in(QUIET)? && Instant::now() < end {}
@@ -140,12 +140,12 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // The version is a text, so it cannot be an answer to an earlier line.
+                // Only the answer to the version request is a text, so this answer cannot belong to an earlier line.
                 if self.got_text {
                     return Ok(());
                 }
             }
-            // The adapter is connected, but does not support the version request.
+            // An adapter is connected, because bytes have arrived, but it does not support the version request.
             if somebody {
                 return Ok(());
             }
@@ -212,7 +212,8 @@ impl SlcanBus {
                         self.state = state;
                     } else if let Some(state) = parse_flags(line) {
                         self.got_flags = true;
-                        // The reported error counters stay valid as long as they agree with the error state.
+                        // This line contains no error counters. The counters that were reported earlier stay valid if
+                        // the error state is unchanged.
                         if self.state.errors != state.errors {
                             self.state = state;
                         }
@@ -247,7 +248,8 @@ impl SlcanBus {
                 Ok(0) if Instant::now() >= give_up => {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
-                // The adapter may wait until this host reads received frames.
+                // The adapter accepts no bytes, perhaps because it waits until this host reads received frames. The
+                // host therefore reads.
                 Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }
@@ -282,7 +284,8 @@ impl SlcanBus {
                 self.write(line.as_bytes())?;
             }
         } else if !self.confirms && now.saturating_duration_since(frame.since) >= ANSWER {
-            // The adapter answers during set-up, but does not confirm frames.
+            // The adapter answered during set-up, but does not confirm frames. From this point, the host does not
+            // wait for confirmations.
             self.answers = false;
             self.outstanding = None;
             return Ok(true);
@@ -354,7 +357,7 @@ impl CanBus for SlcanBus {
         if self.write(b"F\r").is_ok() {
             let end = Instant::now() + ANSWER;
             self.last_answer = None;
-            // A bell character means that the adapter refuses the command.
+            // The loop also ends when the adapter refuses the command with a bell character.
             while !self.got_flags && self.last_answer.is_none() && Instant::now() < end {
                 if self.take_in(SLICE).is_err() {
                     break;

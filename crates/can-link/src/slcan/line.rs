@@ -172,7 +172,7 @@ mod tests {
         parse_frame(line).map(|frame| format!("{frame:?}"))
     }
 
-    /// Examples from the manual and from the description of CANable 2.
+    /// The lines are examples from the LAWICEL manual and from the description of CANable 2.
     #[test]
     fn lines_are_frames() {
         for (line, expected) in [

@@ -81,7 +81,7 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     let counters = error.counters();
     match (errors, counters) {
         (None, None) => before,
-        // Counters of the previous state are not valid for the new one.
+        // The counters of the previous state are not valid for the new state, so the new state has no counters.
         (Some(errors), None) => ControllerState::without_counters(errors),
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));

@@ -51,7 +51,7 @@ mod tests {
         let mut tries = 0;
         let write = || {
             tries += 1;
-            // After all results of the list are used, the last result is repeated.
+            // When only one result of the list is left, each further call returns this result.
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };

@@ -131,7 +131,7 @@ impl SocketcandBus {
             return Err(CanError::Closed { url: self.url.clone() });
         }
         if !self.glued.is_empty() {
-            // At most the bytes of one read are stored.
+            // The stored bytes came from a single read, so they fit into the buffer.
             let count = self.glued.len();
             buffer[..count].copy_from_slice(&self.glued);
             self.glued.clear();
@@ -206,7 +206,7 @@ impl SocketcandBus {
                     give_up = Instant::now() + SEND_TIMEOUT;
                 }
                 Err(error) if is_no_data(&error) && Instant::now() < give_up => {
-                    // The socket may be in non-blocking mode.
+                    // In non-blocking mode the socket calls return at once. The pause prevents a busy loop.
                     if self.receive_queue.len() >= RECEIVE_QUEUE || !self.take_in(Some(SEND_SLICE))? {
                         std::thread::sleep(Duration::from_micros(200));
                     }

@@ -12,8 +12,8 @@ use super::text::{Request, has_form, push_frame, push_state};
 use crate::virtual_bus::Received;
 use crate::{CanBus, VirtualBus};
 
-/// Time after the answer to `rawmode` in which the server sends no frame, because python-can compares all bytes of one
-/// read with the answer.
+/// Time after the answer to `rawmode` in which the server sends no frame. python-can compares all bytes of one read
+/// with the answer, so the read must not contain a frame.
 const HELD_BACK: Duration = Duration::from_millis(20);
 /// Largest number of frames that are queued for a client: some seconds of a fully loaded bus.
 const WAITING: usize = 65_536;
@@ -62,7 +62,7 @@ struct Session<'a> {
 
 impl Session<'_> {
     fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
-        // Each answer must be sent at once in its own segment.
+        // TCP must send each answer at once, in its own segment.
         stream.set_nodelay(true)?;
         // Keep-alive detects that a client's computer was switched off.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
@@ -130,7 +130,8 @@ impl Session<'_> {
                     Route::Host(report) => return Ok(report(self.client, ClientAction::Sent(frame))),
                 }
             }
-            // In raw mode, python-can would parse the first word of an error text as a number, and fail.
+            // In raw mode the server sends no error text, because python-can would parse the first word of the text
+            // as a number, and fail.
             _ => {
                 self.not_understood(1);
                 if self.writer.is_none() {

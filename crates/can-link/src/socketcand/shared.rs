@@ -33,7 +33,7 @@ pub(super) enum Route {
     Host(Box<dyn Fn(ClientId, ClientAction) -> bool + Send + Sync>),
 }
 
-/// A bus of the server, in which clients are guests of the hub.
+/// A bus of the server. The clients are members of its hub for which no sender waits.
 pub(super) struct Channel {
     pub(super) name: String,
     pub(super) hub: VirtualHub,

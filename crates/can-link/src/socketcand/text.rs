@@ -17,7 +17,7 @@ pub(crate) enum Request<'a> {
     BcmMode,
     Echo,
     Send(CanFrame),
-    /// A `send` that is not a valid frame.
+    /// A `send` request that does not contain a valid frame.
     BadSend,
     Other,
 }
@@ -96,7 +96,7 @@ fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     Some(CanFrame::fd(id, &bytes::<64>(words)?).ok()?.with_brs(flags & 1 != 0))
 }
 
-/// Parses `CLASS TIME` or only `CLASS`. The words after these are only for display.
+/// Parses `CLASS TIME` or only `CLASS`. Returns `None` for other words, which are the text of a refusal.
 fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
     let class = words.next().filter(|word| word.len() <= 8 && is_hex(word))?;
     if let Some(time) = words.next() {

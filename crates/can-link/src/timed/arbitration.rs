@@ -6,7 +6,7 @@ use super::event::MemberId;
 use super::wire::{DOMINANT, WireBits, arbitration};
 use crate::CanFrame;
 
-/// A member at the start of a frame.
+/// A member that starts a frame.
 #[derive(Clone, Copy)]
 pub(super) struct Starter {
     pub(super) member: MemberId,
@@ -20,7 +20,7 @@ pub(super) struct Arbitration {
     pub(super) senders: Vec<MemberId>,
     /// Frame on the bus.
     pub(super) frame: CanFrame,
-    /// Number of bits from the start of the frame to the CRC, or to the error if the frame is destroyed.
+    /// Number of bits from the start of the frame to the end of the CRC, or to the error if the frame is destroyed.
     pub(super) bits: u32,
     /// All members that sent the winning identifier, if their frames differ after the identifier.
     pub(super) collision: Vec<MemberId>,
@@ -62,7 +62,8 @@ impl Arbitration {
                     failed,
                 });
             }
-            // A passive error flag is recessive, so the other members do not detect it.
+            // A passive error flag is recessive, so the other members do not detect it. Only the members that lost
+            // have failed to send.
             failed.extend(members(&lost));
             sending = on;
         }

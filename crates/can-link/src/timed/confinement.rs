@@ -31,8 +31,8 @@ impl Counters {
         self.tec = self.tec.saturating_add(8);
     }
 
-    /// Counts a missing acknowledgement. If the sender is passive, the counter stays unchanged, so that a single member
-    /// on a bus never goes bus-off because of missing acknowledgements.
+    /// Counts a missing acknowledgement. If the sender is error passive, the counter stays unchanged. A single member
+    /// on a bus therefore never goes bus-off because of missing acknowledgements.
     pub(crate) fn not_acknowledged(&mut self) {
         if !self.passive() {
             self.send_failed();

@@ -18,7 +18,7 @@ impl TimedBus {
         let frame = arbitration.frame;
         let mut senders = arbitration.senders;
         let destroyed = senders.is_empty();
-        // If a sender has left the bus, its frame is not complete.
+        // A sender that has left the bus has not completed its frame, so it is removed from the senders.
         senders.retain(|member| !self.members[member.0].left);
         if senders.is_empty() && !destroyed && error.is_none() {
             error = Some(BusError::Disturbed);

@@ -102,9 +102,8 @@ fn crc15(crc: u16, bit: bool) -> u16 {
 }
 
 /// Returns the arbitration key of a frame. The frame with the lowest key wins. Frames with equal keys do not lose
-/// arbitration against each other.
-/// The key begins with the base identifier. The next bit is the remote bit of an 11-bit frame, or the recessive
-/// substitute bit of a 29-bit frame, which has the same position.
+/// arbitration against each other. The key begins with the base identifier. The next bit is the remote bit of an
+/// 11-bit frame. In a 29-bit frame, the recessive substitute bit has the same position.
 pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     let (value, remote) = (frame.id().value(), u32::from(frame.is_remote()));
     if frame.is_extended() {

@@ -32,7 +32,8 @@ impl Running {
             let mut latest = None;
             while adapter.turn(&mut port, &mut bus).is_ok() {
                 if asked.load(Ordering::Relaxed) {
-                    // Bytes that were written before the stop request may still be in the terminal.
+                    // The thread ends when the host has closed the channel, or after 2 s. Bytes that the host wrote
+                    // before the stop request may still be in the terminal.
                     let latest = *latest.get_or_insert_with(|| Instant::now() + Duration::from_secs(2));
                     if !adapter.is_open() || Instant::now() >= latest {
                         break;

@@ -89,8 +89,8 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
             assert_eq!(client.ask("< open can0 >"), "< ok >");
             client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
-            // During this wait, frames that the server does not delay arrive. On a busy computer, delayed frames
-            // sometimes also arrive in this time.
+            // A frame that the server does not delay would arrive during these 3 ms. On a busy computer, the wait can
+            // take so long that delayed frames also arrive.
             std::thread::sleep(Duration::from_millis(3));
             let first = client.read();
             assert!(first.starts_with("< ok >"), "{first}");
@@ -249,7 +249,7 @@ fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
     until(|| server.stats().not_carried == 2);
     let stats = server.stats();
     assert!(stats.not_understood >= 9 && stats.received == 0, "{stats:?}");
-    // In the previous mode the client must not receive frames.
+    // The command `bcmmode` ends raw mode. The client must then receive no frames.
     assert_eq!(client.ask("< bcmmode >"), "< ok >");
     node.send(&numbered(8)).unwrap();
     assert_eq!(client.ask("< echo >"), "< echo >");

@@ -105,7 +105,7 @@ proptest! {
         prop_assert!(errors(&events).is_empty());
     }
 
-    /// Any sequence of calls must end, and equal calls must produce equal events.
+    /// Any sequence of calls must come to an end, and equal calls must produce equal events.
     #[test]
     fn any_calls_are_repeatable_and_end(calls in prop::collection::vec((0..9_u8, 0..5_usize, 0..40_u32, any::<u64>()), 1..120), seed in any::<u64>()) {
         let all = || {

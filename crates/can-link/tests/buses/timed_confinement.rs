@@ -20,7 +20,8 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
         .collect();
     let (active, passive) = (times[1] - times[0], times[101] - times[100]);
     assert_eq!(passive - active, 8000);
-    // A member that receives without acknowledging does not end the errors; the next member acknowledges.
+    // While the only other member does not acknowledge frames, the errors continue. They end when a member joins that
+    // acknowledges.
     let mute = bus.join();
     bus.set_acknowledges(mute, false);
     assert!(received(&run(&mut bus, 101 * MS), mute).is_empty());
@@ -55,8 +56,8 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     let events = run(&mut bus, 100 * MS);
     let is_back = |event: &TimedEvent| matches!(event.what, BusEvent::State { member, .. } if member == a);
     let back = events.iter().position(is_back).unwrap();
-    // No member acknowledges the frame of the other node, and each attempt to send this frame ends with 11 recessive
-    // bits.
+    // Only member `b` sends, and no member acknowledges its frame. Each attempt ends with 11 recessive bits, so
+    // member `a` recovers after 128 attempts.
     assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
     assert_eq!(received(&events, a), [frame(0x200, &[])]);
     bus.queue(a, frame(0x100, &[1])).unwrap();
@@ -76,8 +77,8 @@ fn recovery_on_an_idle_bus_takes_1408_bit_times() {
     assert_eq!((back.at_ns, bus.state(a).errors), (100 * MS + 1408 * 2000, ErrorState::Active));
 }
 
-/// ISO 11898-1: on a busy bus, each frame ends with one sequence of 11 recessive bits (including the intermission),
-/// so a controller recovers after 128 frames.
+/// ISO 11898-1: on a busy bus, each frame ends with one sequence of 11 recessive bits (including the intermission). A
+/// controller therefore recovers after 128 frames.
 #[test]
 fn recovery_on_a_busy_bus_takes_128_frames() {
     let mut bus = TimedBus::new(1_000_000, 7);
@@ -158,7 +159,8 @@ fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
         events.iter().filter(|e| matches!(e.what, BusEvent::Sent { .. })).map(|e| e.at_ns).collect();
     let times = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);
     assert!(times.into_iter().all(|at| sent.contains(&(at - MS))));
-    // A frame that is corrupted before the queue is a normal frame on the bus.
+    // A fault before the queue changes only the payload. On the bus, the frame is a valid frame, and it is received
+    // without an error.
     bus.set_faults(
         a,
         FaultSchedule {

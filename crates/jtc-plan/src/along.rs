@@ -32,16 +32,17 @@ pub(crate) fn unexplained(
     along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
-/// Planning method that was chosen for each section of a path. If a path is planned again, the planner reuses these methods. With equal
-/// methods, the time law changes continuously with the path.
+/// Planning method that was chosen for each section of a path. If a path is planned again, the planner reuses these
+/// methods, so that small changes of the path change the time law only slightly.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<Choice>>);
 
-/// Planning method of a section.
+/// Planning method for a section of a path from one stop to the next.
 #[derive(Clone, Copy, Debug)]
 enum Choice {
     InteriorPoint,
-    /// Law without a jerk limit, or law averaged over a time window with these shares of the limits.
+    /// Time law without a jerk limit (`None`), or time law averaged over a time window with these shares of the
+    /// limits.
     Other(Option<jerk::Shares>),
 }
 
@@ -106,7 +107,7 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let sections = ends.windows(2).map(|pair| {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
-        // Several waypoints may be at the same parameter of the path. Each waypoint at this parameter is counted.
+        // Counts the waypoints at a parameter of the path. Several waypoints may have the same parameter.
         let at = |place: f64| {
             waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
         };
@@ -134,7 +135,7 @@ fn of_section(
         .collect();
     let caps = caps(section, &cells, limits, arm)?;
     let plan = Plan { section, cells: &cells, reached: caps.clone(), caps, shares, limits, arm };
-    // On a straight line without torque limits, the averaged law is already the fastest law.
+    // On a straight line without torque limits, the time law averaged over a time window is already the fastest.
     let is_straight = cells.iter().all(Cell::is_straight);
     let found = match *chosen {
         Some(Choice::Other(_)) => None,
@@ -162,8 +163,8 @@ fn of_section(
     }
 }
 
-/// Returns the motion of a law without a jerk limit, or of a law averaged over a time window with the chosen shares of
-/// the limits.
+/// Returns the motion of a time law without a jerk limit, or of a time law averaged over a time window with the
+/// chosen shares of the limits.
 fn without_interior(
     mut plan: Plan,
     shares: Option<jerk::Shares>,
@@ -193,7 +194,8 @@ fn without_interior(
     Ok((best.ok_or("the time of the motion is not finite")?, shares))
 }
 
-/// Returns the highest squared speed of each cell that the velocity limits and the friction permit.
+/// Returns the highest squared path speed in each cell (short interval of the path) that the velocity limits and the
+/// friction permit.
 fn caps(
     section: &Section,
     cells: &[Cell],
@@ -212,15 +214,15 @@ fn caps(
     cells.iter().map(cap).collect()
 }
 
-/// Inputs of a time law.
+/// Data from which a time law is computed. A cell is a short interval of the path.
 pub(crate) struct Plan<'a> {
     pub section: &'a Section<'a>,
     pub cells: &'a [Cell],
     /// Highest squared path speed in each cell.
     pub caps: Vec<f64>,
-    /// Squared speed in each cell up to which friction is evaluated.
+    /// Squared path speed in each cell up to which friction is evaluated.
     pub reached: Vec<f64>,
-    /// Factor that reduces the speed in each cell of the path.
+    /// Factor by which the path speed in each cell is reduced.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
@@ -230,26 +232,28 @@ pub(crate) struct Plan<'a> {
 pub(crate) struct Made {
     pub law: Law,
     pub motion: Motion,
-    /// Shares of the limits that a jerk-limited law uses; `None` for a law without a jerk limit.
+    /// Shares of the limits that a time law with a jerk limit uses; `None` for a time law without a jerk limit.
     pub shares: Option<jerk::Shares>,
 }
 
-/// Number of times that an interior-point law is repaired. A repair slows down each cell in which a limit is violated
-/// between samples.
+/// Number of repairs of a time law that the interior-point method has found. A repair slows down each cell of the
+/// path in which a limit is violated between samples.
 const INTERIOR_REPAIRS: usize = 1;
-/// Largest number of cells for which laws averaged over a time window are also tried.
+/// Largest number of path cells for which time laws averaged over a time window are also tried.
 const FEW: usize = 200;
-/// Number of times that a section is planned with torque limits.
+/// Maximum number of rounds in which a section is planned with torque limits.
 const TORQUE_ROUNDS: usize = 4;
-/// Minimum share of the duration that a round must save. If a round saves less, it is the last round.
+/// Minimum reduction of the duration by a round, as a share of the duration. If a round reduces the duration by less,
+/// it is the last round.
 const WORTH: f64 = 0.004;
 /// Largest factor between a cell's speeds in two consecutive rounds.
 const FASTER: f64 = 1.1;
 
-/// Number of times that single cells are slowed down because a limit is violated between samples. If a limit is still
-/// violated, the whole motion is slowed down.
+/// Maximum number of repairs. A repair slows down the cells of the path in which a limit is violated between samples.
+/// If a limit is still violated after the last repair, the whole motion is slowed down.
 const REPAIRS: usize = 4;
-/// Time factor up to which no further cells are slowed down. If all cells need at most this factor, the whole motion is slowed down.
+/// Largest time factor (new duration divided by old duration) for which no repair is made. If all cells need at most
+/// this factor, the whole motion is slowed down instead.
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
@@ -259,7 +263,7 @@ impl Plan<'_> {
         if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
-    /// Returns a squared speed for each cell, slightly above the highest squared speed of a law in this cell, but at
+    /// Returns a squared speed for each cell, slightly above the highest squared speed of `law` in this cell, but at
     /// most the cap of the cell.
     fn reached_by(&self, law: &Law) -> Vec<f64> {
         let speed = |s: f64| law.at(law.time_of(s)).1;
@@ -298,7 +302,8 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns, for each cell, the time factor with which the motion keeps all limits.
+    /// Returns, for each cell, the time factor (new duration divided by old duration) with which the motion keeps all
+    /// limits.
     pub(crate) fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

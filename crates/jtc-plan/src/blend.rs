@@ -25,7 +25,7 @@ const BACK: f64 = 0.05;
 /// The path parameter is the distance in rad that the joint with the largest movement covers along the straight legs.
 #[derive(Clone, Debug)]
 pub struct BlendedPath {
-    /// Corners without repetitions.
+    /// Corners, without consecutive equal positions.
     corners: Vec<Corner>,
     /// Location on the path of each waypoint of the request.
     given: Vec<Given>,
@@ -264,7 +264,8 @@ impl Path for BlendedPath {
         let mut breaks = Vec::with_capacity(4 * inner.len());
         for corner in inner {
             if corner.half > 0.0 {
-                // If two adjacent rounded corners touch, they share one break.
+                // If two adjacent rounded corners touch, the end of the first and the beginning of the second are one
+                // break.
                 let begin = corner.parameter - corner.half;
                 if breaks.last().is_none_or(|last| begin > last + 0.01 * corner.half) {
                     breaks.push(begin);

@@ -1,4 +1,5 @@
-//! Division of a section of a path into cells, with the effect of the joint limits on the path parameter.
+//! Division of a path section into cells (short intervals), and the limits of the path parameter in each cell that
+//! follow from the joint limits.
 use jtc_wire::Joint;
 
 use crate::compose::Section;
@@ -6,29 +7,29 @@ use crate::path::PathPoint;
 use crate::profile::Bounds;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Number of cells into which each part of a path is divided.
+/// Number of cells into which each smooth part of a path is divided.
 struct Division {
     straight: usize,
     curved: usize,
-    /// Smallest number of cells of a path that has few parts.
+    /// Smallest number of cells of the whole path, for a path that has few parts.
     least: usize,
 }
 
 const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
-/// Division for a law whose acceleration changes only at the ends of cells.
+/// Division for a time law whose acceleration changes only at the ends of the cells.
 const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
-/// Share of the torque available for motion that the path speed may use.
+/// Maximum share of the torque available for motion that the term proportional to the squared path speed may use.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
 /// Minimum share of the torque limit that must be available for motion when friction increases with the speed. If less
 /// torque is available for motion, the speed is reduced.
 const MOTION_SHARE: f64 = 0.05;
-/// Share of the torque above the holding torque that must remain available for motion, if this torque is smaller than
-/// [`MOTION_SHARE`] of the limit.
+/// If the torque left at standstill (usable torque minus holding torque and breakaway friction) is small, only this
+/// share of it must remain available for motion, instead of [`MOTION_SHARE`] of the limit.
 const STANDING_SHARE: f64 = 0.5;
-/// Share of the torque limit that is sufficient for a slow motion.
+/// Share of the torque limit that is sufficient for a slow motion, and that must always remain available for motion.
 const CREEP_SHARE: f64 = 0.002;
 
 /// Parts of the torque at a point, N·m. With q̈ = q′·s̈ + q″·ṡ² the torque is hold + mass·s̈ + speed·ṡ², plus friction.
@@ -52,14 +53,14 @@ impl Loads {
     }
 }
 
-/// Quantities at one end of a cell.
+/// Point of the path at one end of a cell, and the torques at this point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct End {
     pub point: PathPoint,
     pub loads: Option<Loads>,
 }
 
-/// Part of a section on which the path is a single smooth curve.
+/// Short interval of a path section, on which the path is a single smooth curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
     /// Range of the parameter, from the start of the section.
@@ -70,8 +71,8 @@ pub(crate) struct Cell {
     pub third: JointVec,
 }
 
-/// Returns the cells of a section. If `fine` is set, the cells are smaller, for a law whose acceleration changes only
-/// at the ends of the cells.
+/// Returns the cells of a section. If `fine` is set, the cells are smaller, for a time law whose acceleration changes
+/// only at the ends of the cells.
 pub(crate) fn cells(
     section: &Section,
     arm: Option<&ArmDynamics>,
@@ -86,7 +87,8 @@ pub(crate) fn cells(
         let is_straight = inside.iter().all(|p| p.second == [0.0; JOINTS]);
         let count = if is_straight { division.straight } else { division.curved };
         let count = count.max(division.least / section.parts_of_path);
-        // Near a point at which the arm is at rest, the speed changes within a short distance.
+        // Near a point at which the arm is at rest, the speed changes within a short distance, so the cells there are
+        // shorter.
         let (begins, ends) = (from == section.from && !fine, to == section.to && !fine);
         let share = |i: usize| {
             let u = i as f64 / count as f64;
@@ -144,7 +146,7 @@ pub(crate) struct Room {
     limit: JointVec,
 }
 
-/// Returns the torque of a joint (N·m) that a plan may use if the holding torque is `hold`.
+/// Returns the torque of the joint with index `j` (N·m) that a plan may use if the holding torque is `hold`.
 pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold: f64) -> f64 {
     TORQUE_SHARE * arm.usable_torque(limits, j, hold)
 }

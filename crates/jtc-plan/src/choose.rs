@@ -8,8 +8,8 @@ use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanErro
 
 /// Maximum distances of dropped waypoints from the straight line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// If thinning divides the number of corners by this factor or more, and there is a jerk limit, only the thinned paths
-/// are planned.
+/// If removing waypoints divides the number of corners by this factor or more, and there is a jerk limit, only the
+/// paths with removed waypoints are planned.
 const DENSE: usize = 8;
 /// Number of rounds in which rounded corners are replaced by stops.
 const ROUNDS: usize = 5;
@@ -68,7 +68,8 @@ pub(crate) fn fastest(
                 _ => break,
             }
         }
-        // If the best path already stops at all corners, another plan with these stops would give the same motion.
+        // If the best path already stops at all corners, planning the path with all stops would give the same motion
+        // again.
         let is_planned =
             |best: &Timed| best.path.corners() == all_stops.corners() && best.path.stops_everywhere();
         let with_stops: f64 = all_stops.legs().map(|(a, b)| rest_to_rest(&a, &b, &line_limits)).sum();

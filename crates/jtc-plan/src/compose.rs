@@ -4,14 +4,15 @@ use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Minimum duration of a piece with a jerk limit, s. In a shorter piece, rounding errors dominate the third derivative.
+/// Minimum duration of a polynomial piece of a motion with a jerk limit, s. In a shorter piece, rounding errors
+/// dominate the third derivative.
 const SHORTEST: f64 = 2e-4;
-/// Minimum duration of a piece without a jerk limit, s. In a shorter piece, rounding errors dominate the second
-/// derivative.
+/// Minimum duration of a polynomial piece of a motion without a jerk limit, s. In a shorter piece, rounding errors
+/// dominate the second derivative.
 const SHORTEST_WITHOUT_JERK: f64 = 1e-5;
-/// Largest distance between the middle of a piece and the path, rad.
+/// Largest distance between the middle of a polynomial piece and the path, rad.
 const AWAY: f64 = 1e-9;
-/// Largest error of the acceleration in the middle of a piece, as a share of the acceleration limit.
+/// Largest error of the acceleration in the middle of a polynomial piece, as a share of the acceleration limit.
 const ACCELERATION_AWAY: f64 = 1e-3;
 /// Maximum number of times that a piece is halved to stay within the two error limits above.
 const HALVINGS: u8 = 7;
@@ -31,7 +32,8 @@ pub(crate) struct Section<'a> {
 }
 
 impl Section<'_> {
-    /// Returns position and derivatives at the parameter `s`, evaluated inside the part `side` between two breaks.
+    /// Returns position and derivatives at the parameter `s`. `side` is a part between two breaks. If `s` is a break,
+    /// the derivatives are those inside `side`.
     pub(crate) fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
         self.path.at(s.clamp(side.0.next_up(), side.1.next_down().max(side.0.next_up())))
     }
@@ -91,7 +93,7 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// Adds the pieces of the motion in this part. If the motion of one piece leaves the path, the piece is halved.
+    /// Adds the polynomial pieces of the motion in this part. A piece that deviates too far from the path is halved.
     fn pieces(&self, pieces: &mut Vec<Piece>, halvings: u8) {
         let (from, to) = (self.from, self.to);
         if to <= from {
@@ -123,7 +125,8 @@ impl Part<'_> {
         })
     }
 
-    /// Returns the state at `time`, just after (1) or just before (−1) a jump.
+    /// Returns the state at `time`. If the acceleration jumps at `time`, returns the state just after the jump
+    /// (`after` = 1) or just before the jump (−1).
     fn state(&self, time: f64, after: f64) -> State {
         let (s, v, a) = self.law.beside(time, after);
         let at = self.section.at(self.section.from + s, self.side);

@@ -18,7 +18,7 @@ use spline::knot;
 use crate::along::Plan;
 use crate::law::Law;
 
-/// Share of the total time that the barriers may cost, for each round.
+/// Share of the total time that the barriers may add, one value for each round.
 const GAPS: [f64; 3] = [0.2, 0.04, 0.008];
 /// Maximum number of steps in each round.
 const STEPS: usize = 12;
@@ -27,18 +27,19 @@ const STEPS: usize = 12;
 const WORTH: f64 = 0.25;
 /// Smallest fraction of a Newton step that the line search tries.
 const SHORTEST: f64 = 1e-3;
-/// Factors for reducing squared speeds that are outside the limits, and maximum number of reductions.
+/// Factors that reduce squared speeds outside the limits (in the first search and in later searches), and maximum
+/// number of reductions.
 const LOWER: f64 = 0.85;
 const LOWER_AGAIN: f64 = 0.97;
 const LOWER_MAX: usize = 100;
 
-/// Problem of minimising the time and the barriers.
+/// Optimisation problem: minimises the duration plus the barriers of all limits.
 struct Problem<'a> {
     plan: &'a Plan<'a>,
     places: Vec<Place>,
     /// Knots of the spline, between the first and the last cell.
     knots: Vec<f64>,
-    /// Ratio of the first and of the last coefficient to its neighbouring coefficient.
+    /// Ratio of the first coefficient to its neighbour, and of the last coefficient to its neighbour.
     ties: (f64, f64),
     /// Number of limits.
     limits: f64,
@@ -106,7 +107,7 @@ impl<'a> Problem<'a> {
         None
     }
 
-    /// Shortens the time. In each round, the barriers cost one of the shares in `gaps` of the time.
+    /// Shortens the duration. In each round, the barriers may add one of the shares in `gaps` to the duration.
     fn improve(&self, c: &mut Vec<f64>, gaps: &[f64]) {
         for gap in gaps {
             let time = self.value(c, 0.0);
@@ -187,7 +188,7 @@ impl<'a> Search<'a> {
         Some(Self { plan, c, found: false })
     }
 
-    /// Returns the fastest law with a time factor for each cell.
+    /// Returns the fastest time law in which each cell is slowed down by its time factor in `slower`.
     pub(crate) fn fastest(&mut self, slower: &[f64]) -> Option<Law> {
         let problem = Problem::new(self.plan, slower)?;
         if self.found {

@@ -14,20 +14,21 @@ use crate::{JOINTS, Limits};
 
 /// Factor of the acceleration from one attempt to the next. With a lower acceleration, the ramps are shorter.
 const LOWER: f64 = 0.7;
-/// Maximum number of attempts.
+/// Maximum number of accelerations that are tried.
 const ATTEMPTS: usize = 24;
 /// Shares of acceleration and jerk that the curvature may use, in the order of the attempts. If the speed is constant
 /// in curves, the curvature may use nearly the whole limit. If the speed must change in curves, the curvature may use
 /// less.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// Time factor up to which no further cells are slowed down. If all cells need at most this factor, the whole motion is slowed down.
+/// Largest time factor (new duration divided by old duration) for which no cell is slowed down further. If all cells
+/// need at most this factor, the whole motion is slowed down instead.
 const LEFT_OVER: f64 = 1.002;
-/// Like [`LEFT_OVER`], for an interior-point law.
+/// Like [`LEFT_OVER`], for a time law that the interior-point method has found.
 const LITTLE: f64 = 1.005;
 /// Share of the jerk limit from which the length of the window is computed.
 const JERK_SHARE: f64 = 0.995;
 
-/// Shares of the limits that a law uses.
+/// Shares of the limits that a time law uses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shares {
     /// Share of the acceleration along the path.
@@ -36,8 +37,8 @@ pub(crate) struct Shares {
     curvature: f64,
 }
 
-/// Returns the best of several laws with different shares of the limits. If `shares` is set, returns the law with these
-/// shares.
+/// Returns the best of several time laws with different shares of the limits. If `shares` is set, returns the time
+/// law with these shares.
 pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Result<Made, String> {
     let none = || String::from("no attempt took a finite time");
     let shares = shares.or_else(|| best_shares(plan)).ok_or_else(none)?;
@@ -50,10 +51,11 @@ pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Re
     Ok(Made { law: best.law, motion: best.motion, shares: Some(shares) })
 }
 
-/// Shares of the law from which the interior-point method starts.
+/// Shares of the limits for the time law from which the interior-point method starts.
 const SEED: Shares = Shares { acceleration: LOWER * LOWER, curvature: CURVATURE_SHARES[0] };
 
-/// Returns the motion found by the interior-point method, if it is faster than the law from which the method starts.
+/// Returns the motion found by the interior-point method, if it is faster than the time law from which the method
+/// starts.
 pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
     let bounds = bounds(plan, SEED);
     let window = window(plan.cells, &bounds, plan.limits);
@@ -110,8 +112,8 @@ fn best_shares(plan: &Plan) -> Option<Shares> {
 fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     let of_cell = |(i, cell): (usize, &Cell)| {
         let bounds = cell.bounds(plan.caps[i], plan.reached[i], shares.curvature, plan.limits, plan.arm);
-        // The limits of the squared speed and of the acceleration in a cell are reduced by the squared speed factor of
-        // the cell.
+        // The limits of squared speed and acceleration in a cell are multiplied by the square of the cell's speed
+        // factor.
         let slow = plan.shares[i] * plan.shares[i];
         let (up, down) = (bounds.up * slow * shares.acceleration, bounds.down * slow * shares.acceleration);
         Bounds { cap: bounds.cap * slow, up, down, ..bounds }
@@ -135,13 +137,13 @@ impl Attempt {
         Self { law, motion, slower }
     }
 
-    /// Returns the duration (s) of the motion after the whole motion is slowed down.
+    /// Returns the duration (s) of the motion after the whole motion is slowed down until it keeps all limits.
     fn duration(&self) -> f64 {
         self.motion.duration() * self.slower.iter().copied().fold(1.0, f64::max)
     }
 
-    /// Slows down the cells in which a limit is violated, up to `repairs` times. Keeps the motion that is shortest
-    /// after the whole motion is slowed down.
+    /// Slows down the cells in which a limit is violated, up to `repairs` times. Keeps the attempt that is shortest
+    /// after the whole motion is slowed down until it keeps all limits.
     fn repair(&mut self, plan: &Plan, mut bounds: Vec<Bounds>, repairs: usize) {
         let mut slower = self.slower.clone();
         for _ in 0..repairs {

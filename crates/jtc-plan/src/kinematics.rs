@@ -54,7 +54,7 @@ pub struct Kinematics {
     limits: [(f64, f64); JOINTS],
     /// Geometry of the arm, if it has a closed form.
     exact: Option<Geometry>,
-    /// Geometry with a closed form that is close to the arm.
+    /// Closed-form geometry that is close to the geometry of the arm.
     near: Option<Geometry>,
 }
 
@@ -133,7 +133,7 @@ impl Kinematics {
         singular::nearest(&self.chain, geometry, &self.chain.at(q))
     }
 
-    /// Returns the principal values of all solutions, ignoring the limits.
+    /// Returns all solutions with each joint within (−π, π], ignoring the position limits.
     fn solutions(&self, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let mut found = Vec::new();
         if let Some(geometry) = self.exact.as_ref().or(self.near.as_ref()) {

@@ -126,7 +126,7 @@ impl Law {
             let now = |t: f64| if t >= self.duration() { (self.end, 0.0, 0.0) } else { self.at(t) };
             let (head, tail) = (now(start), now(start - window));
             let (speed, acceleration) = ((head.0 - tail.0) / window, (head.1 - tail.1) / window);
-            // In the middle of a phase, the acceleration does not jump.
+            // The acceleration is evaluated in the middle of the phase, because it may jump at the ends.
             let middle = start + 0.5 * length;
             let inside = |t: f64| if t <= 0.0 { 0.0 } else { now(t).2 };
             let jerk = (inside(middle) - inside(middle - window)) / window;

@@ -92,7 +92,7 @@ impl Limits {
                 (LimitKind::Torque, self.torque[j], true),
             ] {
                 let positive = value > 0.0 && (value.is_finite() || !finite);
-                // The squares and cubes of smaller limits would be lost in rounding errors.
+                // Smaller limits are rejected, because their squares and cubes would be lost in rounding errors.
                 if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
                     return Err(PlanError::Limit { joint, limit, value });
                 }

@@ -6,7 +6,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Limits in a part of a section of a path.
+/// Limits of the speed and acceleration of the path parameter in one interval of a section.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     pub from: f64,

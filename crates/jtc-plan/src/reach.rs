@@ -29,7 +29,7 @@ pub(crate) fn fastest(
 ) -> Result<Vec<(f64, f64)>, String> {
     let places: Vec<f64> = cells.iter().map(|c| c.from).chain(cells.last().map(|c| c.to)).collect();
     let count = places.len();
-    // Lower one of the caps before and after a point.
+    // Returns the lower of the caps in the cells before and after point `i`.
     let cap = |i: usize| {
         let (left, right) = (caps[i.saturating_sub(1)], caps[i.min(count - 2)]);
         left.min(right).clamp(1e-18, 1e18)
@@ -93,7 +93,7 @@ struct Step {
 impl Step {
     /// Creates the step between two points with these rows and caps. At the second point, ṡ² is larger by 2·length·s̈.
     fn new(rows: [Rows; 2], caps: [f64; 2], length: f64) -> Self {
-        // |s̈| is at most highest/(2·length).
+        // |s̈| is at most highest/(2·length), because ṡ² changes by at most `highest` within the step.
         let (mut cap, highest) = (caps[0], caps[0].max(caps[1]));
         let (mut upper, mut lower) = (Vec::new(), Vec::new());
         for (rows, added) in rows.iter().zip([0.0, 2.0 * length]) {
@@ -262,8 +262,8 @@ mod tests {
         assert_eq!((step.highest(1.0), step.highest(9.0)), (1.0, 4.0));
     }
 
-    /// Returns the largest x of a linear program in two variables with the rows a·x + b·u ≤ c, from all corners of the
-    /// feasible area.
+    /// Returns the largest x of a linear program in two variables with the rows a·x + b·u ≤ c. The function compares
+    /// all corners of the feasible area.
     fn largest_of_the_corners(rows: &[(f64, f64, f64)]) -> f64 {
         let mut largest: f64 = 0.0;
         for (i, (a, b, c)) in rows.iter().enumerate() {

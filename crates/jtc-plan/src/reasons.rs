@@ -13,8 +13,8 @@ const SAMPLES_MAX: f64 = 4000.0;
 /// A limit that is reached within this time before or after an instant may be the binding limit of this instant, s. Acceleration ramps can
 /// last as long as this time. For example, a motion is slow before a corner because of a limit that is reached in the corner.
 const NEAR: f64 = 0.05;
-/// Share of the torque limit below which the torque is considered holding torque. Holding torque does not depend on the
-/// speed.
+/// Share of the usable torque below which the torque is not reported as the binding limit. Such a torque may be
+/// mainly holding torque, which does not depend on the speed.
 const TORQUE: f64 = 0.9;
 /// Minimum duration of an interval, s. Shorter intervals are merged into the previous interval.
 const SHORT: f64 = 0.004;
@@ -56,7 +56,8 @@ pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) 
     Reasons { used_up: runs(used_up, step), otherwise }
 }
 
-/// Returns the limit with the highest use at `time`, and the limit that the motion reaches, if there is one.
+/// Returns the limit with the highest use (see [`Use`]) at `time`, and the limit that the motion reaches, if there is
+/// one.
 fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> (Use, Option<Use>) {
     let state = motion.at(time);
     // The holding torque is computed only if the torque is near the usable limit.
@@ -92,9 +93,10 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
     (most, used_up)
 }
 
-/// Returns the highest use within `reach` samples of each sample.
+/// Returns, for each sample, the highest use of a limit among all samples at a distance of at most `reach` samples.
 fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
-    // Indices of samples in descending order of the use. The first index has the highest use within `reach` samples.
+    // Indices of samples, in descending order of their use. The use of the first index is the highest within `reach`
+    // samples.
     let mut falling: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
     let mut next = 0;
     let at = |i: usize| {
@@ -113,7 +115,7 @@ fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
     (0..uses.len()).map(at).collect()
 }
 
-/// Merges equal consecutive samples into intervals.
+/// Merges consecutive samples with the same binding limit into intervals.
 fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) -> Vec<Binding> {
     let mut runs: Vec<Binding> = Vec::new();
     for (i, sample) in samples.enumerate() {

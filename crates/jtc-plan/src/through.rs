@@ -13,14 +13,14 @@ use crate::{
 const ON_TIME: f64 = 5e-4;
 /// Maximum number of corrections of the speeds between specified times.
 const CORRECTIONS: usize = 60;
-/// Target duration, as a share of the requested time, when the speed is reduced. A uniform slowdown then adds the
-/// missing time.
+/// Target duration of a part that is slowed down, as a share of the requested duration. A uniform slowdown then adds
+/// the missing time.
 const AIM: f64 = 0.98;
 /// Factor for the shortest time in an error, if only the adjacent legs prevent the specified time. With this factor,
 /// the reported time is always possible.
 const SURE: f64 = 1.05;
-/// After each failed attempt, the speed factor of parts without a specified time is multiplied by `ROOM`. The lowest
-/// value of this speed factor is `ROOM_MIN`.
+/// Factor that reduces the speed of parts without a specified time after each failed attempt. `ROOM_MIN` is the
+/// lowest speed factor of these parts.
 const ROOM: f64 = 0.97;
 const ROOM_MIN: f64 = 0.8;
 /// Maximum number of consecutive attempts in which a part takes too long at full speed. The speeds of the adjacent
@@ -90,7 +90,7 @@ pub fn through(
         return Ok(reasons::explained(chosen.motion, limits, arm));
     }
     match on_time(&path, &given, limits, arm) {
-        // A different path may be fast enough.
+        // Another path within the blends of the waypoints may be fast enough.
         Err(PlanError::TooEarly { .. }) if blend > 0.0 => {
             let chosen = choose::fastest(path, blend, &keep, limits, arm)?;
             on_time(&chosen.path, &given, limits, arm)
@@ -161,7 +161,7 @@ struct Stretch {
     wanted: f64,
     /// Speed factor.
     share: f64,
-    /// Number of consecutive attempts in which the stretch took too long at full speed.
+    /// Number of consecutive attempts in which this part of the motion took too long at full speed.
     late: usize,
 }
 
@@ -199,8 +199,9 @@ fn on_time(
     Ok(motion)
 }
 
-/// Corrects the times of stretches in which the arm moves. Reduces the speed of each stretch until the duration of the stretch is close to
-/// its specified duration. A change of rate then corrects the remaining difference.
+/// Makes the motion keep the specified times in the stretches (parts between two specified times) in which the arm
+/// moves. Reduces the speed of each stretch until its duration is close to the specified duration. The module `warp`
+/// then corrects the remaining difference.
 fn moving_on_time(
     path: &impl Waypointed,
     stretches: &mut [Stretch],
@@ -221,8 +222,8 @@ fn moving_on_time(
             let is_late = s.share >= 1.0 && s.takes(&motion) > s.wanted + ON_TIME;
             s.late = if is_late { s.late + 1 } else { 0 };
         }
-        // A stretch that takes too long may still become faster if the adjacent stretches become faster. The motion of
-        // the first attempt is the fastest motion, so none of its stretches can become faster.
+        // A part that takes too long may still become faster if the adjacent parts become faster. In the first
+        // attempt all parts have their highest speed, so none of them can become faster.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
             return Err(too_early(late, motion, limits, arm));
@@ -232,7 +233,7 @@ fn moving_on_time(
         if stretches.iter().all(|s| is_near(s) || between_rests(s)) {
             let warped = warp::warped(&motion, &parts(stretches, &motion), limits);
             let warped = verify::finished(warped, limits, arm)?;
-            // The timing errors of all stretches add up.
+            // The time error at a waypoint is the sum of the errors of all parts before this waypoint.
             let mut off = 0.0;
             let on_time = stretches.iter().all(|s| {
                 off += s.takes(&warped) - s.wanted;
@@ -249,7 +250,8 @@ fn moving_on_time(
             s.share = (s.share * damped).clamp(SLOWEST, 1.0);
         }
     }
-    // In a stretch at full speed, the limits leave no margin for a change from one rate to the next.
+    // All attempts have failed: next to a part at full speed, the limits leave no margin for a change of speed. The
+    // error reports the part with the smallest time margin.
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {
@@ -258,7 +260,8 @@ fn moving_on_time(
     }
 }
 
-/// Returns the stretches, and the parts without a specified time between two stretches, as parts of a motion.
+/// Returns all parts of the motion for a change of its timing: the stretches between two specified times, and the
+/// parts without a specified time.
 fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     let times = &motion.waypoint_times;
     let mut parts = Vec::with_capacity(stretches.len() + 1);
@@ -276,7 +279,8 @@ fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     parts
 }
 
-/// Returns the error for a stretch that takes longer than permitted, with the limit that determines its duration.
+/// Returns the error for a part between two specified times that takes too long, with the limit that determines its
+/// duration.
 fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> PlanError {
     let motion = reasons::explained(motion, limits, arm);
     let (from, to) = (motion.waypoint_times[late.from], motion.waypoint_times[late.to]);

@@ -32,7 +32,7 @@ const STEPS: usize = 128;
 /// Lowest and highest friction (N·m) of each joint over all speeds from 0 up to each step, backward and forward.
 #[derive(Clone, Debug)]
 struct FrictionRanges {
-    /// Step of speed, rad/s.
+    /// Difference between two consecutive speed steps, rad/s.
     step: JointVec,
     ranges: Vec<[[(f64, f64); STEPS + 1]; 2]>,
 }
@@ -69,8 +69,8 @@ impl<'a> ArmDynamics<'a> {
         self.friction.is_some()
     }
 
-    /// Returns the speed at which the sign of the friction polynomial reaches ±1, rad/s; `None` if the friction is not
-    /// a polynomial.
+    /// Returns the speed at which the smoothed sign function of the friction polynomial reaches ±1, rad/s; `None` if
+    /// the friction is not a polynomial.
     pub(crate) fn sign_width(&self) -> Option<f64> {
         matches!(self.friction, Some(Friction::Polynomial(_))).then_some(self.sign_width)
     }
@@ -100,7 +100,8 @@ impl<'a> ArmDynamics<'a> {
         if step <= STEPS {
             return (low, high);
         }
-        // The requested speed is above the stored range of speeds, which ends at the highest speed of the arm.
+        // The requested speed is above the stored range of speeds, which ends at the highest speed of the arm. The
+        // friction at this speed is therefore computed.
         let friction = self.frictions(j, fastest);
         (low.min(friction.0), high.max(friction.1))
     }
@@ -153,8 +154,8 @@ impl<'a> ArmDynamics<'a> {
         ((1.0 - margin) * whole).max(needed).min(whole)
     }
 
-    /// Returns the breakaway friction of the joint with index `j`, N·m. The breakaway friction is the highest friction up to the speed at
-    /// which the sign of the friction reaches ±1.
+    /// Returns the breakaway friction of the joint with index `j`, N·m. The breakaway friction is the highest
+    /// friction up to the speed at which the smoothed sign function of the friction polynomial reaches ±1.
     pub(crate) fn breakaway(&self, j: usize) -> f64 {
         let of = |speed: f64| {
             let (low, high) = self.friction_range(j, speed);

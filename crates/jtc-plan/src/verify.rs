@@ -11,7 +11,8 @@ const ROUNDING: f64 = 1e-9;
 const TORQUE_STEP: f64 = 0.004;
 /// Share of the torque limit that the torque may reach at the samples. Between samples, the torque may be higher.
 const TORQUE_SHARE: f64 = 0.9985;
-/// Time factor above which the limit that required the slowdown is considered binding.
+/// Time factor (new duration divided by old duration) of a slowdown above which its cause is reported as the binding
+/// limit.
 const MUCH: f64 = 1.01;
 /// Maximum number of torque samples. In a longer motion, the samples are further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
@@ -53,8 +54,8 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// Returns the time factor that a piece needs to keep the velocity, acceleration and jerk limits. The factor is below 1
-/// if the piece already keeps these limits.
+/// Returns the time factor (new duration divided by old duration) that a piece needs to keep the velocity,
+/// acceleration and jerk limits. The factor is below 1 if the piece could be faster.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
@@ -179,7 +180,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     };
     let mut factor = 1.0;
     let mut slowed = None;
-    // Loads that have exceeded the torque limit so far. Most loads never exceed the limit.
+    // Points of the motion that have exceeded the torque limit so far. Most points never exceed the limit.
     let mut some: Vec<&Load> = Vec::new();
     loop {
         let before = some.len();
@@ -267,8 +268,8 @@ pub(crate) fn holds(
 
 /// Returns the times at which the torque of a piece is sampled, in seconds after its start. The list contains both
 /// ends, because the acceleration may jump at the ends, and times between the ends that are at most `step` apart. The
-/// list also contains the times at which the sign of the friction of a joint reaches ±1. A piece with higher
-/// accelerations inside than at its ends has more sample times.
+/// list also contains the times at which the smoothed sign function of a joint's friction reaches ±1. A piece with
+/// higher accelerations inside than at its ends has more sample times.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
     let count = (piece.length / step).ceil().max(least) as usize;

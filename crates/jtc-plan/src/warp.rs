@@ -6,7 +6,8 @@ use crate::law::{Law, Phase};
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 
-/// Maximum duration of a change of rate, in s, and as a share of the duration of the shorter adjacent part.
+/// Maximum duration of a change from one rate to the next, in s, and as a share of the duration of the shorter
+/// adjacent part.
 const CHANGE: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.4;
 /// Speed below which a motion is considered at rest, rad/s.
@@ -58,7 +59,7 @@ pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion
 
 /// Stretches each part separately, because all parts begin and end at rest.
 fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
-    // Values for each part: end of the previous part, start before and after stretching, and time factor.
+    // Values for each part: end of the part, start before and after stretching, and time factor.
     let (mut before, mut after) = (0.0, 0.0);
     let mut scales = Vec::with_capacity(parts.len());
     for part in parts {
@@ -115,8 +116,8 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates with which each part has its requested duration. Each change of rate is half in the part before
-/// the change and half in the part after the change.
+/// Returns the rates (speed factors) with which each part has its requested duration. The first half of each change
+/// of rate is in the part before the change, and the second half is in the part after it.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
     // Half a change of rate changes the distance of a part by the difference of the rates times 1/12 of the change's

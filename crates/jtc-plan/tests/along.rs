@@ -212,7 +212,7 @@ fn a_long_move_is_bound_by_the_speed_of_the_joint_that_goes_farthest() {
     assert_eq!((first.from, first.limit), (0.0, LimitKind::Jerk));
 }
 
-/// At half of the speed, the duration of a motion is twice as long.
+/// If the speed is halved, the duration of a motion is doubled.
 #[test]
 fn a_share_of_the_speed_stretches_the_motion() {
     let limits = Limits::of(&Config::avena());

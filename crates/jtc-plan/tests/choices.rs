@@ -102,8 +102,8 @@ fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     relaxed
 }
 
-/// Checks that the motion passes each waypoint within the blend, and that every point of the motion is within the blend
-/// of a waypoint.
+/// Checks that the motion passes each waypoint within the blend. Every point of the motion must also be within the
+/// blend of a waypoint.
 fn passes_all(motion: &Motion, positions: &[JointVec], blend: f64, seed: u64) -> Result<(), TestCaseError> {
     let distance = |a: &JointVec, b: &JointVec| (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max);
     let places: Vec<JointVec> =

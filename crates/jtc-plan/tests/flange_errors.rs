@@ -12,8 +12,8 @@ fn line(model: &ArmModel, q: &JointVec, to: &Pose) -> PoseError {
     FlangePath::new(&Kinematics::new(model, &WIDE), q, &[Leg::Line { to: *to }], 0.0).unwrap_err()
 }
 
-/// A spherical wrist rotates about axis 5 and passes the position 0. The error is at the point of the line from which
-/// the wrist is near the singular pose.
+/// Joint 5 of a spherical wrist moves through the position 0, in which the wrist is singular. The error must be at
+/// the point of the line from which the wrist is near the singular pose.
 #[test]
 fn a_line_through_a_wrist_singularity_ends_there() {
     let with = |q5: f64| [0.3, -0.8, 0.9, 0.5, q5, 0.4];
@@ -31,8 +31,8 @@ fn a_line_through_a_wrist_singularity_ends_there() {
         let PoseError::Singular(singular) = source else { panic!("{source}") };
         assert_eq!((leg, singular.kind), (1, SingularKind::Wrist));
         assert!(singular.smallest < SINGULAR);
-        // A rotation of 1 rad counts as a length of 0.25 m. After 0.4 rad of 1 rad, the wrist axes are aligned to less
-        // than 2°.
+        // A rotation of 1 rad counts as a length of 0.25 m. Joint 5 turns from 0.4 to −0.6 rad, so the error is
+        // expected after a rotation of about 0.4 rad.
         let turned = distance / 0.25;
         let chord = difference(&robots::pose(&model, &from), &to).0;
         if chord < 1e-9 {
@@ -95,7 +95,7 @@ fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let (leg, distance, source) = on_leg(line(&model, &q, &to));
     let PoseError::OutOfReach { missing, .. } = source else { panic!("{source}") };
     assert!(leg == 1 && missing > 0.0, "{missing}");
-    // The radius of the column is the offset of the shoulder.
+    // The column has the radius 0.15005 m, which is the offset of the shoulder from the axis of joint 1.
     let inside = begin - distance;
     assert!((-0.15005..0.15005).contains(&inside), "{inside}");
     assert!((missing - (0.15005 - inside.abs())).abs() < 1e-6, "{missing} {inside}");
@@ -133,7 +133,7 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     assert!(matches!(arc(&bent, &far), PoseError::NotFinite { .. }));
     let start = FlangePath::new(&kin, &[f64::NAN; 6], &lines, 0.0).unwrap_err();
     assert!(matches!(start, PoseError::Waypoint { waypoint: 1, .. }), "{start}");
-    // With these limits, the arm is outside its limits at the start of the line.
+    // With these limits, joint 4 (at 0.4 rad) is outside its range at the start of the line.
     let mut limits = WIDE;
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();

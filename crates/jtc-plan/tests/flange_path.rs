@@ -9,12 +9,12 @@ use lines::{Vec3, WIDE, cross, dot, moved, norm, on_leg, sub};
 use proptest::prelude::*;
 use robots::difference;
 
-/// Arms with closed forms, and one arm without a closed form.
+/// Returns arms with closed forms, and one arm without a closed form.
 fn arms() -> [(&'static str, ArmModel); 4] {
     [("avena", robots::avena()), ("UR5", robots::ur5()), ("KR 5", robots::kr5()), ("Jaco 2", robots::jaco2())]
 }
 
-/// A start position that is not near a singular pose, for each arm.
+/// Returns a strategy for start positions that are not near a singular pose of any of the arms.
 fn start() -> impl Strategy<Value = JointVec> {
     (-3.0..3.0f64, -1.2..-0.4f64, 0.6..1.6f64, -1.0..1.0f64, 0.5..1.5f64, -2.0..2.0f64)
         .prop_map(|(a, b, c, d, e, f)| [a, b, c, d, e, f])
@@ -245,11 +245,12 @@ proptest! {
                 prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
                 prop_assert!((length - free.end()).abs() < 1e-12);
                 prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
-                // The limit is not exceeded at any earlier point.
+                // Before this point (with a tolerance of 11 mm), the joint stays within its limit.
                 let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
                 prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
             }
-            // In every solution for the pose at the end, a joint is outside its limits.
+            // This error is correct if a joint is outside its limits in every solution for the pose at the end of the
+            // line.
             PoseError::Waypoint { waypoint: 2, source } => {
                 prop_assert!(matches!(*source, PoseError::OutsideLimits { .. }), "{source}");
             }

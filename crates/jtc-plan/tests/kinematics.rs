@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// The closed forms solve extreme poses, with right angles and stretched arms.
+    /// The kinematics find a solution for extreme poses, with right angles and stretched arms.
     #[test]
     fn poses_at_and_near_singular_ones_are_reached(
         quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
@@ -99,7 +99,8 @@ proptest! {
             let (single, all) =
                 (Kinematics::new(&model, &TURN).all(&pose), Kinematics::new(&model, &limits).all(&pose));
             let each = 2usize.pow(wide.iter().filter(|&&wide| wide).count() as u32);
-            // A joint at exactly 0 has three equivalent positions.
+            // In a range of ±2π, each joint position has two equivalent positions. Only exactly 0 has three, and
+            // random positions are never exactly 0.
             prop_assert_eq!(all.len(), single.len() * each);
             for (n, found) in all.iter().enumerate() {
                 let (shift, turn) = difference(&robots::pose(&model, found), &pose);
@@ -121,7 +122,8 @@ proptest! {
             let pose = robots::pose(&model, &q);
             let found = kin.solve(&pose, &near).unwrap();
             let nearest = kin.all(&pose).iter().map(|q| length(q, &near)).fold(f64::INFINITY, f64::min);
-            // In `all`, each joint differs by at most one turn from its principal value, and `near` is within one turn.
+            // In `all`, each joint differs by at most one turn from its principal value, and `near` is within one
+            // turn. Therefore `all` contains the nearest solution.
             prop_assert!((length(&found, &near) - nearest).abs() < 1e-6);
             prop_assert!(found.iter().all(|a| a.abs() <= width));
         }
@@ -150,8 +152,8 @@ proptest! {
         }
     }
 
-    /// The kinematics also solve poses of an arm whose calibration differs by a milliradian and a millimetre from an
-    /// ideal geometry with a closed form.
+    /// The calibration of the arm differs by 1 mrad and 1 mm from an ideal geometry with a closed form. The
+    /// kinematics must still find the solutions.
     #[test]
     fn an_arm_off_its_ideal_geometry_is_solved_too(
         q in positions(), off in prop::array::uniform6(prop::array::uniform6(-1e-3..1e-3f64))
@@ -207,8 +209,8 @@ fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
     let PoseError::Orientation { distance, missing } = error else { panic!("{error}") };
     assert!((distance - pose.position.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < 1e-12);
     assert!(missing > 0.01 && missing < PI, "{error}");
-    // If this orientation is rotated back by slightly more than the missing angle, it is within reach. After a rotation
-    // by a smaller angle about any axis near the correct axis, the orientation is still out of reach.
+    // If the orientation is rotated back by half a turn, it is within reach again. After a rotation by only half of
+    // the missing angle, in either direction, it is still out of reach.
     let turned = |angle: f64| {
         let (s, c) = angle.sin_cos();
         let rotation = pose.rotation.map(|[x, y, z]| [x, c * y + s * z, c * z - s * y]);
@@ -225,7 +227,7 @@ fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
     let all = Kinematics::new(&model, &TURN).all(&pose);
     for joint in 0..JOINTS {
         let mut limits = TURN;
-        // If the other joints have no limits, no solution has a position of this joint in this range.
+        // No solution has a position of this joint in this range. The limits of the other joints permit a full turn.
         let (low, high) = (0..60)
             .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
             .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))

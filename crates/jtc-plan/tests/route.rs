@@ -32,7 +32,7 @@ fn route(points: &[RoutePoint], blends: (f64, f64)) -> Result<Route, PlanError> 
     Route::new(&kinematics().0, points, &[0.0; JOINTS], blends)
 }
 
-/// The route consists of a path in joint space, two lines, an arc and a path in joint space. The arc is half a circle
+/// Route of the tests: a path in joint space, two lines, an arc and a path in joint space. The arc is half a circle
 /// whose centre is in the middle of a vertical line.
 struct Mixed {
     points: Vec<RoutePoint>,

@@ -62,7 +62,7 @@ fn a_time_that_is_too_early_is_refused_with_joint_limit_and_shortest_time() {
     let PlanError::TooEarly { from, waypoint, joint, given, shortest, .. } = error else { panic!("{error}") };
     assert_eq!((from, waypoint, joint.number()), (2, 3, 3));
     assert!((given - 0.4).abs() < 1e-9 && shortest > 0.7 && shortest < 1.0, "{given} {shortest}");
-    // The planner accepts the shortest time that the error contains.
+    // The planner must accept the shortest time that the error contains, plus 1 ms.
     waypoints[2].time = Some(2.0 + shortest + 0.001);
     let motion = through(&waypoints, 0.0, &limits, None).unwrap();
     assert!((motion.duration() - 2.0 - shortest - 0.001).abs() < 5e-4);

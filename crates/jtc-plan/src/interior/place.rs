@@ -13,14 +13,14 @@ pub(super) struct Place {
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
-    /// Coefficients as shares of the limits: bend, slope and squared speed for the jerk (without the speed factor), and
-    /// slope and squared speed for the acceleration.
+    /// Joint jerk and acceleration as shares of their limits. `jerk` contains the coefficients of bend, slope and
+    /// squared speed, without the speed factor. `acceleration` contains the coefficients of slope and squared speed.
     pub jerk: [JointVec; 3],
     pub acceleration: [JointVec; 2],
     /// Highest squared speed, if speed, acceleration and torque are limited at this point.
     pub cap: f64,
-    /// Weights of the reciprocal speed in the sum for the duration, at this point and at the middle of the cell. The
-    /// second field also contains the weights of the squared speed at the middle.
+    /// Weight of this point, and weight of the middle of the cell, in the numerical integration of 1/speed, which
+    /// gives the duration. `middle` also contains the spline weights of the squared speed in the middle.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
@@ -55,7 +55,7 @@ impl Place {
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Adapts the point to an arm at rest. For such a point, only the jerk along the path remains.
+    /// Adapts this point to an arm at rest, at which only the jerk along the path remains.
     pub(super) fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }

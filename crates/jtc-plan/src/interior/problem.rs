@@ -51,7 +51,8 @@ impl<'a> Problem<'a> {
         let ties =
             (1.0 / (1.0 + 2.0 * h_first / (3.0 * x_first)), 1.0 / (1.0 + 2.0 * h_last / (3.0 * x_last)));
         let mut problem = Self { plan, places: Vec::with_capacity(2 * count), knots, ties, limits: 0.0, end };
-        // At both ends of the section, the arm is at rest.
+        // At both ends of the section the arm is at rest. Near an end, the squared speed grows with the power 4/3 of
+        // the distance from the end.
         let power = |x: f64, sign: f64| (sign * 4.0 / (3.0 * x), 4.0 / (9.0 * x * x));
         let (slope, bend) = power(x_first, 1.0);
         let one = |index: usize, value: f64| -> Three {
@@ -85,8 +86,8 @@ impl<'a> Problem<'a> {
         Some(problem)
     }
 
-    /// Adds the jerk limit at one end of a cell. If `whole` is `Some`, also adds the other limits. `whole` is then the
-    /// weight of the reciprocal speed at this point in the sum for the duration.
+    /// Adds the jerk limit at one end of a cell. If `whole` is `Some`, also adds the other limits. The value in
+    /// `whole` is then the weight of this point in the numerical integration of 1/speed, which gives the duration.
     fn push(
         &mut self,
         (cell, side): (usize, usize),

@@ -122,7 +122,7 @@ impl Axes {
         let flange = self.jacobian().fixed_rows::<3>(0) * qd;
         let mut spin = Vector3::zeros();
         for j in 0..JOINTS {
-            // Velocity of the point on the axis, caused by the joints before this axis.
+            // Velocity of the point on axis `j`, caused by the joints before this axis.
             let moved = (0..j).map(|k| self.axis[k].cross(&(self.point[j] - self.point[k])) * qd[k]);
             let speed = moved.fold(Vector3::zeros(), |sum, v| sum + v);
             let turned = spin.cross(&self.axis[j]);

@@ -213,12 +213,13 @@ fn three_parallel(
 ) {
     let (h, p) = (&zero.axis, &zero.point);
     let along = &h[1];
-    // Joints 2, 3 and 4 do not move the centre in the direction of their parallel axes.
+    // Joints 2, 3 and 4 do not move the centre along their parallel axes, so only joint 1 determines this coordinate.
     let height = along.dot(&(centre - p[0]));
     for back in turn_to_value(along, &h[0], &(goal.apply(centre) - p[0]), height, -hint[0]) {
         let q1 = -back;
         let rest = turn(&h[0], back) * goal.rotation;
-        // Joints 2, 3 and 4 do not change the angle between their parallel axes and axis 6.
+        // Joints 2, 3 and 4 do not change the angle between their parallel axes and axis 6, so only joint 5
+        // determines this angle.
         for q5 in turn_to_value(along, &h[4], &h[5], along.dot(&(rest * h[5])), hint[4]) {
             let fifth = turn(&h[4], q5);
             let q6 = -turn_onto(&h[5], &(fifth.transpose() * along), &(rest.transpose() * along), -hint[5]);

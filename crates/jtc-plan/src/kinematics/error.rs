@@ -130,8 +130,8 @@ pub enum PoseError {
     Leg {
         /// Number of the leg, from 1. Leg n is between waypoints n and n + 1.
         leg: usize,
-        /// Distance along the leg, m. A rotation of 1 rad counts as [`RADIUS`](super::RADIUS) m if this length is
-        /// greater than the translation.
+        /// Distance along the leg, m. The length of a leg is the larger of its translation and its rotation, with
+        /// [`RADIUS`](super::RADIUS) m for a rotation of 1 rad.
         distance: f64,
         /// Length of the leg, m, computed in the same way as the distance along the leg.
         length: f64,

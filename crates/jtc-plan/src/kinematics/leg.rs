@@ -60,16 +60,16 @@ pub(crate) struct Drawn {
     pub length: f64,
     from: Frame,
     pub to: Frame,
-    /// Rotation vector, rad per m.
+    /// Rotation vector, rad per metre of the leg's length.
     spin: Vector3<f64>,
     way: Way,
 }
 
 #[derive(Clone, Debug)]
 enum Way {
-    /// Line with its direction, m per m.
+    /// Straight line, with its translation per metre of the leg's length.
     Line(Vector3<f64>),
-    /// Arc with its angle, rad per m.
+    /// Arc, with its angle per metre of the leg's length, rad/m.
     Arc(Circle, f64),
 }
 

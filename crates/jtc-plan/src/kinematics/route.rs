@@ -210,7 +210,8 @@ impl Route {
         let legs = legs(kinematics, points, first)?;
         let start = self.last();
         let path = |blend: f64| FlangePath::new(kinematics, &start, &legs.legs, blend);
-        // Waypoint positions are taken from a path without blends.
+        // Waypoint positions are taken from a path without blends, because a blended path does not pass its corners
+        // exactly.
         let sharp = match path(0.0) {
             Err(PoseError::NoMotion) => None,
             other => Some(other.map_err(|e| legs.numbered(e))?),
@@ -374,7 +375,8 @@ mod tests {
     use super::*;
     use jtc_dynamics::JOINTS;
 
-    /// If a route parameter is on one side of a change of form, the section parameter is also on this side.
+    /// A route parameter just before or just after a change of form must give a section parameter on the same side of
+    /// this change.
     #[test]
     fn rounding_does_not_lead_across_a_mark() {
         let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];

@@ -100,7 +100,7 @@ pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -
 /// 0.
 fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     let (h, p) = (&axes.axis, &axes.point);
-    // The factor of the wrist is divided by its value at a quarter turn of joint 5.
+    // The factor of the wrist is divided by its value at a quarter turn of joint 5, so that it is between 0 and 1.
     let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
     let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
     let (centre, is_planar) = match geometry {

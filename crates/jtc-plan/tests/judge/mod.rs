@@ -170,8 +170,8 @@ impl Case {
         used
     }
 
-    /// Returns the largest friction of each joint, up to a speed slightly above the speed at which the sign of the
-    /// friction reaches ±1.
+    /// Returns the largest friction of each joint, up to a speed slightly above the speed at which the smoothed sign
+    /// function of the friction reaches ±1.
     fn breakaway(&self) -> JointVec {
         std::array::from_fn(|j| {
             let fastest = self.config.friction_sign_width + self.config.joints[j].velocity_max / 128.0;
@@ -211,8 +211,8 @@ impl Case {
         self.torque(dynamics, &b, &velocity, &acceleration)
     }
 
-    /// Checks that every point is on a leg, or within the blend of a corner and inside the bounding box of the legs at
-    /// this corner.
+    /// Checks that every point is on a leg or in a corner. In a corner, the point must be within the blend and inside
+    /// the bounding box of the legs at this corner.
     fn on_the_legs(&self, motion: &Motion, wrong: &mut String) {
         let count = (motion.duration() / 2e-3).ceil().min(50_000.0) as usize;
         for i in 0..=count {

@@ -4,12 +4,12 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin, Pose};
 
-/// Default arm, which has three parallel axes.
+/// Returns the default arm, which has three parallel axes.
 pub(super) fn avena() -> ArmModel {
     Parameters::avena().model
 }
 
-/// Position limits of the default arm, rad.
+/// Returns the position limits of the default arm, rad.
 pub(super) fn avena_limits() -> [(f64, f64); JOINTS] {
     let config = Config::avena();
     std::array::from_fn(|joint| config.position_range(joint))
@@ -24,7 +24,7 @@ pub(super) fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
     model
 }
 
-/// Universal Robots UR5, which has three parallel axes.
+/// Returns a Universal Robots UR5, which has three parallel axes.
 pub(super) fn ur5() -> ArmModel {
     by_dh([
         [0.089159, 0.0, FRAC_PI_2],
@@ -36,7 +36,8 @@ pub(super) fn ur5() -> ArmModel {
     ])
 }
 
-/// Unimation PUMA 560 (Corke and Armstrong-Hélouvry 1994): with a spherical wrist and axes 1 and 2 that meet.
+/// Returns a Unimation PUMA 560 (Corke and Armstrong-Hélouvry 1994), which has a spherical wrist. Its axes 1 and 2
+/// meet.
 pub(super) fn puma560() -> ArmModel {
     by_dh([
         [0.0, 0.0, FRAC_PI_2],
@@ -48,7 +49,7 @@ pub(super) fn puma560() -> ArmModel {
     ])
 }
 
-/// KUKA KR 5 arc, with a spherical wrist and axes 1 and 2 that do not meet.
+/// Returns a KUKA KR 5 arc, which has a spherical wrist. Its axes 1 and 2 do not meet.
 pub(super) fn kr5() -> ArmModel {
     by_dh([
         [0.4, 0.18, -FRAC_PI_2],
@@ -60,7 +61,7 @@ pub(super) fn kr5() -> ArmModel {
     ])
 }
 
-/// Kinova Jaco 2 with six joints and a curved wrist (j2s6s200), which has no closed form.
+/// Returns a Kinova Jaco 2 with six joints and a curved wrist (j2s6s200), which has no closed form.
 pub(super) fn jaco2() -> ArmModel {
     // The curved link moves each of its two axes by sin(a)/sin(2a) = 1/√3 of a link. The angle a = 30° is half of the
     // angle between the two axes.
@@ -75,7 +76,7 @@ pub(super) fn jaco2() -> ArmModel {
     ])
 }
 
-/// An arm without a particular geometry.
+/// Returns an arm whose axes have arbitrary directions, so that it has no closed form.
 pub(super) fn crooked() -> ArmModel {
     let joints = [
         ([0.02, 0.01, 0.12], [0.1, 0.2, 0.3]),

@@ -27,8 +27,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    // The example does not use the minimum, because a tick during the motion and a tick after the motion have
-    // different costs.
+    // The result is the 10th percentile of the measured times. The minimum is not used, because ticks during the
+    // motion and after the motion have different costs.
     let ns = times[times.len() / 10];
     println!(
         "{{\"name\":\"simulated_millisecond\",\"ns\":{ns:.1},\"real_time_factor\":{:.0},\"state\":\"{:?}\"}}",

@@ -88,7 +88,8 @@ impl SimArm {
             model: parameters.model,
             payload: config.payload,
             gravity: config.gravity,
-            // A real drive always has a rotor, even if the arm file contains no rotor inertia for it.
+            // A real drive always has a rotor. If the arm file contains no rotor inertia, the simulation uses 0.7
+            // kg·m².
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
             // Friction was measured only within the velocity limits of the arm.
@@ -213,8 +214,8 @@ impl Arm {
         }
     }
 
-    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share of the
-    /// walls' damping for which this number of sub-steps is sufficient.
+    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share
+    /// of the walls' damping with which the simulation is stable for this number of sub-steps.
     fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
         let (mut square, mut decay) = (0.0, 0.0);
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));

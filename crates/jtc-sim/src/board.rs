@@ -84,7 +84,7 @@ pub struct Board {
     memory: Memory,
     inter_byte_timeout_us: u32,
     watchdog_ms: u32,
-    /// Number of missed ticks since the last tick.
+    /// Number of consecutive missed ticks.
     missed: u32,
     /// Frames that the tick has executed.
     pub worked: Vec<Worked>,
@@ -159,7 +159,7 @@ impl Board {
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
-        // The recorder's memory keeps its contents. The recorder treats a reset by the watchdog as a failure.
+        // The recorder keeps the contents of its memory, and treats a reset by the watchdog as a failure.
         self.recorder = Recorder::new(recorder.into_memory(), resets > 0);
         self.boot();
     }
@@ -234,8 +234,8 @@ impl Board {
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // The parser accepts bytes while a frame is executed, as on the real board. If bytes waited during this time, the
-        // parser would detect a gap.
+        // The parser accepts bytes while a frame is executed, as on the real board. If bytes waited in the ring
+        // buffer during this time, the parser would detect a gap in the frame.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
             let waiting = self.ring.as_slices().0;

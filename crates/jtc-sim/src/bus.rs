@@ -111,7 +111,7 @@ pub struct Bus {
     log: Vec<TimedFrame>,
     /// Frames from nodes outside this simulation, oldest first.
     foreign: VecDeque<Frame>,
-    /// Delay of answers to the controller.
+    /// Model that delays the answers to the controller.
     pub jitter: Jitter,
     /// `true` if another device on the bus, such as an analyser, also acknowledges frames.
     pub monitored: bool,
@@ -272,8 +272,8 @@ impl Bus {
         true
     }
 
-    /// Transmits the answers in the order of arbitration. When the bus is free, it transmits the ready answer with the lowest
-    /// identifier.
+    /// Transmits the answers in the order of arbitration: whenever the bus is free, the ready answer with the lowest
+    /// identifier is next.
     fn answers(&mut self, time: &mut u32, received: &mut Vec<Frame>) {
         while !self.pending.is_empty() && *time < TICK_US {
             let ready = |p: &Pending| p.ready_us <= *time;
@@ -326,7 +326,7 @@ impl Bus {
         room
     }
 
-    /// Returns the frame as a receiver with faulty memory would read it.
+    /// Returns the frame, with changed contents if the fault `garbled` affects this frame.
     fn garble(&mut self, frame: Frame) -> Frame {
         if self.fault.garbled == 0.0 || self.rng.f64() >= self.fault.garbled {
             return frame;

@@ -6,8 +6,8 @@ use crate::arm::SimArm;
 use crate::drive::DriveConfig;
 use crate::faults::FaultPlan;
 
-/// Over-speed limit of a drive divided by the velocity limit of its joint. For the default arm, this quotient gives the
-/// over-speed limit of real drives.
+/// Over-speed limit of a drive divided by the velocity limit of its joint. With 1.2, the drives of the default arm
+/// have the over-speed limit of real drives.
 const OVER_SPEED: f64 = 1.2;
 
 /// Distance of the start position from the nearest limit, rad, for a joint that cannot reach 0.

@@ -168,7 +168,7 @@ fn outside_the_working_area_only_inward_torque_acts() {
 fn j16_safety_line_drops_to_ready_without_an_error() {
     let mut drive = enabled();
     drive.fault.safety_line = true;
-    // The drive must change its state in one tick, without a transition.
+    // The drive must change its state in one tick, without an intermediate transition state.
     run(&mut drive, 1, 0.5);
     assert_eq!(drive.state(), NodeState::READY);
     let report = command(&mut drive, 0.0);

@@ -89,12 +89,14 @@ const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
 const JOINT_DAMPING_MAX: f64 = 1e3;
 
 impl FaultPlan {
-    /// Reads a fault file that does not use trajectory files for hands. [`FAULT_FILE_HELP`] describes the format.
+    /// Reads a fault file that does not use trajectory files for simulated hands. [`FAULT_FILE_HELP`] describes the
+    /// format.
     pub fn from_toml(text: &str) -> Result<Self, FaultFileError> {
         Self::from_toml_with(text, |file| Err(format!("{file}: files cannot be read here")))
     }
 
-    /// Reads a fault file. `load` reads the trajectory files of hands, and returns the reason if it cannot read a file.
+    /// Reads a fault file. `load` reads the trajectory files of simulated hands, and returns the reason if it cannot
+    /// read a file.
     pub fn from_toml_with(
         text: &str,
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
@@ -131,7 +133,7 @@ impl Reader<'_> {
         let trigger = self.trigger()?;
         let duration_ms = match self.entry.for_s.take() {
             Some(s) => Some(ms(self.in_range("for_s", s, 0.0, YEAR_S)?)),
-            // A push must have a duration.
+            // A push without a duration is an error.
             None if matches!(kind, FaultKind::Push { .. }) => return Err(self.missing("for_s")),
             None => None,
         };
@@ -305,7 +307,7 @@ impl Reader<'_> {
     }
 
     fn in_range(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<f64, FaultFileError> {
-        // The comparison is also false for NaN.
+        // The comparison is false for NaN, so NaN is reported as out of range.
         if value >= low && value <= high {
             Ok(value)
         } else {

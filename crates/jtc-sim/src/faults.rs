@@ -304,7 +304,7 @@ impl Running {
 
     /// Adds a fault.
     pub(crate) fn add(&mut self, fault: Fault) {
-        // A soak run adds faults continuously, so ended faults are removed.
+        // A long test run adds faults continuously, so ended faults are removed.
         self.faults.retain(|(_, phase)| *phase != Phase::Over);
         self.faults.push((fault, Phase::Waiting));
         self.open += 1;

@@ -138,7 +138,7 @@ impl FrictionTorques {
         new
     }
 
-    /// Updates the friction curves to the bearing temperatures (°C), and multiplies the curves by `scale`.
+    /// Updates the friction curves to the bearing temperatures (°C), and multiplies the friction by `scale`.
     pub(crate) fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
         for j in 0..JOINTS {
             let t = temperature[j];
@@ -152,8 +152,8 @@ impl FrictionTorques {
                     self.slope[j] = self.polynomial_slope(j, self.reach[j]).max(0.0);
                 }
                 SimFriction::Table(table) => {
-                    // The comparison is also false for NaN, which is the initial temperature. With the initial temperature, the code
-                    // therefore updates the tables.
+                    // The initial temperature is NaN. The comparison is false for NaN, so the first call updates the
+                    // tables.
                     if (t - self.table_temperature[j]).abs() < 0.02 {
                         continue;
                     }
@@ -238,7 +238,7 @@ impl FrictionTorques {
         core::array::from_fn(|j| {
             let v = v[j];
             let (b, level) = lugre.stribeck(v * inverse, self.k[0][j]);
-            // The computation uses x = a/level, and numerator and denominator are multiplied by level².
+            // In this formula, x is a/level. Numerator and denominator are multiplied by level².
             let a = dt * self.stiffness[j] * v.abs() * b;
             let half = level + 0.5 * a;
             level * (z[j] * level + v * dt * half) / (level * level + a * half)
@@ -283,7 +283,7 @@ impl Points {
     /// Interpolates linearly between the points of the table, and extrapolates with the first and last line segments.
     fn at(&self, v: f64) -> f64 {
         let i = self.segment(v);
-        // Beyond an end of the table, the line segment begins at this end of the table.
+        // Above the last point of the table, the line begins at this point.
         let from = i + usize::from(v > self.velocity[19]);
         self.torque[from] + (v - self.velocity[from]) * self.slope(v)
     }

@@ -51,7 +51,8 @@ fn at_speed_both_models_are_the_measured_curve() {
         let smooth = with(FrictionModel::Smooth { width: 0.01 }, curve.clone());
         let lugre = with(FrictionModel::LuGre(LuGre::default()), curve);
         for v in [-0.9, -0.3, -0.15, 0.15, 0.4, 0.8] {
-            // At constant speed the bristles reach a constant deflection within milliseconds.
+            // At constant speed the bristles reach a constant deflection within milliseconds. Both models must then
+            // give nearly the same friction.
             let z = (0..200).fold([0.0; JOINTS], |z, _| lugre.bend(&z, &[v; JOINTS], 1e-3));
             let (a, b) = (smooth.at(&[v; JOINTS], &z)[0], lugre.at(&[v; JOINTS], &z)[0]);
             assert!((a - b).abs() < 0.02 * a.abs(), "{v} rad/s: smooth {a}, LuGre {b} N·m");
@@ -79,7 +80,7 @@ fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
 
 #[test]
 fn a_soft_drive_sticks_and_slips_and_smooth_friction_does_not() {
-    // The free end of a spring of 20 N·m/rad moves at 5 mrad/s.
+    // The free end of a spring of 20 N·m/rad moves at 5 mrad/s and pulls the rotor.
     let pull = |model| {
         let torques = with(model, SimFriction::Polynomial([6.0, 2.0, 0.0, 0.0, 0.0, 20.0]));
         let (mut q, mut v, mut z) = (0.0, 0.0, [0.0; JOINTS]);
@@ -111,7 +112,7 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
         for speed in [1e-6, 1e-4, 1e-2, 1.0, 30.0] {
             let mut z = [0.0; JOINTS];
             for k in 0..500 {
-                // The rotor moves forward and back in turns.
+                // The rotor alternately moves forward for 100 steps and back for 100 steps.
                 let v = if k / 100 % 2 == 0 { speed } else { -speed };
                 z = torques.bend(&z, &[v; JOINTS], dt);
                 assert!(z[0].abs() <= longest * (1.0 + 1e-9), "{} rad at {speed} rad/s, {dt} s", z[0]);
@@ -122,8 +123,8 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
 
 #[test]
 fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
-    // The curves are cubics that end with a driving torque or with a steep slope, and a table whose last segment
-    // decreases.
+    // Three curves are tested: a cubic that ends with a driving torque, a cubic that ends with a steep slope, and a
+    // table whose last segment decreases.
     let motor = SimFriction::Polynomial([2.7, 12.6, -3.7, -0.65, 0.0, 20.0]);
     let wall = SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0]);
     let SimFriction::Table(mut falling) = table() else { unreachable!("a table") };
@@ -141,14 +142,15 @@ fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
             let mut before = there;
             for v in [1.1 * end, 3.0, 10.0, 300.0] {
                 let torque = at(v);
-                // The tolerance covers the part of the Stribeck curve that remains at this speed.
+                // The tolerance of 0.01 N·m covers the part of the Stribeck curve that remains at this speed.
                 assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
                 assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
                 before = torque;
             }
         }
     }
-    // The slope is at most 40 − 2·30·1.5 + 3·12·1.5² N·m·s/rad.
+    // Above 1.5 rad/s, the curve continues with its slope at 1.5 rad/s: 40 − 2·30·1.5 + 3·12·1.5² = 31 N·m·s/rad.
+    // Over 100 rad/s, the torque rises by 3100 N·m.
     let torques = with(FrictionModel::Smooth { width: 0.01 }, wall);
     let rise =
         torques.at(&[101.5; JOINTS], &[0.0; JOINTS])[0] - torques.at(&[1.5; JOINTS], &[0.0; JOINTS])[0];

@@ -95,7 +95,7 @@ impl Gripper {
                 self.command = pump;
                 Some(Answer::Gripper(self.report()))
             }
-            // `NodeRequest` has the separate variant `ChangeFsm` for this request.
+            // This case does not occur, because `NodeRequest` has a separate variant for ChangeFsm.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);

@@ -118,7 +118,7 @@ mod tests {
     fn a_hand_waits_for_teaching_pulls_with_bounded_force_and_lets_go() {
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]; 11], 0.01).unwrap());
         assert_eq!(hand.torque(false, &[0.0; 6], &[0.0; 6]), Some([0.0; 6]));
-        // If the arm does not move, the torque of the hand must rise only to its limit.
+        // The arm does not move, so the torque of the hand must rise to its limit, but not further.
         let mut strongest = 0.0f64;
         let mut ms = 0;
         while let Some(torque) = hand.torque(true, &[0.0; 6], &[0.0; 6]) {
@@ -126,7 +126,8 @@ mod tests {
             ms += 1;
         }
         assert_eq!(strongest, STRONGEST);
-        // The duration is the time for 3 rad at 0.2 rad/s, plus the path, plus the wait at the end of the path.
+        // The expected duration is 15 s for 3 rad at 0.2 rad/s, plus 0.1 s for the path, plus 0.5 s at the last
+        // point.
         assert!((15_590..15_610).contains(&ms), "{ms} ms");
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]], 0.01).unwrap());
         hand.torque(true, &[0.0; 6], &[0.0; 6]);

@@ -125,8 +125,8 @@ impl Listener {
         }
         while self.bytes.len() >= STATUS_LEN {
             let Some(status) = Status::parse(&self.bytes[..STATUS_LEN]) else {
-                // After a reset of the controller, a received status may be incomplete. The host then searches for
-                // the beginning of the next status.
+                // The bytes may be an incomplete status after a reset of the controller. The host skips one byte and
+                // searches for the next status.
                 self.bytes.remove(0);
                 continue;
             };

@@ -28,8 +28,8 @@ impl Line {
     /// Adds bytes to the line at `now_us`, after the bytes that are already on the line.
     pub fn write(&mut self, now_us: u64, bytes: &[u8]) {
         if self.queue.is_empty() {
-            // The last byte may have ended within the millisecond. The transmitter has then been idle since the end of
-            // the last byte.
+            // The line is empty, so the transmitter is idle. The first new byte arrives one byte duration after
+            // `now_us`.
             self.front_ps = now_us * PS_PER_US + self.byte_ps;
         }
         self.queue.extend(bytes);

@@ -34,8 +34,8 @@ pub struct World {
     /// Clock with which the board measures silence on its serial line, µs. The next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
-    /// Longest silence on the serial line that the board measures, µs. With `None`, the board measures the silence in
-    /// virtual time.
+    /// Upper limit of the silence that the board measures on the serial line, µs. With `None`, there is no limit, and
+    /// the board measures the silence in virtual time.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
@@ -61,7 +61,7 @@ pub struct World {
     exchange: Option<Box<Exchange>>,
 }
 
-/// State of the controller in its last log entries.
+/// Controller states and errors that were logged last, used to detect changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     state: ControllerState,
@@ -194,7 +194,7 @@ impl World {
                 FaultKind::SerialFlipped { probability } => line.flipped = probability,
                 FaultKind::SerialDelayed => line.held = true,
                 FaultKind::TickOverrun => self.overrun = true,
-                // The plant applies the other faults.
+                // The function `Plant::set_faults` applies the other faults.
                 _ => {}
             }
         }

@@ -33,7 +33,8 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    // This push is too small to make the joint yield.
+    // A push of 30 N·m for 200 ms is too small to make the joint yield (J-68), so the controller returns the joint to
+    // its position.
     operator.world.push(Joint::ALL[2], 30.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");
@@ -60,7 +61,7 @@ fn a_push_of_a_fault_file_concerns_the_joint_counted_from_1() {
 fn j25_a_hand_leads_the_taught_arm_along_its_path_and_lets_go() {
     let mut operator = held(FaultPlan::default());
     operator.world.lead(path());
-    // The hand must wait until Teaching begins.
+    // The arm must not move before Teaching begins, because the hand must wait.
     assert!(farthest(&mut operator, 0, 1000) < 1e-3);
     operator.teach().unwrap();
     let (mut led, mut fastest) = ([0.0f64; 6], 0.0f64);

@@ -39,7 +39,8 @@ fn energy(arm: &Arm) -> f64 {
             sum += 0.5 * rotor * arm.qd[j].powi(2);
         }
     }
-    // The joint frames are also the frames of the links.
+    // The frames of the joints are also the frames of the links, so the link masses can be located with the joint
+    // poses.
     let poses = dynamics.forward_kinematics(&arm.q);
     for (link, pose) in parts.model.links[1..].iter().zip(&poses) {
         let com: f64 = (0..3).map(|i| pose.rotation[2][i] * link.origin.xyz[i]).sum();
@@ -106,7 +107,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
         arm.q[joint] += 1e-4;
         let inertia = Dynamics::new(&arm.parts().model, [0.0; 3]).mass_matrix(&POSE)[joint][joint] + OUTPUT;
         let expected = (stiffness / inertia).sqrt();
-        // The test measures ten whole periods between crossings of the middle position.
+        // The test measures the duration of ten periods, between upward crossings of the middle position.
         let (mut t, mut first, mut crossings) = (0.0, None, 0);
         let dt = 1e-4;
         while crossings <= 10 {

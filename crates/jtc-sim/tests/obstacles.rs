@@ -91,7 +91,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     let load = jtc_dynamics::Payload { mass, com, ..jtc_dynamics::Payload::NONE };
     let (loaded, empty) = (of(load), of(jtc_dynamics::Payload::NONE));
     for j in 0..6 {
-        // Stiction carries part of the weight.
+        // Stiction carries a part of the weight, so the tolerance is 9 N·m.
         let weight = loaded[j] - empty[j];
         assert!(
             (with[j] - before[j] - weight).abs() < 9.0,
@@ -107,8 +107,8 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     assert!(events.iter().any(|event| event.contains("payload 1.5 kg at (0, 0.02, 0.06) m")), "{events:?}");
 }
 
-/// The speed check of the controller (J-35) is visible only with drives that trip at a higher speed than the default
-/// drives.
+/// The default drives trip on over-speed before the speed check of the controller (J-35) reports an error. With
+/// drives that trip only at 50 rad/s, the controller reports the error.
 #[test]
 fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     let run = |over_speed: Option<f64>| {
@@ -216,7 +216,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
         if trial % 2 == 0 {
             inject(&mut operator, FaultKind::Push { joint, torque }, Some(20 + (500.0 * rng.f64()) as u64));
         } else {
-            // The wall is near the position of the joint, on the side towards which the joint moves.
+            // The wall is 0.05 rad from the position of the joint, on the side towards which the joint moves.
             let speed = operator.world.truth().qd[joint.index()];
             let side = if speed >= 0.0 { Side::Above } else { Side::Below };
             let rad = operator.world.truth().q[joint.index()] + 0.05 * speed.signum();
@@ -234,7 +234,8 @@ fn j35_gears_that_yield_are_no_false_alarm() {
             let telemetry = operator.world.telemetry();
             assert_eq!(telemetry.errors & error::EXTERNAL_JOINTS, 0, "{what}");
             if operator.state() == ControllerState::Error {
-                // No joint can resist this push, so the joint exceeds its speed limit.
+                // The state Error is only permitted if the push is stronger than the joint can resist. The joint then
+                // exceeds its speed limit.
                 let fast = telemetry.joints.iter().any(|joint| joint.internal & joint_error::VELOCITY != 0);
                 assert!(fast, "{what}: {:?}", telemetry.joints.map(|j| (j.internal, j.velocity, j.torque)));
                 break;

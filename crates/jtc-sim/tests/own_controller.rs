@@ -3,8 +3,8 @@
 use jtc_core::{Config, ControllerState, Parameters};
 use jtc_sim::{Board, Fault, FaultKind, FaultPlan, Operator, Pins, Plant, SimConfig, Support, Trigger};
 
-/// A second board with the inputs of the simulated board must have bit-identical outputs. The test includes missed
-/// ticks and a reset by the watchdog.
+/// A second board that receives the inputs of the simulated board must produce bit-identical outputs. The test
+/// includes missed ticks and a reset by the watchdog.
 #[test]
 fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
     let overrun =

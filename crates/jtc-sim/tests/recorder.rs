@@ -26,7 +26,8 @@ fn blocks(world: &World) -> Vec<Block> {
 /// Replays the log, and compares each tick with the values that the controller computed in the session.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    // The replay uses only settings and points of the session's controller. All other data are in the snapshots.
+    // From the controller of the session, the replay uses only the settings and the trajectory points. All other data
+    // are in the snapshots of the log.
     let then = world.controller();
     let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
     controller.put_points(0, then.points());
@@ -120,15 +121,16 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
 }
 
 /// The recorder keeps at least two seconds before an error and the time after the error, even with more traffic than
-/// the controller can execute. The test reads the log at many times, so that different parts of the first snapshot's
-/// interval are lost.
+/// the controller can execute. The ticks before the first complete snapshot in the log are lost. Their number varies,
+/// so the test reads the log every 10 ms during one snapshot interval.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // The host sends frames with only a few instructions each, and parameters, which require a snapshot.
+        // In each tick, the host sends many short frames that are executed quickly, and a parameter frame, after
+        // which the recorder needs a new snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
         }
@@ -170,7 +172,7 @@ fn j56_the_first_tick_that_differs_is_named() {
     let differs = Replay::new(Log::new(&blocks), controller, hash)
         .find(|step| step.outcome == Outcome::Differs)
         .expect("a tick differs");
-    // The effect of a point begins at the previous point, and reaches the torque on the bus within a few ticks.
+    // A changed point has an effect from the previous point on. The torque on the bus differs at most 8 ticks later.
     let acts = seen[&(10 * (POINT as u32 - 1))];
     let tick = differs.telemetry.tick;
     assert!((acts..=acts + 8).contains(&tick), "{tick}, where it acts from {acts} on");

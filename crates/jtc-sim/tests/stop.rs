@@ -45,7 +45,8 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
     assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");
-    // The Stop is written so early that its last byte arrives in the same millisecond in both simulations.
+    // In the simulation without other bytes, the command is sent early enough that its last byte arrives in the same
+    // millisecond as in the other simulation.
     let frame = host::exec(command);
     let lead = baud.map_or(0, |rate| (70_000 / u64::from(rate)) + 1);
     let (mut quiet, quiet_ms) = play(baud, &vec![(ms - lead, frame.clone())], frame.len() as u64);
@@ -90,7 +91,8 @@ fn j04_a_stop_behind_hundreds_of_frames() {
 
 #[test]
 fn j04_a_stop_behind_four_thousand_frames() {
-    // At 115 200 bit/s, 24 000 bytes take two seconds. At the highest rate, the board cannot store so many bytes.
+    // At 115,200 bit/s, 4000 frames (24,000 bytes) take two seconds. At 15 Mbit/s, the buffer of the board cannot
+    // store 200,000 frames, so bytes are lost.
     for (baud, frames) in [(115_200, 4000), (15_000_000, 4000), (15_000_000, 200_000)] {
         let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
         let end = bytes.len() as u64;
@@ -103,8 +105,8 @@ fn j04_a_stop_behind_four_thousand_frames() {
     }
 }
 
-/// Above 960 kBd, the shortest frames arrive faster than the controller executes them. Below 960 kBd, only response
-/// records are lost.
+/// At 921,600 bit/s, the controller executes 40,000 of the shortest frames without losing a frame; only response
+/// records may be lost. Above 960 kBd, the shortest frames arrive faster than the controller executes them.
 #[test]
 fn j04_short_frames_are_executed_as_fast_as_they_come() {
     let mut operator = moving(Some(921_600));
@@ -123,7 +125,7 @@ fn j04_short_frames_are_executed_as_fast_as_they_come() {
 
 #[test]
 fn j04_a_stop_among_pump_frames() {
-    // The host sends a hundred frames per second for three seconds, and more frames after the Stop.
+    // The host sends a frame every 10 ms for 5 s, and a Pause after about 3 s.
     let mut script: Script = (0..500).map(|n| (10 * n, fixed::PUMP_OFF.to_vec())).collect();
     script.insert(300, (3004, fixed::PAUSE.to_vec()));
     let end = 300 * 10 + 10 + 7;
@@ -137,8 +139,7 @@ fn j04_a_stop_among_pump_frames() {
 fn j04_a_stop_in_noise() {
     for baud in [115_200, 9600] {
         for byte in [0x00, 0x55, 0xFF, 0x9B, 0x0B] {
-            // The host sends a byte every 6 ms, before, within and after the Stop. The Stop follows one of these bytes
-            // without a gap.
+            // The host sends a noise byte every 6 ms for 3 s. The Stop follows one of these bytes without a gap.
             let mut script: Script = (0..500).map(|n| (6 * n, vec![byte])).collect();
             script[250].1.extend(fixed::STOP);
             let end = 251 + 7;
@@ -152,8 +153,8 @@ fn j04_a_stop_in_noise() {
 #[test]
 fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
     let points = host::there_and_back(&[0.0; 6], &[0.1; 6], 1.0, 2, 10);
-    // A client with extensions sends the frames of this test. If a client without extensions sent them, the segment
-    // would also stop the arm (J-30).
+    // GetInfo marks the client as a client that uses the extensions. Without GetInfo, segment 0 would itself act as a
+    // Stop (J-30).
     let long = [&fixed::GET_INFO[..], &host::trajectory(&points, 10, 400).concat()].concat();
     for front in [&[0x9B, 0x04, 0xEA, 0x56][..], &[0x9B], &long, &long[..long.len() - 3]] {
         let bytes = [front, &fixed::STOP].concat();
@@ -171,15 +172,16 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
         .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
         .expect("it stops");
     operator.listener.responses.clear();
-    // After frames with gains, which need one tick each, the host sends an Execute and a Stop.
+    // The host sends frames with gains, which need one tick each, and then an Execute and a Stop. The Stop must
+    // cancel the waiting Execute.
     let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();
     operator.world.host_write(&frames);
     for _ in 0..1500 {
         operator.step();
         assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Stop, "nothing moves");
     }
-    // A host without extensions uploaded the trajectory. The controller therefore rejects its Execute with a data
-    // status that existing hosts know (J-51).
+    // The trajectory was uploaded by a host without extensions. The controller therefore rejects the Execute of this
+    // host with a data status that existing hosts know (J-51).
     assert_eq!(exec_records(&operator), [DataStatus::IncorrectValue, DataStatus::NoError]);
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
 }
@@ -190,7 +192,8 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
 fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     for baud in [Some(115_200), None] {
         let mut operator = moving(baud);
-        // More than 2 s have passed since the last extension request.
+        // After more than 2 s without an extension request, the controller treats the host as a host without
+        // extensions (J-51).
         operator.run(2_100);
         assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Execute);
         let mut refused = 0;

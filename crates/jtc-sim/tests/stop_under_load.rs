@@ -5,7 +5,8 @@ use jtc_sim::{ModelError, Support};
 use jtc_wire::ExecCommand;
 use sim_checks::lowering::{LOADED, Lowering, angle_of, holding_torque, with_payload};
 
-/// The margin between the torque limit and the torque of the model must be sufficient to stop in time.
+/// If the holding torque is 80 to 97 % of the torque limit, the remaining torque must be sufficient to stop the arm
+/// within 0.5 s.
 #[test]
 fn j33_a_loaded_arm_stands_within_its_time() {
     for (share, speed) in [(0.8, 0.9), (0.9, 0.3), (0.9, 0.2), (0.95, 0.2), (0.95, 0.1), (0.97, 0.1)] {
@@ -61,14 +62,15 @@ fn j33_the_full_limit_brakes_where_the_time_cannot_be_kept() {
     for (share, speed) in [(0.97, 0.4), (0.99, 0.2), (0.99, 0.4), (1.02, 0.2), (1.02, 0.4)] {
         let outcome = Lowering::at_share(share, speed).run().expect("it is lowered");
         println!("{share} {speed}: {outcome:?}");
-        // The commanded positions follow the motion that the arm can achieve. The speed of the arm increases only if
-        // the load is too heavy for the arm to hold.
+        // The commanded positions follow the motion that the arm can achieve. The speed may increase, to at most 0.6
+        // rad/s, only if the holding torque is 99 % of the limit or more.
         let peak = if share < 0.99 { 1.03 * speed } else { 0.6 };
         assert!(outcome.error < 5e-3 && outcome.peak <= peak, "{outcome:?}");
-        // Friction also brakes the arm, but this limit does not include friction. The speed therefore decreases and the
+        // Friction brakes the arm in addition to the torque of the drives. The speed therefore decreases and the
         // distance is short.
         assert!(outcome.way <= if share < 0.99 { 0.7 * speed } else { 1.0 }, "{outcome:?}");
-        // The arm is in Operate for at most one second, and the controller holds it all the time.
+        // The trajectory state leaves Execute at most one second after the command, and the controller then holds the
+        // arm (HoldPos).
         assert!(outcome.commanded_ms <= 1_002 && outcome.state == ControllerState::HoldPos, "{outcome:?}");
         assert!(outcome.standing_ms <= if share < 0.99 { 1_100 } else { 6_000 }, "{outcome:?}");
     }

@@ -49,7 +49,7 @@ fn j33_pause_and_resume_stay_on_the_path() {
 fn j34_execute_away_from_the_start_is_refused_and_nothing_moves() {
     let mut operator = held();
     operator.upload(&host::there_and_back(&TO, &FROM, 3.0, 1, 10), 10).unwrap();
-    // Existing hosts do not know data statuses above 6 (J-51).
+    // Existing hosts do not know data statuses above 6, so the controller answers with IncorrectValue (J-51).
     let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
     assert_eq!(response.data, DataStatus::IncorrectValue);
     operator.ask(&jtc_wire::fixed::GET_INFO).unwrap();
@@ -210,7 +210,7 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     operator.bring_up().unwrap();
     operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
     operator.execute(10_000).unwrap();
-    // If another node sends a broadcast directly after a broadcast of the controller, an older drive processes all
+    // Another node sends a broadcast directly after a broadcast of the controller. An older drive then processes all
     // later requests one request late.
     let ask = jtc_bus::Request::ChangeFsm { target: [jtc_bus::Target::NoChange; 7] }.emit();
     operator.world.put_bus_frame(ask);

@@ -26,8 +26,8 @@ fn in_range(arm: &Arm, what: &str) {
     }
 }
 
-/// Moves the arm violently, with pushes of up to 400 N·m on all joints at once, friction at low temperature or
-/// multiplied, and brakes that close and open during the motion.
+/// Moves the arm violently: pushes all joints at once with up to 400 N·m, and closes and opens brakes during the
+/// motion. The friction is the friction at low temperature, or is multiplied.
 fn throw_about(parts: &SimArm, seed: u64, what: &str) {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut arm = Arm::new(parts.clone(), [1.2; 6], [0.0; 6]);
@@ -92,7 +92,7 @@ fn a_brake_that_closes_on_a_fast_joint_lets_the_end_stop_end_its_way() {
         }
         assert_eq!(arm.qd, [0.0; 6]);
         if speed == 5.0 {
-            // The braking angle is 25/(2·40) rad, so the joint does not reach the end stop.
+            // The joint turns by v²/(2·a) = 25/(2·40) = 0.31 rad until it stops, so it does not reach the end stop.
             assert!((0.30..0.33).contains(&arm.q[4]), "{} rad", arm.q[4]);
         }
     }

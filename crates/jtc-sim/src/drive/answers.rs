@@ -37,7 +37,7 @@ impl Drive {
                 self.goal = if self.mode == 1 { torque.get(n).copied().unwrap_or(0.0) } else { 0.0 };
                 Some(Answer::Joint { node: self.node, report: self.report() })
             }
-            // `NodeRequest` has the separate variant `ChangeFsm` for this request.
+            // This case does not occur, because `NodeRequest` has a separate variant for ChangeFsm.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { mode, config, .. } => {
                 let accepted = matches!(self.states.state(), NodeState::INIT | NodeState::READY);
@@ -69,7 +69,7 @@ impl Drive {
         if self.outside() {
             warnings |= warning::OUTSIDE_WORKING_AREA;
         }
-        // The warning is also set before the first configuration, at any level of the safety line.
+        // Before the first configuration, the drive sets this warning at any level of the safety line.
         if self.safety_line() || !self.configured {
             warnings |= warning::SAFETY_LINE;
         }

@@ -1,5 +1,5 @@
-//! Sensors of a drive. The sensors are a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and the encoder
-//! of the motor, from which a delayed speed is computed.
+//! Sensors of a drive: a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and the
+//! encoder of the motor. The delayed speed is computed from the encoder of the motor.
 
 /// Counts per turn of the 16-bit absolute encoder.
 const ENCODER_COUNTS: f64 = 65_536.0;

@@ -16,7 +16,7 @@ pub(super) struct States {
     state: NodeState,
     /// Number of ticks since `state` was entered.
     age: u32,
-    /// Last requested state. Start means that no state was requested.
+    /// Last requested state. The value Start means that no request is pending.
     pending: NodeState,
     /// `true` if the motor was aligned since the last reset.
     aligned: bool,
@@ -65,9 +65,10 @@ impl States {
             (NodeState::INIT, NodeState::FAULT) => FAULT_TO_INIT,
             (NodeState::READY, NodeState::INIT) => NodeState::INIT_TO_READY,
             (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
-            // Some drives, including the simulated drive, treat an echoed fault byte as an enable command.
+            // Some drives, including the simulated drive, treat a request for the state Fault as an enable command.
             (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
-            // The error byte of the drive stays 0.
+            // A request for the fault reaction leads directly to the fault state. The error byte of the drive stays
+            // 0.
             (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
                 self.pending = NodeState::START;
                 NodeState::FAULT

@@ -31,7 +31,7 @@ pub enum FaultFileError {
         /// Kind of the fault.
         kind: String,
     },
-    /// The trajectory file of a hand cannot be used.
+    /// The trajectory file of a simulated hand cannot be used.
     Hand {
         /// Number of the fault in the file, from 1.
         fault: usize,

@@ -55,9 +55,10 @@ impl World {
         }
     }
 
-    /// Limits the silence of the host to `us` µs of the host's own time, because virtual time may pass faster. With this limit,
-    /// virtual time alone causes no gap (J-03) in a frame that another program sends in pieces. Bytes that wait on the line still
-    /// cause gaps. With `None`, the default, only virtual time counts.
+    /// Limits the silence that the board measures between bytes of the host to `us` µs. `us` is the real time for
+    /// which the host was silent. Virtual time may pass faster, and would cause a gap (J-03) in a frame that another
+    /// program sends in pieces. Bytes that wait on the line still cause gaps. With `None`, the default, the board
+    /// measures the silence in virtual time.
     pub fn limit_host_silence(&mut self, us: Option<u64>) {
         self.silence_us = us;
     }
@@ -131,7 +132,7 @@ impl World {
         self.exchange.as_deref()
     }
 
-    /// Returns true if the controller executed its tick in the last millisecond.
+    /// Returns `true` if the controller executed its tick in the last millisecond.
     pub fn ticked(&self) -> bool {
         self.ticked
     }

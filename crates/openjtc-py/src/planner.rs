@@ -89,7 +89,7 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    /// Returns the blend that was passed to the call. Without such a blend, returns the blend of the planner.
+    /// Returns the blend that was passed to the call, or the blend of the planner if no blend was passed.
     fn blend(&self, given: Option<f64>) -> Result<f64, Failure> {
         given.map_or(Ok(self.blend), |blend| distance("blend", blend))
     }
@@ -140,7 +140,7 @@ fn distance(what: &str, value: f64) -> Result<f64, Failure> {
     )))
 }
 
-/// Returns the torque margin that was passed to the call, %. Without such a margin, returns the default.
+/// Returns the torque margin that was passed to the call, or the default margin if no margin was passed, %.
 pub(crate) fn margin_of(given: Option<f64>) -> Result<f64, Failure> {
     let percent = given.unwrap_or(MARGIN_PCT);
     margin_in_range(percent)?;

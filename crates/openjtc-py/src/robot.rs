@@ -85,13 +85,14 @@ impl Link {
         self.worker.call(py, job)
     }
 
-    /// Returns `true` until a requested run has ended. Until then, the thread of the connection does not answer queries.
+    /// Returns `true` while a requested run has not ended. During this time, the thread of the connection does not
+    /// answer queries.
     fn is_running(&self) -> bool {
         self.worker.shared.is_running() && !self.worker.is_closed()
     }
 
-    /// Sends a request to the current or next run. The run executes the request when the arm moves. Without a run, the
-    /// request is sent directly to the controller.
+    /// Sends a request to the current or next run (execution of a motion). The run executes the request when the arm
+    /// moves. Without a run, the request is sent directly to the controller.
     fn wish(
         &self,
         py: Python<'_>,
@@ -168,7 +169,8 @@ impl Link {
         self.worker.is_closed()
     }
 
-    /// Returns the number of Stops so far. The next Stop discards every earlier request.
+    /// Returns the number of Stops that were requested so far. A later Stop discards all requests that were made
+    /// before it.
     fn asked(&self) -> u64 {
         // In a forked process the number does not matter, because each request is refused.
         self.worker.now().unwrap_or_default()

@@ -30,7 +30,7 @@ impl Telemetry {
         bits.extend(errors.to_le_bytes());
         bits.extend(records_lost.to_le_bytes());
         for joint in joints {
-            // All fields are listed, so that the compiler reports a new field that is missing here.
+            // The pattern lists all fields, so that a new field causes a compiler error here.
             let JointTelemetry {
                 set_position,
                 set_velocity,

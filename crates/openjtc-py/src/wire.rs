@@ -128,7 +128,7 @@ impl StatusReader {
         Self { receiver: StatusReceiver::new() }
     }
 
-    /// Returns the statuses that these bytes complete, oldest first.
+    /// Returns the statuses that are complete after these bytes, oldest first.
     fn feed<'py>(&mut self, py: Python<'py>, bytes: &[u8]) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let mut rest = bytes;
         let mut found = Vec::new();

@@ -82,7 +82,7 @@ impl WorkerState {
         }
     }
 
-    /// Records that the motion of this connection has ended, if the last status shows this.
+    /// Checks the last status, and records the end of this connection's motion if the status shows it.
     pub(crate) fn look(&mut self) {
         if !self.shared.moves() || !self.session.port().is_shown() {
             return;
@@ -105,8 +105,8 @@ impl WorkerState {
         self.session.settle_for_jog_until(|| asked.is_halted())?;
         let end = self.session.now() + time;
         let jogged = self.session.jog_while(velocity, |session| asked.is_halted() || session.now() >= end);
-        // When the jog ends for any reason, the function brings the arm to rest at once, without waiting for the jog timeout of
-        // the controller.
+        // The arm is brought to rest at once, also if the jog ended with an error. Otherwise the arm would move until
+        // the jog timeout of the controller.
         let rested = self.session.jog_to_rest();
         if let Ok(Some(_)) = rested {
             self.shared.set_moves(false);
@@ -116,7 +116,8 @@ impl WorkerState {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
-            // If the controller refused the jog because of a held stop, the error must report the held stop.
+            // If the controller refused the jog because of a held stop, the error of `jog_to_rest`, which reports the
+            // held stop, is returned below.
             Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
             jogged => jogged?,
         }

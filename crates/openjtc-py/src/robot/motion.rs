@@ -1,4 +1,4 @@
-//! Run that a Python program requested: progress and samples of the run, and requests during the run.
+//! Execution of a motion (a run) that a Python program requested: progress, samples, and requests during the run.
 
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -39,8 +39,8 @@ pub(crate) struct Order {
     pub speed: Option<f64>,
     /// Number of times that the trajectory is executed.
     pub repeat: u32,
-    /// `true` if the caller confirms that the limits, gravity and rotor inertia of the controller are safe for the
-    /// arm, although the values of the arm differ.
+    /// `true` if the caller confirms that the limits, gravity and rotor inertia in the controller are safe for the
+    /// arm. These values may then differ from the values of the arm.
     pub accept_device_limits: bool,
     /// Path of a recording. The second field is `true` if an existing recording may be overwritten.
     pub record: Option<(PathBuf, bool)>,
@@ -201,7 +201,7 @@ impl Observer<AnyPort> for Follower<'_> {
     }
 
     fn failed(&mut self, error: Error) -> Failure {
-        // After a Stop, every other error is a result of the Stop.
+        // Every error after a Stop is treated as a result of the Stop.
         if self.asked.is_halted() { Error::Cancelled.into() } else { error.into() }
     }
 
@@ -237,7 +237,7 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         let (simulated, tape) = (session.port().is_simulated(), Rc::clone(&self.tape));
         Ok(Box::new(move |sample| {
-            // The simulator itself pushes one sample each millisecond.
+            // A simulator records one sample each millisecond itself, so this sample is not needed.
             if !simulated {
                 tape.push(sample);
             }
@@ -263,7 +263,7 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         if let Some(waits) = self.waits.take() {
             let came = result.as_ref().copied().map_err(Failure::of);
-            // The thread may have stopped waiting for the result.
+            // An error is ignored, because the waiting thread may have stopped waiting for the result.
             let _ = waits.send(came);
         }
     }
@@ -271,11 +271,11 @@ impl Observer<AnyPort> for Follower<'_> {
     fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
         observe(session, &self.shared);
         self.tape.pause();
-        // A request that was made at the last status has no effect. The thread that made this request receives the information that the
-        // motion has ended.
+        // A request that arrived with the last status has no effect. When `waits` is dropped, the waiting thread is
+        // informed that the motion has ended.
         self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
-            // The motion was stopped before it began.
+            // A Stop prevented the start of the motion.
             self.shared.set_moves(false);
             return Err(Error::Cancelled.into());
         }

@@ -15,7 +15,7 @@ use crate::number;
 use crate::run::Samples;
 use crate::threads::lock;
 
-/// Interval and number of checks after another thread has received the result.
+/// Interval and maximum number of checks for a result that another thread has received but not stored yet.
 const LOOK: Duration = Duration::from_millis(2);
 const LOOKS: u32 = 50;
 
@@ -41,7 +41,8 @@ impl Motion {
         *lock(&progress) = Progress { phase: "waiting", ..Progress::default() };
         let pending = Pending::begin(&worker.shared);
         let of_run = Arc::clone(&progress);
-        // The guard moves into the job. A job that never begins therefore does not count as pending.
+        // The guard moves into the job and is dropped with it. A job that never begins therefore does not count as
+        // pending.
         let came = worker.ask(asked, move |state, asked| {
             let _pending = pending;
             let ran = state.run(&order, asked);
@@ -88,7 +89,7 @@ impl Motion {
                     Ok((Py::new(py, Samples::of_run(ran))?, error))
                 }
                 Waited::Came(Err(failure)) => Err(raised(py, failure)),
-                // Another thread has received the result and stores it shortly.
+                // Another thread has received the result and will store it soon.
                 Waited::Gone if looks < LOOKS => {
                     looks += 1;
                     worker.pass(py, LOOK)?;

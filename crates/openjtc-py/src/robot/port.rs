@@ -1,9 +1,9 @@
-//! Line to the controller with a filter. The filter does not send frames that are older than a Stop. The filter sends the Stop itself
-//! at once.
+//! Line to the controller with a filter. The filter sends no frame that was requested before a Stop, and sends the
+//! Stop itself at once.
 //!
-//! This module writes the frames of all jobs, and every wait for the controller reads through this module. Only the module `port`
-//! therefore decides whether a frame may still move the arm. The module writes a Stop as soon as a caller requests the Stop, even in
-//! the middle of a job.
+//! This module writes the frames of all jobs, and every wait for the controller reads through this module. Only the
+//! module `port` therefore decides whether a frame may still move the arm. The module writes a Stop as soon as a
+//! caller requests the Stop, even in the middle of a job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(10);
 const PIECE: Duration = Duration::from_millis(50);
 /// Maximum time until the response record of a Stop arrives. Only a status that is already being sent can delay the response record.
 const RECORD: Duration = Duration::from_millis(200);
-/// Time and number of statuses after the start of a motion, until the statuses show this motion.
+/// Minimum time and minimum number of statuses after the start of a motion until the statuses show this motion.
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
 /// Line without the filter.
@@ -53,7 +53,7 @@ macro_rules! each_line {
 pub(crate) struct AnyPort {
     line: Line,
     shared: Arc<Shared>,
-    /// Number of Stops at the time when the current request was made.
+    /// Number of Stops that had been requested when the current request was made.
     at: u64,
     /// Numbers of handled Stops, in the form that [`Shared::stops`] returns.
     done: (u64, u64),
@@ -136,8 +136,8 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop frame after a new Stop that must stop every motion. After other Stops, writes a frame only while this connection
-    /// moves the arm.
+    /// Writes a Stop frame if a new Stop must stop every motion. For a Stop that concerns only this connection,
+    /// writes the frame only while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         let now = self.shared.stops();
@@ -164,7 +164,8 @@ impl AnyPort {
         if !moves && frame != fixed::TEACHING_MODE_ENABLE {
             return Ok(());
         }
-        // `moves` is set before the check. A Stop between these two steps therefore detects a motion.
+        // `moves` is set before the number of Stops is checked. A Stop that is requested between these two steps then
+        // finds a motion that it must stop.
         let moved_before = self.shared.moves();
         if moves {
             self.shared.set_moves(true);
@@ -253,7 +254,8 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
-    /// Requests permission to move the arm. The line compares Stops with the time of the request, not with the start time of the job.
+    /// Requests permission to move the arm. The permission is refused if a Stop was requested after the request was
+    /// made, even if the job began after the Stop.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         if self.shared.queue.stops() != self.at {

@@ -207,14 +207,15 @@ impl Link {
         self.call(py, move |state, _| Ok(state.session.change_settings(&given)?))
     }
 
-    /// Returns the findings of `jtc doctor`. The worst finding is first.
+    /// Returns the findings of `jtc doctor`, with the worst finding first.
     fn doctor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = self.call(py, |state, asked| {
             let mut seen = state.session.examine_until(LOOK, || asked.is_halted())?;
             if asked.is_halted() {
                 return Err(jtc_host::Error::Cancelled.into());
             }
-            // Held stops and encoder jumps occur only while drives have torque.
+            // The list of held stops and encoder jumps is read only if drives have torque, because these reactions do
+            // not occur without torque.
             if seen.status.as_ref().is_some_and(labels::has_torque) {
                 seen.reactions = state.session.reactions();
             }

@@ -100,7 +100,7 @@ impl Shared {
         self.moves.store(moves, Ordering::SeqCst);
     }
 
-    /// Returns `true` until every requested run has ended. Until then, the thread does not answer queries.
+    /// Returns `true` while any requested run has not ended. During this time, the thread does not answer queries.
     pub(crate) fn is_running(&self) -> bool {
         self.pending.load(Ordering::SeqCst) > 0
     }
@@ -123,7 +123,8 @@ impl Shared {
         self.seen.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Passes a request to the current run. Without a run, the result channel of the request is dropped.
+    /// Passes a request to the current run. Without a run, drops the result channel of the request, so that the
+    /// caller receives an error.
     pub(crate) fn wish(&self, wish: Wish) {
         lock(&self.wishes).push_back(wish);
         if !self.is_running() {

@@ -89,7 +89,7 @@ impl Worker {
         let asked = Asked::after(&self.shared, at);
         self.put(at, move |state| {
             state.begin(&asked)?;
-            // The call of `begin` may have waited, and a Stop may have been requested during this time.
+            // A Stop may have been requested while `begin` waited.
             if asked.is_halted() {
                 return Err(jtc_host::Error::Cancelled.into());
             }
@@ -142,7 +142,8 @@ impl Worker {
         Ok(())
     }
 
-    /// Returns the number of Stops so far. The next Stop cancels every request that was made before it.
+    /// Returns the number of Stops that were requested so far. A later Stop cancels all requests that were made
+    /// before it.
     pub(super) fn now(&self) -> Result<u64, Failure> {
         self.is_here()?;
         Ok(self.shared.queue.stops())
@@ -186,7 +187,8 @@ impl Worker {
     pub(super) fn wait<T: Send>(&self, py: Python<'_>, came: Receiver<T>) -> PyResult<T> {
         match self.wait_for(py, &Mutex::new(came), None)? {
             Waited::Came(result) => {
-                // Handles a Ctrl-C that arrived together with the result. After such a Ctrl-C, Python itself would not stop the arm.
+                // Handles a Ctrl-C that arrived together with the result. Otherwise Python would raise the exception
+                // without stopping the arm.
                 self.look_for_signals(py)?;
                 Ok(result)
             }
@@ -269,7 +271,7 @@ impl Worker {
         if self.is_foreign() || self.shared.is_gone() {
             return Ok(());
         }
-        // The end of the connection is marked before the Stop, so that no request can begin after the Stop.
+        // The connection is marked as ended before the Stop, so that no request can begin after the Stop.
         let rested = match self.shared.end() {
             true => {
                 self.overtake(WorkerState::rest).map_err(PyErr::from).and_then(|came| self.wait(py, came))
@@ -317,7 +319,7 @@ fn act<T: Send + 'static>(
             state.shared.queue.done();
             result
         });
-        // The caller may have stopped waiting for the result.
+        // An error is ignored, because the caller may have stopped waiting for the result.
         let _ = done.send(result);
     };
     (Box::new(act), came)

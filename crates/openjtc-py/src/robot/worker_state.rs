@@ -65,7 +65,7 @@ pub(crate) struct WorkerState {
     pub session: Session<AnyPort>,
     /// Arm that the caller passed, or the built-in arm. If the controller has extensions, the arm of the controller is used instead.
     pub arm: Arc<Arm>,
-    /// `true` if the caller passed an arm.
+    /// `true` if the caller passed an arm to `connect`.
     pub named: bool,
     pub shared: Arc<Shared>,
     pub tape: Rc<Tape>,

@@ -40,7 +40,7 @@ impl Alarms {
     pub(super) fn number_shared(&self, board: u8, found: &[u16]) {
         let error = IdentityError::NumberShared { board, found: found.to_vec(), given_back: false };
         let mut own = Failure::from(SessionError::from(Error::from(error)));
-        // If the conflict is found while the board runs, it is a fault and not a refusal.
+        // The board already runs when the conflict is found, so this is a fault and not a refusal.
         own.kind = ErrorKind::Fault;
         self.add(own);
     }

@@ -10,7 +10,7 @@ use ucom_host::session::{Held, Link, Notice, Operator};
 
 use super::shared::{Halt, Shared};
 
-/// State that the thread of the session keeps between turns.
+/// State that the thread of the session keeps between two passes of its main loop.
 #[derive(Default)]
 struct Local {
     /// `true` after the Stop at the end of the session was sent.
@@ -18,7 +18,7 @@ struct Local {
     now_us: u64,
 }
 
-/// Operator of the session.
+/// Operator of the session, which passes events, samples and alarms from the bus to the Python threads.
 pub(super) struct Hand {
     shared: Arc<Shared>,
     held: Rc<RefCell<Held>>,
@@ -95,8 +95,8 @@ impl Operator for Hand {
         let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
-            // The running request must undo its changes, possibly on boards that do not answer. The Stop is therefore sent first,
-            // so that no board continues to run during this time.
+            // The running request must undo its changes, possibly on boards that do not answer. The Stop is sent
+            // before that, so that no board continues to run meanwhile.
             local.end_sent = true;
             halts.push(Halt::Started);
         }

@@ -41,7 +41,8 @@ impl Owner {
         let shared = Arc::new(Shared::default());
         let own = shared.clone();
         let thread = std::thread::spawn(move || {
-            // With this guard, callers do not wait forever after a fault of this thread.
+            // The guard closes the queue when this thread ends, also after a fault. Callers therefore do not wait
+            // forever.
             let gone = Gone(&own);
             let mut state = WorkerState::new(own.clone(), config, link);
             match state.serve() {
@@ -123,13 +124,14 @@ impl Owner {
     /// Adds the result of each board to the exception that ended an update. An update that ends with an exception returns no report.
     fn add_outcomes(&self, py: Python<'_>, after: u64, error: &PyErr) {
         for text in self.shared.outcomes(after) {
-            // Errors are ignored, because exceptions have notes only since Python 3.11 and the events contain these texts, too.
+            // Errors are ignored: exceptions accept notes only since Python 3.11, and the events contain the same
+            // texts.
             let _ = error.value(py).call_method1("add_note", (text,));
         }
     }
 
-    /// After a Ctrl-C, stops all boards that this session has started, and waits for the end of the stop. A second Ctrl-C only ends
-    /// the wait.
+    /// After a Ctrl-C, stops all boards that this session has started, and waits until they are stopped. A second
+    /// Ctrl-C only ends the wait.
     pub(super) fn interrupted(&self, py: Python<'_>) {
         if !self.process.is_this() {
             return;
@@ -157,7 +159,7 @@ impl Owner {
         loop {
             match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
-                // After a signal, another stop is not needed here.
+                // A signal needs no further stop here, because the stop is already in progress.
                 _ => py.check_signals()?,
             }
         }

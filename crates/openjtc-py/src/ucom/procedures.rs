@@ -78,7 +78,7 @@ pub(super) fn init(
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
 ) -> Result<(Value, Option<Inventory>), Failure> {
-    // The comparison includes changes that another program has made in the inventory file.
+    // The content of the inventory file takes precedence, because another program may have changed the file.
     state.inventory = listed.or_else(|| state.inventory.take().map(Inventory::without_records));
     let compared = state.inventory.as_ref().filter(|_| state.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());

@@ -55,7 +55,8 @@ impl Tap {
         if let Some(sender) = &*lock(&self.sink.0) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // An error is ignored. If the disk is full, the writer has ended and reports the error itself.
+            // An error is ignored. It occurs if the writer has ended, for example because the disk is full, and the
+            // writer reports the error itself.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }
     }

@@ -16,8 +16,7 @@ pub(super) fn start(state: &mut WorkerState, boards: &Boards, force: bool) -> Re
     let all = state.starting(&numbers, |state| {
         state.driver.change_each(&numbers, |board| Request::Start { board, force })
     })?;
-    // The session reads the signal names of the boards. If the names cannot be read, the applications still stay
-    // started.
+    // Reads the signal names of the boards into the cache. If this fails, the applications stay started.
     numbers.iter().for_each(|board| drop(state.known(*board)));
     Ok(numbered(state, &all))
 }
@@ -33,7 +32,7 @@ pub(super) struct Run {
     pub force: bool,
 }
 
-/// Starts applications and control loops, with their values.
+/// Starts applications and control loops of boards with their initial values.
 pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failure> {
     let numbers = state.driver.numbers(&run.boards)?;
     only(&numbers, &run.inputs, "run").map_err(SessionError::from)?;
@@ -48,7 +47,7 @@ pub(super) fn run(state: &mut WorkerState, mut run: Run) -> Result<Value, Failur
     let begin = |session: &mut Session, cache: &Cache| {
         let mut prepared = Prepared::default();
         let started = begin(session, cache, &numbers, &run, file.as_ref(), &mut prepared);
-        // The failed procedure has already undone its own steps. Only the preparation must still be undone here.
+        // The failed procedure has already undone its own steps. Here, only the preparation is undone.
         let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
         Ok((report, prepared))
     };
@@ -129,7 +128,7 @@ fn all_certain(what: &str, failed: Vec<(u8, SessionError)>) -> Result<(), Failur
     Err(own)
 }
 
-/// Stops each selected board. `all` selects the boards that answer and the boards that this session has started.
+/// Stops each selected board. `all` selects the boards that answer, and the boards that this session has started.
 pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -> Result<Value, Failure> {
     let was_master = state.driver.master.is_master();
     let wanted = match boards {
@@ -137,7 +136,7 @@ pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -
             let mut wanted = state.started();
             match state.driver.numbers_to_stop(&Boards::All) {
                 Ok(found) => wanted.extend(found),
-                // A board without a number does not run.
+                // Boards without a number do not run, so only the boards that this session has started are stopped.
                 Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) if !wanted.is_empty() => {}
                 Err(error) => return Err(error.into()),
             }
@@ -155,7 +154,8 @@ pub(super) fn stop(state: &mut WorkerState, boards: &Boards, level: StopLevel) -
         }
     }
     if !was_master && state.started().is_empty() {
-        // The session ends its role as master of the bus, because a stop must not make it the master.
+        // A stop must not make the session the master of the bus. If the session was not the master before, it gives
+        // up this role.
         state.driver.master.end_session();
     }
     all_certain("not stopped for certain", failed)?;

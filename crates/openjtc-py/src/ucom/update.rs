@@ -112,7 +112,7 @@ fn image(source: &Source, options: &ImageOptions) -> Result<UpdateImage, Failure
             Source::File(path) => path.display().to_string(),
             Source::Bytes(_) => "image".into(),
         };
-        // Some error texts already contain the file name.
+        // The file name is added only if the error text does not contain it.
         Failure::usage(if text.contains(&name) { text.clone() } else { format!("{name}: {text}") })
             .next(advice(&e))
     })?;

@@ -52,8 +52,8 @@ pub(super) fn set(
     note_rounded(&state.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = state.driver.now_us();
     let boards = state.driver.master.boards();
-    // The session sends the inputs of a running board repeatedly, so a lost frame has no effect. If a board has no power, its
-    // control loop does not run.
+    // The session repeats the inputs of a running board, so a lost frame has no effect. A board that sends no
+    // outputs, for example because it has no power, does not run.
     let runs = state.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -117,7 +117,7 @@ pub(super) fn running(state: &mut WorkerState) -> Result<Value, Failure> {
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
-        // If the reason for missing outputs is known, the reason is reported first.
+        // If another failure explains the missing outputs, that failure is reported instead.
         state.shared.check()?;
         return Err(no_value(board, "outputs", one["age_s"].as_f64()));
     }
@@ -132,7 +132,7 @@ fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     let followed = held.followed.outputs(&state.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
-    // If this session does not run the board, another program runs it.
+    // If this session does not run the board, another program may run it. The last received outputs are then used.
     let other =
         || held.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
     let last = followed.or_else(other);
@@ -167,7 +167,7 @@ pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Va
         Buffer::Par => "parameters",
     }];
     if buffer == Buffer::So && all["stale"] == json!(true) {
-        // If the reason for missing outputs is known, the reason is reported first.
+        // If another failure explains the missing outputs, that failure is reported instead.
         state.shared.check()?;
         return Err(no_value(board, name, all["age_s"].as_f64()));
     }

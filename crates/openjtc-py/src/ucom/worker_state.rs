@@ -15,7 +15,7 @@ use super::operator::Hand;
 use super::shared::Shared;
 use super::simulated::Simulated;
 
-/// Maximum duration of a turn of the session. Waits for the bus itself are shorter.
+/// Maximum duration of one pass of the session's main loop. Waits for the bus itself are shorter.
 const TURN: Duration = Duration::from_millis(25);
 
 /// Maximum wait for the first outputs of a board, µs. Boards send outputs every few milliseconds.
@@ -107,7 +107,7 @@ impl WorkerState {
         }
     }
 
-    /// Runs the bus for one turn.
+    /// Runs one pass of the session's main loop on the bus, and reports changes of boards.
     fn turn(&mut self) -> Result<(), SessionError> {
         self.session.turn(TURN)?;
         if self.shared.queue.stop_waits() {
@@ -121,7 +121,7 @@ impl WorkerState {
 
     /// Sends all frames of a request before the caller receives the result.
     pub(super) fn settle(&mut self) {
-        // If the bus is lost, the next turn reports the loss.
+        // An error is ignored here. If the bus is lost, the next pass of the main loop reports the loss.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }

@@ -136,8 +136,8 @@ async fn serve_connection(
         .with_upgrades()
         .await;
     is_socket.store(true, Ordering::Relaxed);
-    // An error only means that the client has disconnected, so it is ignored. The place of a WebSocket also becomes
-    // free here, because `Sockets` counts WebSockets separately.
+    // An error is ignored, because the connection is closed and its client cannot receive an answer. The place of a
+    // WebSocket also becomes free here, because `Sockets` counts WebSockets separately.
     drop((served, place));
 }
 

@@ -171,8 +171,8 @@ impl Agent {
         self.gate.lost_lines()
     }
 
-    /// Sends a Stop or a Pause of an HTTP client. It also cancels earlier requests of this client itself, even if the
-    /// client holds the lease.
+    /// Sends a Stop or a Pause of an HTTP client. The Stop also cancels earlier requests of this client itself, even
+    /// if the client holds the lease, because such requests may arrive after the Stop.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
         // The client's identity decides only which name is reported, and that no hold-off applies to this client.

@@ -399,8 +399,9 @@ impl SharedLine {
     }
 
     /// Stops or pauses every motion on behalf of the line's owner. Sends the command even if the arm seems to be at
-    /// rest, because the last status may be older than the last command. In this case, no hold-off begins for other
-    /// clients, and the controller may refuse the command. Returns true if the arm may have been moving.
+    /// rest, because the last status may be older than the last command. If the arm seems to be at rest, no hold-off
+    /// begins for other clients, and the controller may refuse the command. Returns true if the arm may have been
+    /// moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.motion_tracker.may_move(self.status.as_ref(), now);
         if moved {

@@ -225,8 +225,8 @@ impl Drop for Owner {
     }
 }
 
-/// Reads and writes the port until the port is lost or the thread must end. The thread then waits until the serial
-/// line is idle, for at most 1 s.
+/// Reads and writes the port until the port is lost or the thread must end. Before it ends, the thread continues to
+/// serve the port until the serial line is idle, for at most 1 s. If the port is lost, the thread ends at once.
 fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     let mut gone = Gone(shared, "internal error of the agent".to_owned());
     let mut last_turns = None;

@@ -1,4 +1,4 @@
-//! Commands of the lease holder that end at once, in contrast to jobs.
+//! Short commands of the lease holder, which end before the agent answers the request, in contrast to jobs.
 use std::borrow::Cow;
 use std::time::Duration;
 

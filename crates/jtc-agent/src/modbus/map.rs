@@ -407,7 +407,7 @@ mod tests {
             jumped: 0b100,
             ..View::default()
         };
-        // The value 61.5 and its limit 54 are 42760000 and 42580000 in IEEE 754, and 12,300 ms are 12 s.
+        // The value 61.5 and its limit 54 are 0x42760000 and 0x42580000 as 32-bit floats, and 12,300 ms are 12 s.
         assert_eq!(inputs(&view)[86..94], [2, 2, 0x4276, 0, 0x4258, 0, 12, 0b100]);
         let bit = |view: &View| (DISCRETE_INPUTS[13].value)(view);
         assert!(bit(&view) && !view.is_ready());

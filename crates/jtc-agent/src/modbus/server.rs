@@ -139,7 +139,8 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
 
 /// Ensures that the server can accept another connection. If necessary, closes the connection that has been idle
 /// longest. Never closes a connection that sends commands, whose coil holds the arm at rest, or that was idle for
-/// less than `GIVES_WAY`. Returns `false` if no connection can be closed.
+/// less than `GIVES_WAY`. Returns `false` if no connection can be closed. If all connections hold the arm at rest, no
+/// motion can begin.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {

@@ -6,7 +6,7 @@ use cli_kit::variables::{Retired, Variables};
 pub(crate) const VARIABLES: Variables = Variables {
     json: "JTC_JSON",
     retired: &[
-        // The first variables caused a motion, a reset, flashing or overwriting. The others confirmed an action,
+        // Some of these variables caused a motion, a reset, flashing or overwriting. Others confirmed an action,
         // overrode a check, or selected another file.
         Retired::less("JTC_ACCEPT_DEVICE_LIMITS", "", "accept-device-limits"),
         Retired::less("JTC_ACCEPT_SUPPLY", "", "accept-supply"),

@@ -79,8 +79,8 @@ pub(super) struct Incoming {
     missing: usize,
     /// `true` if the bytes that were received last continue a frame.
     continued: bool,
-    /// Time at which the simulated line sent the last byte. For a long frame, time at which a real serial line would
-    /// have sent this byte.
+    /// Time at which the simulated line sent the last byte. For a long frame, the value is the time at which a real
+    /// serial line would have sent this byte.
     heard: Instant,
 }
 

@@ -185,7 +185,8 @@ mod tests {
 
     use super::*;
 
-    /// The test runs 100,000 motions. Only the results of the last 1000 runs stay in memory, with their run numbers.
+    /// After 3001 motions (2001 runs and 1000 approaches), only the results of the last 1000 motions are in memory.
+    /// The run numbers count all runs.
     #[test]
     fn figures_of_the_last_motions_are_kept() {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);

@@ -119,7 +119,8 @@ impl<'a> Checker<'a> {
     }
 
     /// Adds the problems that the controller's own check would find during the upload (J-36). If the verdict already
-    /// contains a problem of this kind and joint, it is added again only for kinds whose occurrences are counted.
+    /// contains a problem of this kind and joint, it is added again only for kinds whose occurrences are counted. A
+    /// problem is not added if the verdict contains a jump of this joint at the same point.
     fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
         let tables = match self.friction {
             Some(Friction::Table(tables)) => Some(tables),

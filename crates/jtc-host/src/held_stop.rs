@@ -76,8 +76,8 @@ impl HeldStop {
 /// Reactions of a controller to faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reacting {
-    /// Last held stop; `None` if no held stop has occurred since the start of the controller, or since the errors
-    /// were last cleared.
+    /// Last held stop; `None` if no held stop has occurred since the start of the controller, or since its occurred
+    /// errors were last cleared (ClearOccurredErrors).
     pub last_held_stop: Option<HeldStop>,
     /// Numbers, from 1, of the joints that yield to a push or lower their loads.
     pub yields: Vec<u8>,

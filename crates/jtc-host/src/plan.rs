@@ -90,8 +90,9 @@ pub struct Planner<'a> {
     pub temperature: f64,
     /// Speed of planned motions, 1 to 100 % of the limits.
     pub speed_pct: f64,
-    /// Size of a rounded corner, rad. Within this distance from the waypoint, the path leaves the straight segments.
-    /// The distance is the largest distance of a joint. If the blend is 0, the arm stops at each waypoint.
+    /// Size of a rounded corner, rad. The path leaves the straight segments only within this distance from the
+    /// waypoint. The distance is that of the joint that is furthest from the waypoint. If the blend is 0, the arm
+    /// stops at each waypoint.
     pub blend: f64,
     /// `true` if the jerk is limited. If the value is `false`, the acceleration changes within two steps.
     pub jerk: bool,

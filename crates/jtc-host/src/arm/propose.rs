@@ -69,8 +69,8 @@ pub const RULES: [Rule; 11] = [
 const TEACH_DAMPING_RATE: f64 = 100.0;
 /// Tool speed limit of an imported arm, m/s. ISO 10218 requires this limit while a person near the robot sets it up.
 const TOOL_SPEED_MAX: f64 = 0.25;
-/// Damping of the proposed gains, without a unit: Kd multiplied by [`DERIVATIVE_AGE`], divided by the least inertia
-/// (J-71).
+/// Damping of the proposed gains, without a unit: Kd multiplied by the sum of the controller's delay and
+/// [`DERIVATIVE_AGE`], divided by the least inertia (J-71).
 const DAMPING: f64 = 0.7;
 /// Age of the derivative, s: half of the time window of the derivative, plus half a tick. A torque stays constant for one tick, so its
 /// average delay is half a tick.

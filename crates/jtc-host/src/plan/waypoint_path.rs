@@ -13,11 +13,12 @@ const ASIDE_M: f64 = 5e-4;
 pub struct WayOptions {
     /// `true` if the flange moves along a straight line in each segment for which the file does not specify the motion.
     pub line: bool,
-    /// Size of a rounded corner, rad. Within this distance from the waypoint, the path leaves the straight segments.
-    /// The distance is the largest distance of a joint. If `blend` is 0, the arm stops at each waypoint.
+    /// Size of a rounded corner, rad. The path leaves the straight segments only within this distance from the
+    /// waypoint. The distance is that of the joint that is furthest from the waypoint. If `blend` is 0, the arm stops
+    /// at each waypoint.
     pub blend: f64,
-    /// Size of a rounded corner between two lines or arcs of the flange, m. If `blend_m` is 0, the arm stops at each
-    /// of these corners.
+    /// Size of a rounded corner between two lines or arcs of the flange: the largest distance of the flange from the
+    /// waypoint in the corner, m. If `blend_m` is 0, the arm stops at each of these corners.
     pub blend_m: f64,
 }
 

@@ -158,8 +158,8 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the errors of the joints that have occurred since the errors were last cleared. These errors include
-/// errors to which the controller itself reacts (J-66).
+/// Returns the errors of the joints that have occurred since the occurred errors were last cleared. These errors
+/// include errors to which the controller itself reacts (J-66).
 fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }

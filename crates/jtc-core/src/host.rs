@@ -258,8 +258,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
         if command.frame_type().is_default() {
             if self.extensions.unusable {
-                // The stored arm could not be loaded. The built-in arm is a different arm, so the controller must not
-                // use it instead (J-54).
+                // The stored arm could not be loaded or written. The built-in arm is a different arm, so the controller
+                // must not use it instead (J-54).
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
             if self.extensions.stored.is_there() {

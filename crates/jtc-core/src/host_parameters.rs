@@ -37,7 +37,8 @@ pub(crate) struct HostParameters {
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
-    /// Effective inertia of the joints in the received model, or in a model while it is being checked (J-71).
+    /// Effective inertia of the joints in the received model (J-71). `looked_at` is the effective inertia in the model
+    /// that is being checked or was checked last.
     felt: FeltInertia,
     looked_at: FeltInertia,
     /// Trial of gains that were received under torque.

@@ -218,8 +218,8 @@ impl Nodes {
 
     /// Processes the frames that the bus has received since the last tick. `commanded` contains the set values of the last ticks.
     pub(crate) fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
-        // `answered` and `configured_before` are masks of nodes. A node that accepts its configuration in this tick
-        // answers only the Move of a later tick.
+        // `answered` and `configured_before` are masks of nodes. If a node accepts its configuration in this tick, its
+        // Move answer in this tick does not count. Its answer to the next Move comes in a later tick.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         if self.some_absent {
             self.nodes.iter_mut().for_each(|node| node.unasked = None);

@@ -80,7 +80,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
         let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
-        // Masks for a trial of gains (J-71): the joints that their gains do not hold, and among these the joints with
+        // Masks of the joints that fail with their gains, on trial or not (J-71), and among these of the joints with
         // an unstable control loop.
         let (mut failed, mut unstable) = (0u8, 0u8);
         // With a loop over the index, the compiler can see that the index is in range.

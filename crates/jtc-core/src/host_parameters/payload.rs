@@ -18,8 +18,8 @@ pub(crate) struct PayloadBlend {
     left_ms: u16,
 }
 
-/// State of a payload blend for a snapshot. The end of the blend follows from the arm and its configured payload, so
-/// this state contains only the start of the blend.
+/// State of a payload blend for a snapshot. The inertial parameters at the end of the blend follow from the arm and its
+/// configured payload, so this state does not contain them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,

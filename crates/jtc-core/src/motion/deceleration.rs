@@ -185,10 +185,10 @@ mod tests {
         }
     }
 
-    /// In these formulas, v is the start velocity, T is the duration and u is the elapsed share of T. A guided joint
-    /// takes 0.2 s, with the velocity v · (1 − u)² and the acceleration −2 · v / T · (1 − u). A joint that falls at 1
-    /// rad/s takes 1.5 · 1 rad/s / 3 rad/s² = 0.5 s, with the velocity v · (1 − 3 · u² + 2 · u³) and the acceleration
-    /// −6 · v / T · u · (1 − u).
+    /// In the formulas below, v is the start velocity, T is the duration and u is the elapsed share of T. A guided
+    /// joint takes 0.2 s, with the velocity v · (1 − u)² and the acceleration −2 · v / T · (1 − u). A joint that falls
+    /// at 1 rad/s takes 1.5 · 1 rad/s / 3 rad/s² = 0.5 s, with the velocity v · (1 − 3 · u² + 2 · u³) and the
+    /// acceleration −6 · v / T · u · (1 − u).
     #[test]
     fn j16_j25_the_acceleration_is_the_derivative_of_the_velocity() {
         let (config, limits) = (Config::avena(), JointConfig { velocity_max: 2.0, ..limits() });

@@ -39,7 +39,7 @@ pub(crate) struct HoldBack {
     quiet_ms: u16,
     /// Number of ticks of this run of the path in which the path was held back.
     run_ms: u16,
-    /// Mask of the joints that were at their torque limits since the path was last slowed down.
+    /// Mask of the joints that were at their torque limits since the controller last began to slow down the path.
     pressed: u8,
 }
 
@@ -91,7 +91,7 @@ impl HoldBack {
         self.run_ms
     }
 
-    /// Returns `true` if the joint was at its torque limit since the path was last slowed down.
+    /// Returns `true` if the joint was at its torque limit since the controller last began to slow down the path.
     pub(crate) fn has_pressed(&self, joint: usize) -> bool {
         self.pressed & (1 << joint) != 0
     }

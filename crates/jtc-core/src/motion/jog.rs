@@ -484,9 +484,9 @@ mod tests {
                     tick(&mut jog, &mut position, &config);
                     position[0] = position[0].min(0.0);
                 }
-                // At the same speed, a motion on a path would stop within the time of the ramp, and would travel half
-                // of the distance at constant speed. A fast joint takes longer, because its acceleration limit
-                // applies.
+                // Like a motion on a path, a jog stops within the time of the ramp. Its stopping distance is about half
+                // of the distance that it would travel in this time at constant speed. A fast joint takes longer,
+                // because its acceleration limit applies.
                 let hard = config.joints[0].acceleration_max;
                 let longest = 20 + config.ramp_ms.max((1_600.0 * share * fastest / hard) as u16);
                 for (end, wait) in [(End::Stop, 0), (End::Rate(0.0), 0), (End::Silence, LASTS_MS)] {

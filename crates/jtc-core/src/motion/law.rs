@@ -124,8 +124,8 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// Like [`Self::change_mode`], but no part of the torque may step. After this change, the model torque also
-    /// contains the torque that decelerates the arm.
+    /// Like [`Self::change_mode`], but no part of the torque may step, because the model torque then also contains the
+    /// torque that decelerates the arm.
     pub(crate) fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
@@ -441,8 +441,8 @@ impl ControlLaw {
         // While the integral releases torque that the model now contains, it does not show the load of the joint.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
-            // The load is unknown until the integral alone holds the joint, so that the other parts of the PID torque
-            // are small.
+            // The load is unknown until the integral alone holds the joint. The other parts of the PID torque are then
+            // small.
             let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
             load.observe(pid.i, found && set.settled(j), limits);
         }

@@ -19,7 +19,7 @@ const FAST: f64 = 0.2;
 const PUSHED_MS: u16 = 20;
 /// Excess of a joint's speed over the commanded speed, as a share of its velocity limit. `RUSH_WAY` is the distance
 /// by which the joint is ahead of its set position, rad. A joint above both values counts as pushed. With weak gains,
-/// this detects a push of a joint with little inertia earlier than the feedback torque.
+/// a pushed joint with little inertia exceeds its speed limit before its feedback torque shows the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 

@@ -123,7 +123,8 @@ impl PathRamp {
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
-            // If a joint does not move along the path, path time has no effect on its torque.
+            // A joint that does not move along the path may be above its limit for another reason. Its bounds always
+            // permit a slope of 0, so that it does not force a change of path time.
             narrow(
                 &mut full,
                 if moves(at.velocity[j]) { (low, high) } else { (low.min(0.0), high.max(0.0)) },

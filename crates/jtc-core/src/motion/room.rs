@@ -28,7 +28,8 @@ const TOP_ACCELERATION: f64 = 5.774;
 const REST_S: f64 = 0.3;
 /// Speed of a slow jog, rad/s. If friction leaves no torque for the requested speed, the controller tries this speed.
 const CREEP: f64 = 0.02;
-/// Speed of a joint, rad/s, from which the controller uses the full friction of the model.
+/// Speed from which the full friction of the model acts, rad/s. The friction of a slower jogged joint is computed at
+/// this speed.
 const SLIDES: f64 = 0.1;
 /// Highest speed that counts as zero, rad/s.
 const NO_SPEED: f64 = 1e-3;

@@ -19,9 +19,9 @@ use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
 use joint::{TaughtJoint, rotor};
 
-/// Number of ticks in a round. Each round computes all slowly changing values once. `FIRST` is the number of ticks
-/// before the first round: the start of Teaching, the mass at the flange, the inertia of the whole arm for a ramp,
-/// and the inertia of each of the six joints.
+/// Number of ticks in a round. Each round computes the inertia and the friction of each joint once. `FIRST` is the
+/// number of ticks before the first round: the start of Teaching, the mass at the flange, the inertia of the whole arm
+/// for a ramp, and the inertia of each of the six joints.
 const TURNS: u8 = 76;
 const FIRST: u8 = 9;
 /// Time between two comparisons of the load with the motion, ticks. `PERIOD` is the same time in s.

@@ -149,8 +149,8 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Returns the torque steps that are still blended in each tick after a change of state. `last` is the torque
-    /// before this change.
+    /// Executes one tick in which the next torque is zero, and returns the remaining torque steps of the joints. `last`
+    /// is the torque of the tick before. It matters only in the first tick after a change of state.
     fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
         let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);

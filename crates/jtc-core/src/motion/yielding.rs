@@ -70,10 +70,10 @@ const COMES_BACK_S: f64 = 0.3;
 const HOLDABLE: f64 = 0.95;
 /// Number of missing answers after which the spring of a yielding joint does not act.
 const MISSING: u8 = 2;
-/// Number of consecutive yields of a joint after which the last yield lasts until the host clears it. Yields count as
-/// consecutive if each yield of the arm begins within [`AGAIN_MS`] after the previous one.
+/// Number of the first yield in a series of yields of a joint that lasts until the host clears it. A series continues
+/// while each yield of the arm begins within [`AGAIN_MS`] after the beginning of the previous one.
 const TIMES: u8 = 3;
-/// Longest time between two consecutive yields (see [`TIMES`]), ticks.
+/// Time without the beginning of a yield after which a series of yields ends (see [`TIMES`]), ticks.
 const AGAIN_MS: u16 = 10_000;
 
 /// State of a joint that yields.
@@ -256,8 +256,8 @@ impl Yield {
             wanted.min(soft * DAMPING_RATE * self.inertia)
         };
         self.damping += SETTLES * (damping - self.damping);
-        // The brake has no effect in the first tick of a yield. Otherwise the transfer would treat its torque as a
-        // torque step and blend it out.
+        // The brake has no effect in the first tick of a yield. The transfer compares the torque of this tick with the
+        // last torque. It would treat a brake torque as a part of the step and would let it act only gradually.
         let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
         let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);
@@ -328,11 +328,11 @@ fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
     if beyond > 0.0 { -(slope * beyond).min(torque_max) * joint.young_velocity.signum() } else { 0.0 }
 }
 
-/// Number of yields of each joint that are counted together (see [`TIMES`]).
+/// Number of yields of each joint in the present series (see [`TIMES`]).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Yielded {
     times: [u8; JOINTS],
-    /// Number of ticks since the last yield of any joint.
+    /// Number of ticks since the beginning of the last yield of any joint.
     since_ms: u16,
 }
 

@@ -30,8 +30,9 @@ pub(super) use jump::Ways;
 use jump::{Jumps, Seen};
 use lateness::Lateness;
 
-/// Speed that a joint cannot reach, as a multiple of its velocity limit. An answer is not usable if its distance from
-/// the prediction is larger than the distance at this speed (the *implausible distance*, J-35).
+/// Speed that a joint cannot reach, as a multiple of its velocity limit. The *implausible distance* is the distance at
+/// this speed in the time since the last usable answer. An answer is not usable if it is farther from its prediction
+/// (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
 /// Largest distance from the prediction at which an answer is used for the rate of the joint, as a share of the
 /// implausible distance. An answer farther away may show a jump of the encoder instead of a motion.

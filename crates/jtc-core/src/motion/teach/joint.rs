@@ -242,11 +242,11 @@ impl TaughtJoint {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Returns the dry friction torque of a slow joint. The first speed is the speed at which the damping torque
-    /// equals the dry friction. From this speed to four times this speed, the dry friction fades to zero, so a joint
-    /// stops if a lower torque moves it. If the first speed is at most [`SLOW`], the dry friction falls at most half
-    /// as fast as the damping torque rises. The total torque against the motion then never falls with the speed, even
-    /// with the friction compensation.
+    /// Returns the dry friction torque of a slow joint, N·m. The *first speed* of a joint is the speed at which its
+    /// damping torque equals its dry friction. From the first speed to four times this speed, the dry friction fades
+    /// to zero. A joint therefore stops against any torque that is lower than the dry friction. If the first speed is
+    /// at most [`SLOW`], the dry friction falls at most half as fast as the damping torque rises. The total torque
+    /// against the motion then never falls with the speed, even with the friction compensation.
     fn dry_friction(
         &mut self,
         position: f64,

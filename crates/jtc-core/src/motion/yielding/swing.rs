@@ -8,7 +8,7 @@ const HALF_SPEED: f32 = 0.15;
 /// Lowest speed of the second half of a swing, as a share of the speed of the first half. When a spring moves a joint
 /// back after a sudden push, the second half is slower and does not count as a swing.
 const LASTS: f32 = 0.5;
-/// Factor by which each swing reduces `soft`. `SOFTEST` is the lowest value of `soft`.
+/// Factor by which each swing multiplies `soft`. `SOFTEST` is the lowest value of `soft`.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
 /// Time without a swing after which `soft` increases by its first step, ms, and time between two further steps, ms.

@@ -125,8 +125,9 @@ pub(crate) struct BaseInertialParameters {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
-    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike a moment of inertia, a
-    /// second moment of an axis contributes to the torque only through the acceleration along this axis.
+    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike a moment of inertia, the
+    /// integral of x² contributes to the torque only through the acceleration of the points on the x axis. The
+    /// integral of y² does so only through the points on the y axis.
     pub xx: f64,
     pub yy: f64,
     pub xy: f64,

@@ -222,8 +222,8 @@ fn j33_a_stop_that_takes_too_long_is_found() {
         let found = (0..600).find_map(|ms| script.tick(state, trajectory).map(|broken| (ms, broken)));
         assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{trajectory:?}");
     }
-    // Here the checker has not seen the command, but the controller brakes. The time of the stop then begins with the
-    // braking.
+    // A stop acts before the controller executes its frame (J-04), so the checker has not seen the command yet. The
+    // time of the stop then begins when the controller brakes.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     script.telemetry.braking = true;

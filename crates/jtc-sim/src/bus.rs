@@ -326,7 +326,8 @@ impl Bus {
         room
     }
 
-    /// Returns the frame, with changed contents if the fault `garbled` affects this frame.
+    /// Returns the frame as a receiver with faulty memory reads it: the fault `garbled` changes the contents of some
+    /// frames.
     fn garble(&mut self, frame: Frame) -> Frame {
         if self.fault.garbled == 0.0 || self.rng.f64() >= self.fault.garbled {
             return frame;

@@ -105,8 +105,8 @@ fn j04_a_stop_behind_four_thousand_frames() {
     }
 }
 
-/// At 921,600 bit/s, the controller executes 40,000 of the shortest frames without losing a frame; only response
-/// records may be lost. Above 960 kBd, the shortest frames arrive faster than the controller executes them.
+/// At 921,600 bit/s, the controller executes 40,000 short frames without losing a frame; only response records may be
+/// lost. Above 960 kBd, the shortest frames arrive faster than the controller executes them.
 #[test]
 fn j04_short_frames_are_executed_as_fast_as_they_come() {
     let mut operator = moving(Some(921_600));

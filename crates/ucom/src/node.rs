@@ -188,7 +188,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         match FromBoard::decode(frame, &self.config.profile) {
             // The INITACK counts only if it contains the number that the board is accepting now. The board may have
-            // lost the earlier number while the frame waited.
+            // lost this number, for example by a reset, while the frame waited.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }

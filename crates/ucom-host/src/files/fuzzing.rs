@@ -72,8 +72,8 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Reads signal tables. For every signal, a word is displayed as text, and this text must convert back to the same
-/// word unless a limit forbids the word.
+/// Reads signal tables. For every signal, a word is displayed as text. This text must convert to a word that is
+/// displayed as the same text, unless a limit forbids the word.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -87,8 +87,8 @@ pub fn edges(data: &[u8]) {
                         signal.text_with_unit(word).parse().expect("what is shown can be given");
                     let (again, text) = (signal.word(&given), signal.text(word));
                     let limited = signal.min.is_some() || signal.max.is_some();
-                    // If the offset is more than 1e9 times the scale, the displayed values of neighbouring words can
-                    // be equal.
+                    // If the offset is more than 1e9 times the scale, a displayed value has too few digits to
+                    // distinguish neighbouring words.
                     let coarse = signal.offset.abs() > signal.scale.abs() * 1e9;
                     // A scaled signal without a unit accepts only raw words.
                     let no_unit = signal.unit.is_empty() && (signal.scale != 1.0 || signal.offset != 0.0);

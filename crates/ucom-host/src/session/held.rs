@@ -177,8 +177,8 @@ impl Session {
     }
 
     /// Runs an action that starts or moves these boards. The boards are listed as started before any frame is sent,
-    /// because the user may end the action at any time. If the action fails, the function removes boards from the
-    /// list if no frame was sent to them or if they answer that they are stopped.
+    /// because the user may end the action at any time. If the action fails, a board that was not listed before is
+    /// removed again if no command was sent to it or if it answers that it is stopped.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],

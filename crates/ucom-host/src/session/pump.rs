@@ -16,8 +16,8 @@ const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Limit of the frames that the PC sends before it handles received frames.
 const MOST_SENT: usize = 64;
-/// Age in µs above which the loop assumes that frames were delivered to the master. The age is used only if the bus is
-/// flooded permanently.
+/// Age in µs above which the loop assumes that frames were delivered to the master, if the bus is flooded permanently.
+/// [`Pump::flush`] also ends after this time.
 const BEHIND_US: u64 = 1_000_000;
 
 /// Interface to a bus with a clock.

@@ -1,5 +1,6 @@
-//! Tests with two boards that have the same number (D-24). A stop stops both boards. Every other request to a shared
-//! number fails with a specific error before any board is changed.
+//! Tests with two boards that have the same number (D-24). A stop reaches both boards, and so does a request that
+//! switches outputs off. Every other request to a shared number fails with a specific error before any board is
+//! changed.
 
 use super::bench::Exit;
 use ucom::{Profile, Status};

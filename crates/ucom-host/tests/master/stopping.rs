@@ -159,7 +159,7 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     bench.run(100);
     assert_eq!([0, 1, 2].map(|i| bench.board(i).application.running), [false, true, false]);
     assert_eq!(["601#00000000", "603#00000000", "600#00000000"].map(|f| bench.count(f)), [3, 3, 0]);
-    // The boards are stopped in the reverse order of their numbers.
+    // The boards are stopped in the reverse order of the given list.
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 

@@ -1,5 +1,5 @@
-//! Tests of the conditions under which a board is up to date (D-62, U-3). A board is up to date if its answer and its
-//! flash record match the image. Some tests cover cases in which both are not enough.
+//! Tests of the conditions under which a board is up to date (D-62, U-3). A board is up to date if both its answer and
+//! its flash record match the image. Some tests cover cases in which even this is not enough.
 
 use super::bench::{Bench, Exit};
 use super::chain::initialised;

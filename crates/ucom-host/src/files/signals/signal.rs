@@ -204,8 +204,8 @@ impl Signal {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
-                // A number without a unit is refused here. Its meaning would depend on a file: it is a scaled value
-                // with a signal table, and a raw word without one.
+                // A number without a unit is refused if the table has a unit or a scale for the signal. The number
+                // would be a scaled value with the signal table, and a raw word without it.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }

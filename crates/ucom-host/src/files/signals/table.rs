@@ -149,8 +149,8 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Skips a key that the table already contains. For example, two signals share a name, so the key
-                    // of one of them is its index, such as `#2`. A third signal may have the name `#2`.
+                    // Skips a key that the table already contains. For example, two signals share a name, so their
+                    // keys are their indices, such as `#2`. A third signal may have the name `#2`.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }

@@ -48,13 +48,13 @@ pub(crate) struct Core {
     pub times: Times,
     /// Time of the last call of the master.
     pub now: u64,
-    /// Time up to which waits of procedures can end: the time of the last `poll`. The caller has delivered all frames
-    /// that were received before this time. If the caller is late, frames that were received between this time and
-    /// `now` are not delivered yet.
+    /// Time up to which waits of procedures can end: the time `received` of the last poll. The caller has delivered all
+    /// frames that were received before this time. If the caller is late, frames that were received between this time
+    /// and `now` are not delivered yet.
     pub fired: u64,
     /// Sum of the times that have certainly passed between received frames, µs. For each frame, the sum increases by
-    /// the time from the delivery of the frame to the last `poll` before the next frame. Frames that were received
-    /// together and delivered late do not increase the sum, so they do not look like a gap in a string.
+    /// the time from the delivery of the frame to the last value of `fired` before the next frame. Frames that were
+    /// received together and delivered late do not increase the sum, so they do not look like a gap in a string.
     pub passed: u64,
     /// Time at which the caller delivered the last frame.
     handed_over: u64,
@@ -65,8 +65,8 @@ pub(crate) struct Core {
     pub competing_master: Option<(u64, Function, u8)>,
     /// Time until which a report of a board is considered to be an answer, and not the sign of a reboot.
     pub report_until: u64,
-    /// Times at which stop commands that `on_lost` requires will be repeated, with the boards. The master repeats the
-    /// stops because a frame can be lost.
+    /// Times at which stop commands will be repeated, with the boards. `on_lost` or the caller has requested these
+    /// stops. The master repeats them because a frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
     /// Earliest time at which the inputs may be repeated.
     pub inputs_from: u64,

@@ -34,8 +34,8 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // The age is computed up to the last `poll` and not up to `now`, because a received heartbeat may not be
-            // delivered yet.
+            // The age is computed up to `fired` and not up to `now`, because a heartbeat that was received after
+            // `fired` may not be delivered yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;

@@ -75,9 +75,9 @@ impl IoDescription {
         }
     }
 
-    /// Returns the index of a signal in the buffer. The caller selects the signal by its index (`#3` or `3`) or by
-    /// its text. The unit in brackets at the end of the text can be omitted. The letter case is ignored if only one
-    /// signal then matches.
+    /// Returns the index of a signal in the buffer. The caller selects the signal by its text, or by its index (`#3` or
+    /// `3`) if no text matches. The unit in brackets at the end of the text can be omitted. The letter case is ignored
+    /// if only one signal then matches.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {

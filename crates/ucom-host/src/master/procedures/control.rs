@@ -271,8 +271,8 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // The start is recorded before PC_START leaves the queue. If the procedure is cancelled now, the PC therefore
-        // still stops the board.
+        // The start is recorded before PC_START leaves the queue. If the procedure is cancelled during the start, a
+        // later stop therefore knows that the board may still start.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;

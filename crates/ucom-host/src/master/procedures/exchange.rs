@@ -78,8 +78,8 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     }
     let answer = collector.answer();
     if let Answer::Info(info, text) = &answer {
-        // A string package can look like the first frame of an answer, but it does not contain the board's number and
-        // a possible status.
+        // A string package can be mistaken for the first frame of an answer. At the positions of the status and the
+        // board number, such a package has other bytes.
         if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }

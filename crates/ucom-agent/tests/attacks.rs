@@ -168,7 +168,7 @@ fn images_are_read_of_who_commands_alone_and_two_at_once() {
 #[test]
 fn stops_without_end_are_counted_and_sent_together() {
     let served = Served::start(1);
-    // The test waits for the result of a first Stop before it sends many Stops.
+    // Waits for the result of a first Stop, which shows that the agent has ended its first scan.
     let (status, _) = served.get("POST /api/stop");
     assert_eq!(status, 200);
     served.event(0, "stopped", |event| event["kind"] == "stopped");

@@ -1,4 +1,4 @@
-//! Commands of the lease holder that end at once, in contrast to jobs.
+//! Short commands of the lease holder. Their requests wait for the result, in contrast to jobs.
 use std::sync::Arc;
 
 use agent_kit::api::{Asked, Body, Number, Problem, Refusals};
@@ -148,8 +148,8 @@ fn set(
     note_rounded(&worker.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = worker.driver.now_us();
     let boards = worker.driver.master.boards();
-    // The agent repeats the inputs of a running board, so a lost frame has no effect and needs no check. A board that
-    // sends no outputs may be without power, and does not count as running.
+    // The agent repeats the inputs of a running board, so a lost frame has no lasting effect and needs no check. A
+    // board that sends no outputs may be without power, and does not count as running.
     let runs = worker.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;

@@ -76,7 +76,7 @@ impl Operator for Hand {
     fn happened(&self, event: &Event, text: Option<String>) {
         let mut local = self.local.borrow_mut();
         let now_us = local.now_us;
-        // The returned change is ignored, because `Worker::turn` reports all changes of control loops with `look`.
+        // The returned change of the supervision is ignored, because the code below writes an event for it.
         let _ = self.held.borrow_mut().see(event, now_us);
         let job = local.job;
         let mut write = Vec::new();
@@ -174,7 +174,7 @@ impl Hand {
         }
         local.states = states;
         let held = self.held.borrow();
-        // If a board has another application than before, its stored names are invalid.
+        // If a board has another application than before, its stored names are invalid and are not published.
         let is_its = |(number, known): &(&u8, &Arc<Known>)| {
             let info = boards.get(**number).and_then(|board| board.info);
             info.is_none_or(|info| DescriptionKey::of(&info) == DescriptionKey::of(&known.info))

@@ -23,9 +23,9 @@ fn rebooted() -> Sim {
     }
 }
 
-/// Section 5.4: the command first switches the outgoing init pin (OPINIT) of board 2 off, three times. The board then
-/// gets its number, and its identity is read. At the end, the pin is switched on and read back. The command reads the
-/// flash number of the board from the inventory.
+/// Section 5.4: the command first switches off the outgoing init pins (OPINIT) of number 2 and of all other numbers
+/// except 1, three times. The board then gets its number, and its identity is read. At the end, its pin is switched on
+/// and read back. The test compares the frames to number 2. The command reads the flash number from the inventory.
 #[test]
 fn d21_a_board_gets_its_number_back() {
     let sim = rebooted();

@@ -29,7 +29,7 @@ pub(super) fn monitor(args: &MonitorArgs, link: &LinkArgs, out: &Output) -> Resu
 
 fn lines(driver: &mut Driver, watch: &mut Watch, mut left: u64, out: &Output) -> Result<(), Failure> {
     let mut shown = Instant::now();
-    // The first view is printed about two seconds after the start, when the scan has ended.
+    // The first view is printed about two seconds after the start, so that the first scan can end before.
     let first = Instant::now();
     let stdout = Lines::stdout()?;
     while left > 0 && !driver.stop_asked() && !stdout.gone() {

@@ -44,7 +44,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
         // no idle interrupt wakes the links at that time.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
-        // The first bytes take part of the time `ms`, so the line is silent for about 0.2 ms less. The test sends
+        // The first bytes take part of the time `ms`, so the line is silent for 0.26 ms less. The test sends
         // both parts of the frame at `us` = 0, 300 or 600 µs after the start of a millisecond.
         let moments = [0, 300, 600].into_iter().flat_map(|us| [1, 3, 4, 5, 6, 8, 12].map(|ms| (us, ms)));
         for (us, ms) in moments {

@@ -5,6 +5,7 @@ use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
 use utoipa::IntoResponses;
 
+pub use crate::finding::FindingObject;
 pub use crate::problem::Problem;
 
 /// Refusals that every request can receive.

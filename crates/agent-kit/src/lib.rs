@@ -5,6 +5,7 @@ pub mod access;
 pub mod api;
 mod cut;
 pub mod events;
+mod finding;
 pub mod gate;
 pub mod halt;
 pub mod journal;

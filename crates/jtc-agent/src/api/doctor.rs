@@ -1,11 +1,10 @@
 //! Diagnosis of the connection, the bus and the set-up, like `jtc doctor`.
 use std::time::Duration;
 
-use agent_kit::api::{Problem, Refusals};
+use agent_kit::api::{FindingObject, Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
-use host_kit::FrontEnd;
-use jtc_host::doctor::{Finding, Observation, Severity, findings};
+use jtc_host::doctor::{Observation, Severity, findings};
 use jtc_host::{Session, labels};
 use jtc_wire::{JOINTS, Joint, STATUS_LEN, Status, error};
 use utoipa::ToSchema;
@@ -27,31 +26,6 @@ pub(super) struct DoctorObject {
     pub statuses: u64,
     /// Findings, worst first.
     pub findings: Vec<FindingObject>,
-}
-
-/// Finding of a diagnosis.
-#[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub(super) struct FindingObject {
-    /// `problem`, `warning` or `good`.
-    pub severity: String,
-    /// Text of the finding.
-    pub what: String,
-    /// Usual cause; empty if no cause is known.
-    pub why: String,
-    /// Next step; empty if no action is needed.
-    pub next: String,
-}
-
-impl From<Finding> for FindingObject {
-    fn from(Finding { severity, what, why, next }: Finding) -> Self {
-        let severity = match severity {
-            Severity::Problem => "problem",
-            Severity::Warning => "warning",
-            Severity::Good => "good",
-        };
-        let (why, next) = (why.replace('`', ""), next.plain(FrontEnd::Agent));
-        Self { severity: severity.to_owned(), what, why, next }
-    }
 }
 
 /// Diagnoses link, joint bus and set-up.
@@ -95,7 +69,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     };
     let found = findings(&seen);
     let healthy = found.iter().all(|finding| finding.severity != Severity::Problem);
-    let findings = found.into_iter().map(FindingObject::from).collect();
+    let findings = found.iter().map(FindingObject::from).collect();
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 

@@ -1,6 +1,6 @@
 //! Jobs of the agent and their results.
-use agent_kit::api::Problem;
-use host_kit::{Diagnose as _, Facts, Finding, FrontEnd, Severity};
+use agent_kit::api::{FindingObject, Problem};
+use host_kit::{Diagnose as _, Facts};
 use ucom_host::master::update::{UpdateReport, UpdateResult};
 use utoipa::ToSchema;
 
@@ -14,32 +14,6 @@ pub(crate) struct ChainObject {
     pub boards: Vec<FoundObject>,
     /// Unusual observations; empty: none.
     pub findings: Vec<String>,
-}
-
-/// Finding of a diagnosis.
-#[derive(Clone, Debug, serde::Serialize, ToSchema)]
-pub(crate) struct FindingObject {
-    /// Severity: `problem`, `warning` or `good`.
-    pub severity: String,
-    /// Text of the finding.
-    pub what: String,
-    /// Probable cause; empty if no cause is known.
-    pub why: String,
-    /// Next step; empty if no action is needed.
-    pub next: String,
-}
-
-impl From<&Finding> for FindingObject {
-    fn from(finding: &Finding) -> Self {
-        let severity = match finding.severity {
-            Severity::Problem => "problem",
-            Severity::Warning => "warning",
-            Severity::Good => "good",
-        };
-        let Finding { what, why, next, .. } = finding;
-        let (why, next) = (why.replace('`', ""), next.plain(FrontEnd::Agent));
-        Self { severity: severity.into(), what: what.clone(), why, next }
-    }
 }
 
 /// Result of an update for one board.

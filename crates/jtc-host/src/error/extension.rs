@@ -115,7 +115,7 @@ impl Diagnose for ExtensionError {
                 ErrorKind::Device,
                 "powered",
                 next!(
-                    "an arm can be stored only while the torque is off: {}, then push again; an arm without brakes falls",
+                    "the controller can store arm parameters only while the torque is off. {} (an arm without brakes falls then), then push the file again",
                     Disable
                 ),
             ),

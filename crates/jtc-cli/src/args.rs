@@ -45,18 +45,23 @@ pub(crate) use variables::VARIABLES;
     after_help = "Examples:\n  \
         jtc demo                              run a complete example on the built-in simulator\n  \
         jtc sim --serial /tmp/jtc             simulate a controller at a serial port\n  \
-        jtc --json status --port /tmp/jtc     print one status for programs\n  \
-        jtc traj run motion.csv --approach    check, upload, execute, report\n\n\
-        With --json, the command writes its result to stdout. Commands that take some time also write events \
-        to stderr (see `jtc help events`).\n\n\
+        jtc --json status --port /tmp/jtc     print one status as JSON\n  \
+        jtc traj run motion.csv --approach    check, upload and execute a trajectory\n\n\
+        With --json, a command writes its result to stdout as JSON. Some commands also write events to \
+        stderr while they run (see `jtc help events`).\n\n\
         You can write --json, --port and --baud before or after the command.\n\n\
         Environment variables can set options for ports, addresses, files and formats (see `jtc COMMAND \
         --help`).\n\n\
+        `jtc explain` explains the states of the controller (for example HoldPos) and all error codes.\n\n\
+        `jtc serve` starts an agent. An agent is a server that shares the port of a controller among many \
+        programs.\n\n\
+        A controller with the protocol extensions of this project reports its firmware, arm and limits. `jtc \
+        info` shows whether the controller has these extensions.\n\n\
         Exit codes:\n  \
         0  done\n  \
         1  the controller reported an error\n  \
         2  wrong usage or unreadable input\n  \
-        3  no link\n  \
+        3  no link to the controller\n  \
         4  refused by a check (nothing was sent or moved)\n  \
         5  fault while running",
     max_term_width = 100,
@@ -86,18 +91,18 @@ pub(crate) struct Cli {
 pub(crate) struct LinkArgs {
     /// Use this serial port, or the agent at http://HOST:PORT.
     ///
-    /// Default: the serial port that the command finds, if it finds only one
+    /// Default: the only serial port that the command finds
     #[arg(long, env = "JTC_PORT", value_name = "PATH", help_heading = "Link")]
     pub port: Option<String>,
     /// Use this token file of the agent.
     ///
-    /// `jtc serve` creates the file if the file does not exist. Default: the token file of an agent on this computer
+    /// If the file does not exist, `jtc serve` creates it. Default: the token file of the agent on this computer
     #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
     pub token_file: Option<std::path::PathBuf>,
     /// Trust the certificates in this PEM file for https:// agents.
     ///
-    /// Default: for an agent on this computer, the certificate of this agent; otherwise, the certificates of the operating
-    /// system
+    /// Default for an agent on this computer: the certificate of this agent. Default for other agents: the certificates
+    /// of the operating system
     #[arg(long, env = "JTC_TLS_CA", value_name = "FILE", help_heading = "Link")]
     pub tls_ca: Option<std::path::PathBuf>,
     /// Set the rate of the port, Bd (300 to 15000000)
@@ -119,8 +124,8 @@ pub(crate) struct OverwriteArgs {
 pub(crate) enum Command {
     /// Run a complete example on the built-in simulator
     #[command(
-        after_help = "The command sends the parameters, uploads and executes a trajectory, and writes a \
-        report.\n\n\
+        after_help = "The command starts a simulated controller and sends the parameters of the arm. Then it \
+        uploads and executes a trajectory, and writes a report.\n\n\
         Examples:\n  \
         jtc demo\n  \
         jtc demo --out /tmp/demo --speed realtime"
@@ -135,55 +140,57 @@ pub(crate) enum Command {
         jtc sim --serial /tmp/jtc --record sim.mcap\n  \
         jtc sim --serial /tmp/jtc --support stand --gear-stiffness 20000\n\n\
         --record writes up to 40 MB per minute as .mcap, or 50 MB per minute as .csv. The simulator opens \
-        the file before it starts. You can read the file during the recording. If the simulator is killed, \
-        the last 0.2 s can be missing from the file. If the disk is full, the simulator reports the full \
-        disk at once, continues, and ends with exit code 5.\n\n\
-        The simulator accepts these events as lines on stdin:\n  \
+        the file before it starts. You can read the file while the simulator writes it. If the simulator is \
+        killed, the last 0.2 s can be missing from the file. If the disk is full, the simulator prints an \
+        error at once. The simulation continues, and its exit code at the end is 5.\n\n\
+        The simulator reads these commands from stdin, one per line:\n  \
         push 3 12 0.5    push joint 3 (counted from 1) with 12 N·m for 0.5 s\n  \
-        hand lead.csv    in Teaching, a simulated hand moves the arm along a trajectory file")]
+        hand lead.csv    in Teaching, move the arm along this trajectory file, like a person")]
     Sim(SimArgs),
     /// Share the port of a controller among many clients
     #[command(
-        after_help = "Many clients can read at the same time. Only one client at a time can move the arm or \
-            change settings. Every client can stop the arm.\n\n\
-            With --port http://…, every other command connects to the agent. A command also connects to an \
-            agent of this user if this agent has opened the serial port of the command.\n\n\
-            On this computer, reading, Stop and Pause need no token. All other requests need the operator's \
-            token from the token file. Only the owner of this file can read it.\n\n\
+        after_help = "The command runs an agent. The agent keeps the port open, and forwards the requests of \
+            its clients to the controller. Many clients can read at the same time. Only one client at a time \
+            can move the arm or change settings. Every client can stop the arm.\n\n\
+            Other commands use the agent with --port http://HOST:PORT. Commands with --port PATH also use \
+            the agent if an agent of the same user has opened this serial port.\n\n\
+            Clients on this computer can read, stop and pause without a token. All other requests need the \
+            operator's token from the token file. Only the owner of this file can read it.\n\n\
             Examples:\n  \
             jtc serve --sim\n  \
             jtc serve --port /dev/ttyUSB0\n  \
             jtc status --port http://127.0.0.1:8780\n  \
             curl -X POST http://127.0.0.1:8780/api/stop\n  \
             jtc serve --sim --record recordings --record-limit 500MB\n\n\
-            --record writes each motion to a separate file. The name of the file is NAME.part.mcap during \
-            the motion, and NAME.mcap afterwards. You can read the file at any time. A full disk never \
-            delays a command. The agent reports the full disk, and records again when the disk has free \
-            space."
+            --record writes each motion to a separate file. During the motion, the name of the file is \
+            NAME.part.mcap. After the motion, the name is NAME.mcap. You can read the file at any time. If \
+            the disk is full, the agent reports an error, but does not delay any command. The agent records \
+            again when the disk has free space."
     )]
     Serve(ServeArgs),
-    /// List serial ports, with the reason if a port cannot be used
+    /// List serial ports, and show why a port cannot be used
     #[command(after_help = "Examples:\n  jtc ports\n  jtc --json ports")]
     Ports,
-    /// Diagnose link, bus and setup, and suggest the next command
+    /// Find faults of link, bus and setup; suggest the next command
     #[command(after_help = "Examples:\n  jtc doctor\n  jtc doctor --port /dev/ttyUSB0")]
     Doctor(LinkArgs),
-    /// Show one decoded status
+    /// Show the present status of the controller
     #[command(after_help = "Examples:\n  jtc status\n  jtc --json status | jq .joints[0].position_rad")]
     Status(LinkArgs),
-    /// Show firmware, arm, missing parameters and boot cause
-    #[command(after_help = "The hash covers all parameters that determine how the arm moves: model, gains, \
-            friction and settings. If the controller has no extensions, the command shows only the values of \
-            its status.\n\n\
+    /// Show firmware, arm, missing parameters and last boot cause
+    #[command(after_help = "The hash is a checksum of all parameters that determine the motion of the arm: \
+            model, gains, friction and settings. Controllers with the same hash have the same parameters. A \
+            controller without the protocol extensions reports only its status. The command then shows only \
+            its state and its missing parameters.\n\n\
             Examples:\n  \
             jtc info\n  \
             jtc --json info | jq -r .hash")]
     Info(LinkArgs),
     /// Show a live view of the controller and the joints
     #[command(after_help = "The terminal needs at least 40 columns and 12 rows. At the top, the view shows \
-            problems and the command to use next.\n\n\
-            Press s to stop a motion on its path, and q to quit. The arrow keys, PageUp, PageDown, Home and \
-            End scroll the view.\n\n\
+            problems and the next command to use.\n\n\
+            Press s to stop a motion on its path. Press q to quit. The arrow keys, PageUp, PageDown, Home \
+            and End scroll the view.\n\n\
             Examples:\n  \
             jtc monitor\n  \
             jtc --json monitor --count 100 > statuses.jsonl")]
@@ -194,7 +201,7 @@ pub(crate) enum Command {
     /// Send and show friction, gains and arm model
     #[command(subcommand)]
     Params(ParamsCommand),
-    /// Declare joints absent, for work on a bench
+    /// Declare joints absent if a bench has only some drives
     #[command(subcommand)]
     Bench(BenchCommand),
     /// List, flash and verify the firmware of the boards
@@ -212,21 +219,22 @@ pub(crate) enum Command {
             pose                           name of a pose from the arm file\n  \
             x,y,z                          position of the flange, m\n  \
             qx,qy,qz,qw or roll,pitch,yaw  orientation of the flange, rad\n  \
-            leg                            path to this waypoint: joint, line, via or arc\n  \
+            leg                            type of the path to this waypoint: joint, line, via or arc\n  \
             t                              time of the waypoint, s (optional)\n\n\
             By default, the arm stops at each waypoint. --blend rounds a corner if a rounded corner is \
             faster than a stop. By default, the path between two waypoints is a straight line in joint \
             space. With --line, or with `line` in the column `leg`, the flange moves along a straight line. \
-            With `arc` in the column `leg`, the flange moves along an arc. --blend-m rounds the corners \
-            between lines and arcs.\n\n\
-            The motion uses at most 98 % of the limits of velocity and acceleration. According to the arm \
-            model, the torque of each joint stays below its torque limit minus the margin of --margin. By \
-            default, the jerk limit allows the acceleration to rise from 0 to its limit in 100 ms. The \
-            planned trajectory has passed the check of `jtc traj check`.\n\n\
+            With `arc` in the column `leg`, the flange moves along an arc through the previous waypoint. \
+            This previous waypoint must have `via` in the column `leg`. --blend-m rounds the corners between \
+            lines and arcs.\n\n\
+            The motion uses at most 98 % of the limits of velocity and acceleration. The torque of each \
+            joint, computed with the arm model, stays below its torque limit minus the margin (--margin). By \
+            default, the acceleration needs at least 100 ms to rise from 0 to its limit. The command writes \
+            a trajectory only if it passes the check of `jtc traj check`.\n\n\
             The margin is a reserve for masses and friction that the arm model does not contain. If gravity \
-            and friction leave less torque than the margin, the motion uses a quarter of the remaining \
-            torque. A note then names the joint. If the margin is below 10 %, the command prints a \
-            warning.\n\n\
+            and friction leave less torque than the margin, the motion uses only a quarter of the remaining \
+            torque. In this case, the command prints a note with the joint. If the margin is below 10 %, the \
+            command prints a warning.\n\n\
             Examples:\n  \
             jtc plan waypoints.csv -o cycle.csv\n  \
             jtc plan waypoints.csv -o cycle.csv --blend 0.1 --speed 50 --report cycle.html\n  \
@@ -237,12 +245,12 @@ pub(crate) enum Command {
     /// Move to joint positions, a named pose or a flange pose
     #[command(
         after_help = "The arm moves from its present position to the target on a straight line in joint \
-            space. With --line, the flange moves along a straight line. The command checks the limits of \
-            velocity, acceleration, jerk and torque before it sends anything. The command does not check for \
+            space. With --line, the flange moves along a straight line. Before the command sends anything, \
+            it checks the limits of velocity, acceleration, jerk and torque. The command does not check for \
             obstacles.\n\n\
-            The command executes the motion and ends like `jtc traj run`. On a terminal, press space to \
-            pause and resume, s to stop, and + and - to change the speed. Ctrl-C stops the arm on its path. \
-            --margin works as in `jtc plan`.\n\n\
+            The command executes the motion like `jtc traj run`, with the same report and exit codes. On a \
+            terminal, press space to pause and resume, and s to stop. Press + and - to change the speed. \
+            Ctrl-C stops the arm on its path. `jtc help plan` explains --margin.\n\n\
             Examples:\n  \
             jtc move --to home --arm my-arm.toml\n  \
             jtc move --to 0,0.5,-1,0,0.5,0\n  \
@@ -265,29 +273,33 @@ pub(crate) enum Command {
     /// Move the arm by hand, and record its motion
     #[command(subcommand)]
     Teach(TeachCommand),
-    /// Read the flight recorder (the seconds before an error)
+    /// Read the flight recorder (log of the time before an error)
     #[command(subcommand)]
     Log(LogCommand),
     /// Clear errors of the controller and all nodes
     #[command(after_help = "Examples:\n  jtc clear\n  jtc clear --occurred")]
     Clear(ClearArgs),
-    /// Reset nodes of the joint bus; the arm loses torque
-    #[command(after_help = "The whole arm loses its torque, even if you name only one joint.\n\n\
+    /// Reset drives or the gripper; the arm can lose its torque
+    #[command(
+        after_help = "If you reset one or more joints, the whole arm loses its torque. During a motion \
+            and in Teaching, the command refuses to reset joints. A reset of the gripper does not remove the \
+            torque, but switches off the pump.\n\n\
             Examples:\n  \
-            jtc reset --joints 3          joint 3 only\n  \
-            jtc reset --joints 1,3 --yes  do not ask, even if the controller holds the arm\n  \
+            jtc reset --joints 3          reset joint 3\n  \
+            jtc reset --joints 1,3 --yes  reset joints 1 and 3 without a question\n  \
             jtc reset --gripper\n  \
-            jtc reset --all")]
+            jtc reset --all"
+    )]
     Reset(ResetArgs),
     /// Switch the vacuum pump of the gripper on or off
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
     /// Switch off the torque at rest; an arm without brakes falls
     #[command(
-        after_help = "The controller returns to Init, and you must send the parameters again. An arm without \
-            holding brakes falls: support it first. On a terminal, the command first asks for confirmation. \
-            With --yes, the command does not ask. Without a terminal, the command refuses to switch off the \
-            torque unless you use --yes.\n\n\
+        after_help = "An arm without holding brakes falls. Support the arm first. The controller returns to \
+            the state Init, and you must send the parameters again. On a terminal, the command first asks \
+            for confirmation. With --yes, the command does not ask. Without a terminal, the command needs \
+            --yes.\n\n\
             Examples:\n  \
             jtc disable\n  \
             jtc disable --yes"
@@ -299,30 +311,34 @@ pub(crate) enum Command {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Jog joints with keys, or one joint while the command runs
+    /// Jog joints with keys, or one joint at a given velocity
     #[command(
-        after_help = "On a terminal, the keys 1 to 6 select a joint. Hold the left or right arrow key to \
-            move the selected joint. The up and down arrow keys change the rate, and q quits.\n\n\
-            The arm begins to stop 0.2 s after the last key press, or 0.2 s after the last message of this \
-            command. The stop takes at most 0.52 s if the drives have enough torque. Joints stop before the \
-            ends of their ranges. You can jog only in HoldPos, and not while a motion is paused.\n\n\
+        after_help = "Without JOINT and RATE, use the keys of the terminal. The keys 1 to 6 select a joint. \
+            Hold the left or right arrow key to move the selected joint. The up and down arrow keys change \
+            the velocity (0.01 to 0.5 rad/s). Press q to quit.\n\n\
+            The arm begins to stop at most 0.2 s after you release the key. The arm also begins to stop 0.2 \
+            s after the command is killed or loses its connection. The stop takes at most 0.52 s if the \
+            drives have enough torque. Joints stop before their position limits. You can jog only in the \
+            state HoldPos, and not while a motion is paused.\n\n\
             Examples:\n  \
             jtc jog\n  \
-            jtc jog 3 0.1                  joint 3 at 0.1 rad/s until Ctrl-C\n  \
+            jtc jog 3 0.1                  move joint 3 at 0.1 rad/s until Ctrl-C\n  \
             jtc jog 3 -5 --deg --duration 2"
     )]
     Jog(JogArgs),
-    /// Recover to HoldPos, reporting each step
+    /// Bring the controller to HoldPos, and report each step
     #[command(
-        after_help = "The command reports the source of the parameters that each step uses. The command does \
-            not resume an interrupted motion.\n\n\
-            If the controller does not hold the arm, --arm FILE sends friction, gains and arm model of that \
-            file. These values replace the parameters of the controller. If the controller holds the arm, it \
-            keeps its present parameters, and the command reports that these parameters stay in use.\n\n\
-            With --defaults, the controller uses its default parameters, but only if it lacks parameters. \
-            The default parameters are the parameters of the stored arm, or of the built-in arm if no arm is \
-            stored. Without --arm and --defaults, the controller keeps its friction, gains and model. If \
-            friction, gains or model are missing, the command refuses the recovery.\n\n\
+        after_help = "In the state HoldPos, the controller holds the arm at rest. The command reports the \
+            source of the parameters that each step uses. The command does not resume an interrupted \
+            motion.\n\n\
+            With --arm FILE, the command sends friction, gains and arm model of this file to the controller. \
+            These values replace the parameters of the controller. If the controller already holds the arm, \
+            the command does not send the file, and the controller keeps its parameters.\n\n\
+            With --defaults, the controller uses its default parameters, but only if parameters are missing. \
+            The default parameters are the parameters of the stored arm. If the controller has not stored an \
+            arm, they are the parameters of the built-in arm. Without --arm and --defaults, the controller \
+            keeps its friction, gains and model. If friction, gains or model are missing, the command then \
+            refuses the recovery.\n\n\
             Examples:\n  \
             jtc recover\n  \
             jtc recover --arm my-arm.toml\n  \
@@ -332,9 +348,9 @@ pub(crate) enum Command {
     /// Compute the dynamics of an arm for each line of stdin
     #[command(
         after_help = "For each line of numbers on stdin, the command prints one line of numbers to stdout. \
-            An input line has q1..q6 qd1..qd6 qdd1..qdd6 (rad, rad/s, rad/s²). With `forward`, the last six \
-            numbers are torques (N·m). With `mass`, the line has only q1..q6. Results have 17 significant \
-            digits.\n\n\
+            With `inverse`, an input line contains positions q1..q6 (rad), velocities qd1..qd6 (rad/s) and \
+            accelerations qdd1..qdd6 (rad/s²). With `forward`, the last six numbers are torques (N·m). With \
+            `mass`, the line contains only q1..q6. Results have 17 significant digits.\n\n\
             Examples:\n  \
             echo 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 | jtc dynamics inverse\n  \
             echo 0 0.5 0 0 0 0 | jtc dynamics mass --arm my-arm.urdf"
@@ -376,7 +392,7 @@ pub(crate) enum Command {
     Man {
         /// Write the pages to this directory.
         ///
-        /// Without this option the main page goes to stdout
+        /// Without this option, the command prints the main page to stdout
         #[arg(long, env = "JTC_MAN_DIR", value_name = "DIR")]
         out: Option<PathBuf>,
     },

@@ -10,27 +10,26 @@ use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 #[derive(Debug, Subcommand)]
 pub(crate) enum ArmCommand {
     /// Make an arm file from a robot description (URDF)
-    #[command(after_help = "The command lists all frames that it has rotated, and all values that it has \
-        guessed.\n\n\
-            The arm must be a chain of six revolute or continuous joints. If the robot has more movable \
-            joints (a gripper, a seventh axis, a second arm), select the six joints with --joints or --tip. \
-            The other joints stay at position 0.\n\n\
-            A URDF does not contain rotor inertia, gains, acceleration limits and other parameters. The \
-            command uses rules to compute starting values for these parameters. The arm file contains these \
-            rules, and marks the starting values as proposed.\n\n\
-            Examples:\n  \
-            jtc arm import ur5.urdf -o ur5.toml\n  \
-            jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
-            jtc arm import two-arms.urdf --tip left_tool0 -o left.toml")]
+    #[command(after_help = "The command prints each frame that it rotated, and each value that it \
+        estimated.\n\n\
+        The arm must be a chain of six revolute or continuous joints. If the robot has more movable joints \
+        (a gripper, a seventh axis, a second arm), select the six joints with --joints or --tip. The arm \
+        file treats the other joints as fixed at position 0.\n\n\
+        A URDF contains only some of the parameters. For example, rotor inertia, gains and acceleration \
+        limits are missing. The command uses rules to compute starting values for the missing parameters. \
+        The arm file contains these rules, and marks the starting values as proposed.\n\n\
+        Examples:\n  \
+        jtc arm import ur5.urdf -o ur5.toml\n  \
+        jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
+        jtc arm import two-arms.urdf --tip left_tool0 -o left.toml")]
     Import(ImportArgs),
     /// Check that an arm is physically possible and complete
     #[command(
-        after_help = "The command also checks that the drives can hold the arm and that the controller \
-            accepts it.\n\n\
-            Exit code 0 means that the controller would accept the arm. Exit code 4 means that the \
-            controller would refuse it. With exit code 0, the command can still show warnings. Examples of \
-            warnings are proposed values, and poses in which a drive cannot hold the arm against \
-            gravity.\n\n\
+        after_help = "The command also checks the torques that the drives need to hold the arm, and checks \
+            that the controller accepts the arm.\n\n\
+            Exit code 0 means that the controller accepts the arm. Exit code 4 means that the controller \
+            refuses the arm. The command can also show warnings with exit code 0. For example, it warns \
+            about proposed values, and about poses in which a drive cannot hold the arm against gravity.\n\n\
             Examples:\n  \
             jtc arm check ur5.toml\n  \
             jtc --json arm check ur5.toml | jq .findings[].what"
@@ -51,7 +50,7 @@ pub(crate) enum ArmCommand {
     Show {
         /// Arm file (TOML) or robot description (URDF).
         ///
-        /// Without a file, the command asks the controller for its arm
+        /// Without a file, the command shows the arm of the controller
         file: Option<PathBuf>,
         /// Show angles in degrees
         #[arg(long)]
@@ -60,19 +59,21 @@ pub(crate) enum ArmCommand {
         link: LinkArgs,
     },
     /// Send a complete arm to the controller, and verify it
-    #[command(after_help = "The command sends settings, gains, friction, model and name, reads them back, \
-            and compares them with the file.\n\n\
-            The controller accepts new settings only in Init or Error. Switch off the torque first with `jtc \
-            disable`.\n\n\
-            With --store, the controller keeps the arm after a loss of power. After the controller has \
-            stored the arm, the controller is in Init. Run `jtc params use-defaults` or `jtc recover \
-            --defaults` to use the stored arm.\n\n\
-            A controller without extensions accepts only friction, gains and model. If the limits, gravity \
-            or rotor inertia of such a controller differ from the file, the command sends nothing unless you \
-            use --accept-device-limits.\n\n\
+    #[command(
+        after_help = "The command sends settings, gains, friction, model and name. Then it reads these \
+            values back, and compares them with the file.\n\n\
+            The controller accepts new settings only in the states Init and Error. Switch off the torque \
+            first with `jtc disable`.\n\n\
+            With --store, the controller also keeps the arm without power. After the controller has stored \
+            the arm, it is in the state Init. Run `jtc params use-defaults` or `jtc recover --defaults` to \
+            use the stored arm.\n\n\
+            A controller without the protocol extensions accepts only friction, gains and model. You cannot \
+            change its limits, gravity and rotor inertia. If these values differ from the file, the command \
+            sends nothing, unless you use --accept-device-limits.\n\n\
             Examples:\n  \
             jtc arm push my-arm.toml\n  \
-            jtc arm push my-arm.toml --store")]
+            jtc arm push my-arm.toml --store"
+    )]
     Push {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
@@ -120,7 +121,7 @@ pub(crate) struct ImportArgs {
     /// Select the six joints of the arm, from base to wrist
     #[arg(long, value_name = "A,B,C,D,E,F", value_delimiter = ',')]
     pub joints: Option<Vec<String>>,
-    /// Select the link to use as the flange
+    /// Use this link of the URDF as the flange
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
     #[command(flatten)]

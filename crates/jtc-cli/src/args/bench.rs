@@ -10,22 +10,22 @@ use super::LinkArgs;
 pub(crate) enum BenchCommand {
     /// Declare these joints absent, and all other joints present
     #[command(
-        after_help = "For each absent joint, write its number, counted from 1, and the angle that the joint \
-            has in the model. The controller accepts this command only in Init or Error. Switch off the \
-            torque first with `jtc disable`.\n\n\
-            The controller does not wait for the nodes of absent joints, and the torque of absent joints is \
-            zero. While a joint is absent, the controller does not execute trajectories, and teaching is not \
-            possible. The controller holds the other joints, and you can jog these joints. The controller \
-            computes the torque of these joints from the model of the whole arm. Therefore, push a model of \
-            the arm that is on the bench.\n\n\
-            If a drive answers at an absent joint, the controller reports an error. The setting is not \
-            stored: after a power cycle, the controller expects all joints again.\n\n\
+        after_help = "For each absent joint, write its number (1 to 6) and its angle in the arm model. The \
+            controller accepts this command only in the states Init and Error. Switch off the torque first \
+            with `jtc disable`.\n\n\
+            The controller does not wait for the drives of absent joints, and commands zero torque for these \
+            joints. While a joint is absent, the controller refuses trajectories and teaching. The \
+            controller holds the present joints, and you can jog them. The controller computes their torques \
+            with the model of the whole arm. Therefore, send a model that matches the arm on the bench (`jtc \
+            arm push`).\n\n\
+            If the drive of an absent joint answers, the controller reports an error. The controller does \
+            not store the absent joints. After a power cycle, it expects all joints again.\n\n\
             Examples:\n  \
             jtc bench absent 3=0.5 4=0\n  \
             jtc bench absent 2=90 3=-45 --deg"
     )]
     Absent {
-        /// Joint and its angle in rad, for example 3=0.5
+        /// Joint and its angle (-6.2832 to 6.2832 rad), such as 3=0.5
         #[arg(required = true, value_name = "JOINT=RAD", value_parser = joint)]
         joints: Vec<(Joint, f64)>,
         /// Read the angles as degrees
@@ -35,7 +35,7 @@ pub(crate) enum BenchCommand {
         link: LinkArgs,
     },
     /// Declare all joints present
-    #[command(after_help = "The controller accepts this command only in Init or Error.\n\n\
+    #[command(after_help = "The controller accepts this command only in the states Init and Error.\n\n\
         Examples:\n  \
         jtc bench present")]
     Present {

@@ -10,35 +10,32 @@ use super::LinkArgs;
 #[derive(Debug, Subcommand)]
 pub(crate) enum FirmwareCommand {
     /// List installed images and mounted board drives
-    #[command(
-        after_help = "The file firmware.json lists the images. The environment variable OPENJTC_FIRMWARE \
-            names the folder of this file. Without this variable, the folder is ../share/openjtc/firmware, \
-            relative to the directory of this program. If this folder does not contain firmware.json, the \
-            folder is /usr/share/openjtc/firmware.\n\n\
+    #[command(after_help = "The file firmware.json lists the installed images. The environment variable \
+            OPENJTC_FIRMWARE sets the folder of this file. Without this variable, the command first searches \
+            ../share/openjtc/firmware, relative to the directory of this program. Then it searches \
+            /usr/share/openjtc/firmware.\n\n\
             Examples:\n  \
             jtc firmware list\n  \
-            jtc --json firmware list | jq -r .drives[].path"
-    )]
+            jtc --json firmware list | jq -r .drives[].path")]
     List,
     /// Flash a Nucleo board through its ST-LINK drive, and verify
-    #[command(after_help = "Flashing resets the board. An arm that the board holds then falls.\n\n\
-            Before flashing, the command always asks the controller at the board's own port for its state. \
-            With --port, the command also asks the controller at that port. The board's own port is the \
-            serial port of the USB device that has the drive. The command knows this port only on Linux. The \
-            command ends with exit code 4 if the board's own port cannot be used, if the port of --port is \
-            in use, or if a controller reports torque. No option overrides these checks.\n\n\
-            The command flashes without a question only under three conditions. The controller at the \
-            board's own port reports no torque, every joint answers this controller, and the gripper is off. \
-            Otherwise, the command asks for confirmation on a terminal. With --yes, the command does not \
-            ask.\n\n\
-            If the controller at the board's own port reports exactly the board of the image, the command \
-            knows the core supply of the board. Otherwise, a board that exists with both core supplies needs \
-            --accept-supply.\n\n\
-            After flashing, the command asks the controller at the same port which firmware runs. The \
-            firmware reports the CRC-32 of its own flash, and the command compares this CRC-32 with the \
-            image. --baud is the rate before flashing. After flashing, the command uses the rate of the \
-            image.\n\n\
-            Flashing can delete the stored arm: save it first with `jtc arm pull -o FILE`.\n\n\
+    #[command(after_help = "Flashing resets the board. If the board holds an arm, the arm falls.\n\n\
+            The board's own port is the serial port of the USB device that has the ST-LINK drive. The \
+            command can find this port only on Linux. Before flashing, the command asks the controller at \
+            the board's own port for its state. With --port, the command also asks the controller at the \
+            port of this option. The command refuses to flash (exit code 4) if the board's own port cannot \
+            be used. It also refuses if the port of --port is in use, or if a controller reports torque. No \
+            option overrides these checks.\n\n\
+            On a terminal, the command asks for confirmation before flashing. It does not ask if the \
+            controller at the board's own port reports zero torque, answers of all joints, and a gripper \
+            that is off. With --yes, the command never asks.\n\n\
+            The processor core of some boards can have one of two supplies (SMPS or LDO). Do not flash an \
+            image for the other supply. The command knows the supply only if the controller at the board's \
+            own port reports the board of the image. Otherwise, such a board needs --accept-supply.\n\n\
+            After flashing, the command asks the controller which firmware runs. The firmware reports the \
+            CRC-32 of its flash memory, and the command compares this CRC-32 with the image. --baud sets the \
+            rate before flashing. After flashing, the command uses the rate of the image.\n\n\
+            Flashing can delete the stored arm. Save the arm first with `jtc arm pull -o FILE`.\n\n\
             Examples:\n  \
             jtc firmware flash\n  \
             jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
@@ -85,10 +82,13 @@ pub(crate) struct FlashArgs {
     pub drive: Option<PathBuf>,
     /// Do not ask, and confirm that flashing is safe.
     ///
-    /// You confirm that the arm is supported, that its drives have no power, and that the safety wires match the image
+    /// You confirm that a mechanical support holds the arm, that its drives are without power, and that the safety
+    /// wires match the image
     #[arg(long)]
     pub yes: bool,
-    /// Assume the board of the image if the drive names no board
+    /// Flash even if the drive does not show the type of the board.
+    ///
+    /// The command then assumes that the image matches the board
     #[arg(long)]
     pub assume_board: bool,
     /// Confirm that the solder bridges match the core supply.
@@ -99,14 +99,14 @@ pub(crate) struct FlashArgs {
     /// Flash even if the board already runs this image
     #[arg(long)]
     pub again: bool,
-    /// Do not ask the controller afterwards which image it runs.
+    /// Skip the verification after flashing.
     ///
-    /// The command then cannot verify that the board runs the image
+    /// The command then does not ask the controller which image it runs
     #[arg(long)]
     pub no_read_back: bool,
-    /// Set the longest wait for the image, s (1 to 3600).
+    /// Set the timeout after flashing, s (1 to 3600).
     ///
-    /// The command waits until the board runs the image
+    /// The command waits for this time until the board runs the image
     #[arg(long, env = "JTC_WAIT", value_name = "S", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub wait: u64,
     #[command(flatten)]

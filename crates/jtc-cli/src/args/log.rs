@@ -12,15 +12,15 @@ pub(crate) enum LogCommand {
     /// Read the flight recorder, and report the first error
     #[command(
         after_help = "The report shows the first error, and the events before and after this error.\n\n\
-            The flight recorder records every tick, and stops 0.3 s after the first error. The log survives \
-            a reset, and stays in the controller until `jtc log clear`. Clearing errors does not clear the \
-            log. You can read the log while the arm moves, but the flight recorder pauses while you \
-            read.\n\n\
-            The command replays the ticks with the program of the controller and with the present arm of the \
-            controller. If the controller recorded the log with another arm, name the file of that arm with \
+            The flight recorder is a memory in the controller. It contains every control cycle (tick, 1 ms) \
+            of the last seconds, and stops 0.3 s after the first error. A reset does not delete the log. \
+            Only `jtc log clear` deletes the log; `jtc clear` does not. You can read the log while the arm \
+            moves. The flight recorder pauses while you read.\n\n\
+            The command computes each tick again, with the code of the controller and the present arm of the \
+            controller. If the controller recorded the log with another arm, set the file of that arm with \
             --arm.\n\n\
-            -o writes a recording that Foxglove and PlotJuggler can plot. The file also contains the log, for \
-            `jtc log replay`.\n\n\
+            -o writes a recording that Foxglove and PlotJuggler can plot. The file also contains the log, \
+            for `jtc log replay`.\n\n\
             Examples:\n  \
             jtc log fetch\n  \
             jtc log fetch -o fault.mcap --report fault.html"
@@ -48,8 +48,9 @@ pub(crate) enum LogCommand {
     },
     /// Replay a fetched log, and name the first tick that differs
     #[command(
-        after_help = "The command replays the log with the program of the controller, and compares each \
-            tick. Exit code 4 means that a tick differs, or that no tick could be replayed.\n\n\
+        after_help = "The command computes each tick again with the code of the controller, and compares the \
+            result with the log. Exit code 4 means that a tick differs, or that the command could not \
+            compute any tick.\n\n\
             Examples:\n  \
             jtc log replay fault.mcap\n  \
             jtc --json log replay fault.mcap | jq .difference"

@@ -11,7 +11,7 @@ use super::{AcceptArgs, LinkArgs};
 pub(crate) struct MonitorArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// End after this number of statuses
+    /// End after this number of status messages
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
 }
@@ -21,7 +21,7 @@ pub(crate) struct MonitorArgs {
 pub(crate) struct ClearArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// Also clear the record of errors that occurred
+    /// Also clear the flags of earlier errors
     #[arg(long)]
     pub occurred: bool,
 }
@@ -86,10 +86,10 @@ pub(crate) struct RecoverArgs {
 pub(crate) struct JogArgs {
     /// Joint, counted from 1 (1 to 6).
     ///
-    /// Without a joint number, you jog with the keys of the terminal
+    /// Without a joint, jog with the keys of the terminal
     #[arg(value_name = "JOINT", value_parser = clap::value_parser!(u8).range(1..=6), requires = "rate")]
     pub joint: Option<u8>,
-    /// Velocity, rad/s
+    /// Velocity, rad/s (negative: opposite direction)
     #[arg(value_name = "RATE", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Read the rate as degrees per second

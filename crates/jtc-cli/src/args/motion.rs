@@ -7,29 +7,29 @@ use clap::{Args, Subcommand};
 use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
 /// Help text of `jtc run` and `jtc traj run`.
-pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of the speed in the file. An \
-    approach runs at --speed percent of the limits, but at most at 50 %. Without --speed, the approach runs \
-    at 10 % of the limits, or at 25 % in a simulator.\n\n\
+pub(super) const RUN_EXAMPLES: &str = "By default, the motion runs at 100 % of the speed in the file. With \
+    --approach, the arm first moves to the first point. The approach runs at --speed percent of the limits, \
+    but at most at 50 %. Without --speed, the approach runs at 10 % of the limits, or at 25 % in a \
+    simulator.\n\n\
     On a terminal, press space to pause and resume, and s to stop. Press + and - to change the speed if the \
-    controller has extensions. Ctrl-C stops the arm on its path, then ends the command. A second Ctrl-C ends \
-    the command at once.\n\n\
-    The command opens its output files before the arm moves, and writes the recording while the arm moves. \
-    If the program is killed, the last 0.2 s can be missing from the recording. If the command cannot write \
-    the recording before the motion starts, the arm does not move. If the command cannot write the recording \
-    during the motion (full disk), it reports the failure at once. The motion continues unchanged, and the \
-    command ends with exit code 5.\n\n\
+    controller has the protocol extensions. Ctrl-C stops the arm on its path, and then ends the command. A \
+    second Ctrl-C ends the command at once.\n\n\
+    The command opens its output files before the arm moves. If it cannot write the recording, the arm does \
+    not move. The command writes the recording during the motion. If the program is killed, the last 0.2 s \
+    can be missing from the recording. If the disk becomes full during the motion, the command prints an \
+    error at once. The motion continues, and the command ends with exit code 5.\n\n\
     Examples:\n  \
     jtc run motion.csv --approach\n  \
     jtc traj run motion.csv --speed 10 --record run.mcap\n  \
     jtc traj run cycle.csv --approach --repeat 10";
 
 /// Help text of `jtc stop` and `jtc traj stop`.
-pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agent or another program of this \
-    user has opened the serial port. Without --port or JTC_PORT, the command stops every arm whose serial \
-    port is open in such a program. If no such program runs, the command uses the serial port that it finds, \
-    if it finds only one.\n\n\
-    The command ends with exit code 0 when the arm is at rest, even if the arm was not moving. The command \
-    does not replace the emergency stop.\n\n\
+pub(super) const STOP_EXAMPLES: &str = "The command also works if an agent, or another program of this user, \
+    has opened the serial port. Without --port or JTC_PORT, the command stops every arm whose serial port is \
+    open in such a program. If no such program runs, the command uses the only serial port that it \
+    finds.\n\n\
+    When the arm is at rest, the command ends with exit code 0, even if the arm did not move before. The \
+    command does not replace the emergency stop.\n\n\
     Examples:\n  \
     jtc stop\n  \
     jtc traj stop --port /dev/ttyUSB0";
@@ -39,8 +39,8 @@ pub(super) const STOP_EXAMPLES: &str = "The Stop also reaches the arm if an agen
 pub(crate) struct CheckArgs {
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
-    /// Default: the built-in arm, until the command connects to a controller with extensions. From then on, the command
-    /// uses the arm of the controller
+    /// Default: the arm of the controller, if the command is connected to a controller that reports its arm. Otherwise,
+    /// the default is the built-in arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Set the speed in percent of the file's speed (1 to 200).
@@ -50,7 +50,8 @@ pub(crate) struct CheckArgs {
     pub speed: Option<f64>,
     /// Read the numbers of the file as degrees.
     ///
-    /// Use this option for files that do not name their unit. In a CSV header, the columns q1_deg..q6_deg are in degrees
+    /// Use this option for files that do not contain units. CSV columns with the names q1_deg..q6_deg are always in
+    /// degrees
     #[arg(long)]
     pub deg: bool,
 }
@@ -68,8 +69,8 @@ pub(crate) enum TrajCommand {
     /// Check the limits of a trajectory; nothing is sent
     #[command(
         after_help = "The command checks the limits at the points and between the points. The command \
-            computes the torques with the arm model. The torque margin is the smallest share of a torque \
-            limit that the motion does not use. If the margin is below 10 %, the command prints a \
+            computes the torques with the arm model. The torque margin is the smallest unused part of a \
+            torque limit during the motion, in percent. If the margin is below 10 %, the command prints a \
             warning.\n\n\
             Examples:\n  \
             jtc traj check motion.csv\n  \
@@ -98,7 +99,7 @@ pub(crate) enum TrajCommand {
         file: PathBuf,
         /// Read the numbers of the file as degrees.
         ///
-        /// Use this option for files that do not name their unit
+        /// Use this option for files that do not contain units
         #[arg(long)]
         deg: bool,
     },
@@ -107,16 +108,18 @@ pub(crate) enum TrajCommand {
     Run(RunArgs),
     /// Run the trajectory or the measured path of a recording
     #[command(
-        after_help = "This command works like `jtc traj run` with a recording, but refuses all files that \
-            are not recordings.\n\n\
+        after_help = "FILE must be a recording (.mcap or .csv). The command refuses all other files. The \
+            command works like `jtc traj run`.\n\n\
             An MCAP file of `traj run` or `move` contains the whole trajectory. The command runs the whole \
-            trajectory, even if the recorded run was interrupted. `jtc traj continue` runs only the \
-            remainder. From other recordings, the command runs the recorded part of the last execution, \
-            along the commanded path.\n\n\
-            With --measured, the command uses the positions that were measured every 40 ms. Use --measured \
+            trajectory, even if the recorded run was interrupted. To run only the rest of an interrupted \
+            run, use `jtc traj continue`. Other recordings contain only a part of a trajectory. From these \
+            recordings, the command runs the recorded part of the last execution, along the commanded \
+            path.\n\n\
+            With --measured, the command follows the measured positions (one every 40 ms). Use --measured \
             for a motion by hand, because such a motion has no commanded path. If the measured path exceeds \
-            the limits or does not end at rest, the command plans a new motion along the path, at the same \
-            or a lower speed. A note reports the new motion.\n\n\
+            the limits or does not end at rest, the command plans a new motion. The new motion follows the \
+            measured path, at the same speed or slower. The command prints a note if it plans a new \
+            motion.\n\n\
             Examples:\n  \
             jtc traj replay run.mcap --approach\n  \
             jtc traj replay run.csv --speed 50 --record again.mcap\n  \
@@ -125,25 +128,24 @@ pub(crate) enum TrajCommand {
     Replay {
         #[command(flatten)]
         run: RunArgs,
-        /// Run the measured path.
+        /// Follow the measured path instead of the commanded path.
         ///
-        /// The command uses the last motion by hand in the recording. If the recording has no motion by hand, the command
-        /// uses the last execution
+        /// The command uses the last motion by hand in the recording. If the recording does not contain a motion by
+        /// hand, the command uses the last execution
         #[arg(long)]
         measured: bool,
     },
     /// Continue an interrupted run
     #[command(
-        after_help = "An error, a stop or a lost link interrupts a run. The recording of the run contains \
-            the position that the arm reached. An MCAP file also contains the whole trajectory. For a CSV \
-            file, name the trajectory with --trajectory.\n\n\
-            The remainder of the trajectory begins at the last confirmed position. This is the last position \
-            in the recording. If the motion continued after the end of the recording, the last confirmed \
-            position is the later position that the controller reports. If the arm is at another position \
-            (after an error, or a restart of the controller), an approach moves the arm to the last \
+        after_help = "The command continues a run that an error, a stop or a lost link interrupted. The \
+            recording of the run contains the last position of the arm. An MCAP file also contains the whole \
+            trajectory. For a CSV file, set the trajectory file with --trajectory.\n\n\
+            The command continues at the last confirmed position. This is the last position in the \
+            recording, or a later position that the controller reports. After an error or a restart of the \
+            controller, the arm can be at another position. The command then first moves the arm to the last \
             confirmed position.\n\n\
-            The remainder starts from rest and follows the original path. After the remainder of a run with \
-            --repeat, the command runs the missing repetitions.\n\n\
+            The arm starts from rest, and follows the rest of the original path. If the run used --repeat, \
+            the command then runs the missing repetitions.\n\n\
             Examples:\n  \
             jtc traj run cycle.csv --record run.mcap\n  \
             jtc traj continue run.mcap\n  \
@@ -155,10 +157,10 @@ pub(crate) enum TrajCommand {
     Pause(LinkArgs),
     /// Resume a paused motion
     #[command(after_help = "If no motion is paused, the command ends with an error.\n\n\
-            If settings or payload changed during the pause, the remainder of the motion can exceed a limit. \
-            Name the paused trajectory with --trajectory. The command then checks the remainder with the new \
-            settings and payload before it sends anything. Without --trajectory, a note reports that the \
-            command does not check the remainder.\n\n\
+            If settings or payload changed during the pause, the rest of the motion can exceed a limit. With \
+            --trajectory, the command checks the rest of the motion with the new settings and payload before \
+            it sends anything. Without --trajectory, the command does not check the rest of the motion, and \
+            prints a note.\n\n\
             Examples:\n  \
             jtc traj resume\n  \
             jtc traj resume --trajectory motion.csv\n  \
@@ -167,11 +169,11 @@ pub(crate) enum TrajCommand {
     /// Stop on the path, and end the motion
     #[command(after_help = STOP_EXAMPLES)]
     Stop(LinkArgs),
-    /// Set or show the speed override on the path, in percent
+    /// Set or show the speed override, in percent (5 to 100)
     #[command(
-        after_help = "The override applies to the present motion and to later motions. The path stays \
-            unchanged, and the speed changes along a ramp. The controller needs extensions (see `jtc info`). \
-            Without a number, the command shows the present override.\n\n\
+        after_help = "The override slows down the present motion and later motions. It does not change the \
+            path. The speed changes gradually. The controller must have the protocol extensions (see `jtc \
+            info`). Without a number, the command shows the present override.\n\n\
             Examples:\n  \
             jtc traj speed 30\n  \
             jtc traj speed"
@@ -199,13 +201,14 @@ pub(crate) struct RunArgs {
     pub approach: bool,
     /// Set the points per segment (1 to 1500).
     ///
-    /// A trajectory has at most 100 segments. By default, segments are short enough for a reliable CRC
+    /// The command uploads a trajectory in segments (at most 100), each with one CRC. By default, segments are short
+    /// enough that the CRC detects errors reliably
     #[arg(long, value_name = "N")]
     pub points_per_segment: Option<usize>,
     /// Run the trajectory this number of times (1 to 100000).
     ///
-    /// The command keeps statistics of the last 1000 runs, and the samples of the last run. If the path does not end at its
-    /// first point, you also need --approach
+    /// The report contains statistics of the last 1000 runs, and the samples of the last run. If the path does not end
+    /// at its first point, you also need --approach
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
     #[command(flatten)]
@@ -215,9 +218,9 @@ pub(crate) struct RunArgs {
 /// Options of `jtc traj resume`.
 #[derive(Args, Debug)]
 pub(crate) struct ResumeArgs {
-    /// Check the remainder of this trajectory before the motion.
+    /// Check the rest of this trajectory before the motion resumes.
     ///
-    /// Name the trajectory file of the run, or an MCAP recording of the run. An MCAP recording contains the trajectory
+    /// Use the trajectory file of the run, or an MCAP recording of the run
     #[arg(long, env = "JTC_TRAJECTORY", value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     #[command(flatten)]
@@ -232,19 +235,19 @@ pub(crate) struct ContinueArgs {
     /// Recording of the interrupted run, .mcap or .csv
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// Use this trajectory file of the run.
+    /// Use this file as the trajectory of the interrupted run.
     ///
-    /// Default: the trajectory in the recording
+    /// Default: the trajectory in the MCAP recording
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
     /// Set the total number of runs (1 to 100000).
     ///
-    /// This number includes the runs that have already finished. Default: the number in the recording (MCAP)
+    /// This number includes the runs that have already finished. Default: the number in the MCAP recording
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: Option<u32>,
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
-    /// Default: the arm of the controller, or the built-in arm if the controller has no extensions
+    /// Default: the arm of the controller, or the built-in arm if the controller cannot report its arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
@@ -254,10 +257,10 @@ pub(crate) struct ContinueArgs {
 /// Options of every command that executes a motion.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExecuteArgs {
-    /// Set what the motion does if this program disconnects.
+    /// Set the reaction of the agent if this program disconnects.
     ///
-    /// If this program is killed or loses its connection to the agent, the motion continues, pauses or stops. This option
-    /// needs an agent (`jtc serve`)
+    /// If this program is killed or loses its connection to the agent, the motion continues, pauses or stops. Default:
+    /// continue. This option needs an agent (`jtc serve`)
     #[arg(long, value_name = "POLICY", value_parser = ["continue", "pause", "stop"])]
     pub when_gone: Option<String>,
     #[command(flatten)]
@@ -286,11 +289,13 @@ pub(crate) struct RunFiles {
 /// `jtc teach …`
 #[derive(Debug, Subcommand)]
 pub(crate) enum TeachCommand {
-    /// Start teaching, to move the arm by hand
-    #[command(after_help = "During teaching, the controller compensates gravity and part of the friction, \
-        and damps the motion. The controller does not push the arm back to an earlier position.\n\n\
+    /// Start teaching, so that you can move the arm by hand
+    #[command(
+        after_help = "During teaching, the controller compensates gravity and a part of the friction, \
+        and damps the motion. The controller does not move the arm back to an earlier position.\n\n\
         Examples:\n  \
-        jtc teach on")]
+        jtc teach on"
+    )]
     On(LinkArgs),
     /// End teaching, and hold the pose
     #[command(after_help = "Examples:\n  jtc teach off")]
@@ -298,12 +303,12 @@ pub(crate) enum TeachCommand {
     /// Record a motion by hand as a trajectory, until Ctrl-C
     #[command(
         after_help = "The command writes the file while you move the arm by hand. If the program is killed, \
-            the file contains the motion up to that time. If the file cannot be written (full disk), the \
-            recording ends at once, the controller holds the arm, and the exit code is 5.\n\n\
-            With --waypoints, the final file contains as few positions as possible, for `jtc plan`. All \
-            other recorded positions are within --tolerance of the straight lines between the waypoints. The \
-            command selects the waypoints when the recording ends. Before that time, the file contains all \
-            positions of the motion.\n\n\
+            the file contains the motion up to that time. If the disk is full, the recording ends at once, \
+            and the controller holds the arm. The exit code is then 5.\n\n\
+            With --waypoints, the command writes a waypoint file for `jtc plan`, with as few waypoints as \
+            possible. All recorded positions are within --tolerance of the straight lines between the \
+            waypoints. The command selects the waypoints when the recording ends. During the recording, the \
+            file contains all positions of the motion.\n\n\
             Examples:\n  \
             jtc teach record motion.csv\n  \
             jtc teach record motion.csv --duration 20\n  \

@@ -49,7 +49,7 @@ pub(crate) struct ExplainArgs {
 pub(crate) struct ExampleArgs {
     /// Name of the example.
     ///
-    /// Without a name, or with `list`, the command lists all examples
+    /// Without a name, or with the name `list`, the command lists all examples
     pub name: Option<String>,
     /// Write to this directory (default: the current directory)
     #[arg(short = 'o', long = "out", env = "JTC_EXAMPLE_DIR", value_name = "DIR")]
@@ -61,7 +61,7 @@ pub(crate) struct ExampleArgs {
 /// Options of `jtc help`.
 #[derive(Args, Debug)]
 pub(crate) struct HelpArgs {
-    /// Page (files, faults or events), or the words of a command
+    /// Page (files, faults, events), or a command such as traj run
     pub topic: Vec<String>,
 }
 
@@ -75,7 +75,9 @@ pub(crate) struct ReportArgs {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Use the limits of this arm if the recording has none (CSV)
+    /// Use the limits of this arm, TOML or URDF.
+    ///
+    /// Default: the limits in the recording. A CSV recording does not contain limits; its default is the built-in arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
 }

@@ -16,11 +16,11 @@ pub(crate) enum ParamsCommand {
             FricTableJointN.csv        friction tables, six files\n  \
             PidParamJointN.csv         gains, six files\n\n\
             You can name several files. If you name a directory, the command searches the directory for \
-            these files. The command uses files of single joints only if it finds the files of all six \
-            joints.\n\n\
-            This command does not send the limits, gravity and rotor inertia of an arm file. If these values \
-            differ from the values of the controller, the command sends nothing unless you use \
-            --accept-device-limits.\n\n\
+            these files. The command uses FricTableJointN.csv or PidParamJointN.csv only if it finds the \
+            files of all six joints.\n\n\
+            The command does not send limits, gravity and rotor inertia of an arm file. If these values \
+            differ from the values of the controller, the command sends nothing, unless you use \
+            --accept-device-limits. `jtc arm push` sends the complete arm.\n\n\
             Examples:\n  \
             jtc params push my-arm.toml\n  \
             jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv")]
@@ -37,7 +37,10 @@ pub(crate) enum ParamsCommand {
         link: LinkArgs,
     },
     /// Make the controller use its default parameters
-    #[command(after_help = "Examples:\n  jtc params use-defaults")]
+    #[command(after_help = "The default parameters are the parameters of the stored arm. If the controller \
+        has not stored an arm, they are the parameters of the built-in arm.\n\n\
+        Examples:\n  \
+        jtc params use-defaults")]
     UseDefaults(LinkArgs),
     /// Show the parameters of a file or of the built-in arm
     #[command(
@@ -74,8 +77,9 @@ pub enum FrictionKind {
 pub(crate) struct AcceptArgs {
     /// Continue even if limits, gravity or rotor inertia differ.
     ///
-    /// The controller then uses its own values instead of the values of the arm file. For a motion on a controller with
-    /// extensions, the option accepts every difference, including differences in masses, gains and friction
+    /// The controller then uses its own values, not the values of the arm file. Before a motion, the command compares
+    /// the whole arm if the controller reports its arm. The option then also accepts differences in masses, gains and
+    /// friction
     #[arg(long)]
     pub accept_device_limits: bool,
 }

@@ -10,12 +10,12 @@ use super::LinkArgs;
 pub(crate) enum PayloadCommand {
     /// Set the payload
     #[command(
-        after_help = "The controller then holds and moves the arm with this payload. The flange is the last \
-            frame of the arm file.\n\n\
-            In HoldPos, Teaching and Pause, the controller adds the torque of the payload over 0.5 s, \
-            without a step. If you start a motion during this time, the motion waits until the controller \
-            has added the full torque. The payload is not stored: after a power cycle, the controller has no \
-            payload.\n\n\
+        after_help = "The controller then computes the torques of the arm with this payload. The flange is \
+            the last frame of the arm file.\n\n\
+            In the states HoldPos and Teaching, and during a pause, the controller changes its payload \
+            linearly over 0.5 s. If you start a motion during this time, the motion waits until the change \
+            is complete. The controller does not store the payload. After a power cycle, the payload is \
+            zero.\n\n\
             Examples:\n  \
             jtc payload set --mass 2 --com 0,0,0.08\n  \
             jtc payload set --mass 2 --com 0,0,0.08 --inertia 0.01,0.01,0.004\n  \

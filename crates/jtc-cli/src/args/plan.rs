@@ -18,13 +18,13 @@ pub(crate) struct PlanArgs {
     pub out: PathBuf,
     /// Round corners within this distance, rad (0 to 0.5).
     ///
-    /// The distance is measured at the joint that is furthest from the waypoint. With --deg, the distance is in degrees (0
-    /// to 28.6). With 0, the arm stops at each waypoint
+    /// The value is the largest distance of a joint from the waypoint. With --deg, the value is in degrees (0 to 28.6).
+    /// With 0, the arm stops at each waypoint
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
-    /// Keep the flange on straight lines.
+    /// Move the flange along straight lines.
     ///
-    /// The option applies to each leg without a value in the column `leg`
+    /// The option applies to each waypoint without a value in the column `leg`
     #[arg(long)]
     pub line: bool,
     /// Round corners of lines and arcs, m (0 to 0.5).
@@ -37,9 +37,9 @@ pub(crate) struct PlanArgs {
     pub speed: f64,
     #[command(flatten)]
     pub margin: MarginArgs,
-    /// Let the acceleration change in 20 ms instead of 100 ms.
+    /// Let the acceleration rise in 20 ms instead of 100 ms.
     ///
-    /// The motion is then faster, and puts more stress on gears and load
+    /// The motion is then faster, but increases the stress on gears and load
     #[arg(long)]
     pub no_jerk_limit: bool,
     /// Use limits, masses and poses of this arm, TOML or URDF.
@@ -49,7 +49,7 @@ pub(crate) struct PlanArgs {
     pub arm: Option<PathBuf>,
     /// Read the numbers of the file and --blend as degrees.
     ///
-    /// Use this option for files that do not name their unit
+    /// Use this option for files that do not contain units
     #[arg(long)]
     pub deg: bool,
     /// Plan with this payload at the flange, kg.
@@ -59,12 +59,12 @@ pub(crate) struct PlanArgs {
     pub payload: Option<jtc_core::Payload>,
     /// Set the lowest expected bearing temperature, °C.
     ///
-    /// Cold bearings need more torque
+    /// Cold bearings need more torque. Range: -40 to 120
     #[arg(long, value_name = "C", default_value_t = 20.0, allow_hyphen_values = true)]
     pub temperature: f64,
     /// Write a report page to this .html file.
     ///
-    /// The page shows the motion, its limits, and the active limit at each time
+    /// The page shows the motion, its limits, and which limit determines the speed at each time
     #[arg(long, env = "JTC_PLAN_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
@@ -86,7 +86,7 @@ pub(crate) struct MoveArgs {
     pub to: Option<Target>,
     /// Move the flange to a pose in the base frame.
     ///
-    /// X,Y,Z in m; roll, pitch and yaw in rad
+    /// X,Y,Z are in m. Roll, pitch and yaw are in rad, or in degrees with --deg
     #[arg(
         long,
         value_name = "X,Y,Z,ROLL,PITCH,YAW",
@@ -100,7 +100,7 @@ pub(crate) struct MoveArgs {
     pub line: bool,
     /// Read positions, or roll, pitch and yaw, as degrees.
     ///
-    /// The command refuses this option for a named pose, because its unit is known
+    /// Do not use this option with a named pose, because poses in an arm file are always in rad
     #[arg(long)]
     pub deg: bool,
     /// Set the speed in percent of the allowed speed (1 to 100).
@@ -112,8 +112,8 @@ pub(crate) struct MoveArgs {
     pub margin: MarginArgs,
     /// Use poses, limits and masses of this arm file.
     ///
-    /// Default: the arm of the controller, or the built-in arm if the controller has no extensions. A named pose needs this
-    /// option
+    /// Default: the arm of the controller, or the built-in arm if the controller cannot report its arm. A named pose
+    /// needs this option
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
@@ -123,7 +123,7 @@ pub(crate) struct MoveArgs {
 /// Option for the torque that a plan keeps in reserve.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct MarginArgs {
-    /// Reserve torque, in percent of each limit (0 to 50).
+    /// Keep this torque reserve, percent of each limit (0 to 50).
     ///
     /// The reserve is for masses and friction that the arm model does not contain
     #[arg(

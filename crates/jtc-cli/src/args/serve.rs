@@ -18,8 +18,8 @@ pub(crate) struct ServeArgs {
     pub sim: bool,
     /// Use this arm, TOML or URDF (default: the built-in arm).
     ///
-    /// With --sim, the agent simulates this arm. If the file is complete, the simulated controller also has this arm as its
-    /// stored arm. Without --sim, the agent uses this arm for a controller that cannot report its arm
+    /// With --sim, the agent simulates this arm. If the file contains all parameters, the simulated controller also has
+    /// this arm as its stored arm. Without --sim, the agent uses this arm only if the controller cannot report its arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Listen at this address.
@@ -29,16 +29,17 @@ pub(crate) struct ServeArgs {
     pub listen: SocketAddr,
     /// Accept this host name in addition to the address.
     ///
-    /// Requests to the agent may then use this host name. For several names, repeat the option or use commas
+    /// Clients can then use this host name in the address of the agent. For several names, repeat the option, or write
+    /// commas between the names
     #[arg(long = "name", env = "JTC_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
     /// Allowed origins.
     #[arg(
         long = "allow-origin",
-        help = "Allow web pages of this origin read-only access",
-        long_help = "Allow web pages of this origin read-only access.\n\n\
-            Examples are https://app.foxglove.dev, and file:// for desktop applications. For several origins, \
-            repeat the option or use commas",
+        help = "Give web pages of this origin read-only access",
+        long_help = "Give web pages of this origin read-only access.\n\n\
+            Examples are https://app.foxglove.dev, and file:// for desktop applications. For several \
+            origins, repeat the option, or write commas between the origins",
         env = "JTC_ALLOW_ORIGINS",
         value_name = "ORIGIN",
         value_delimiter = ',',
@@ -58,13 +59,13 @@ pub(crate) struct ServeArgs {
     pub command_log: Option<PathBuf>,
     /// Limit the size of the command log.
     ///
-    /// When the log reaches half of this size, the agent renames the log to FILE.1
+    /// When the log reaches half of this size, the agent renames the log to FILE.1, and starts a new log
     #[arg(long, env = "JTC_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
-    /// Keep trajectories in this directory.
+    /// Store the trajectories of clients in this directory.
     ///
-    /// Each file name contains the number of the trajectory, for example 7-pick.csv. Without this option, the agent keeps
-    /// trajectories only while it runs
+    /// Each file name contains the number of the trajectory, for example 7-pick.csv. Without this option, the agent
+    /// keeps trajectories only while it runs
     #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
     pub trajectories: Option<PathBuf>,
     /// Use TLS with the certificate chain in this PEM file
@@ -80,17 +81,19 @@ pub(crate) struct ServeArgs {
     pub record: Option<PathBuf>,
     /// Limit the size of the recordings.
     ///
-    /// The agent deletes the oldest recordings first. The agent deletes only recordings that agents made in this directory
+    /// When the recordings reach this size, the agent deletes the oldest recordings. It deletes only recordings of
+    /// agents
     #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = record_size)]
     pub record_limit: u64,
-    /// Let a PLC drive the arm by Modbus TCP at this address.
+    /// Let a PLC control the arm by Modbus TCP at this address.
     ///
-    /// Modbus has no tokens. By default, only programs on this computer can connect
+    /// Modbus does not use tokens. Without --modbus-allow, only programs on this computer can connect
     #[arg(long, env = "JTC_MODBUS", value_name = "ADDRESS:PORT")]
     pub modbus: Option<SocketAddr>,
     /// Allow Modbus only from this address or network.
     ///
-    /// An example of a network is 192.168.0.0/24. For several networks, repeat the option or use commas
+    /// An example of a network is 192.168.0.0/24. For several networks, repeat the option, or write commas between the
+    /// networks
     #[arg(long, env = "JTC_MODBUS_ALLOW", value_name = "CIDR", value_delimiter = ',', requires = "modbus")]
     pub modbus_allow: Vec<Network>,
     #[command(flatten)]

@@ -61,7 +61,7 @@ pub(crate) struct DemoArgs {
     pub out: PathBuf,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Set the speed of virtual time
+    /// Set the speed of the simulated time
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Max)]
     pub speed: SimSpeed,
 }
@@ -69,19 +69,20 @@ pub(crate) struct DemoArgs {
 /// Options of `jtc sim`.
 #[derive(Args, Debug)]
 pub(crate) struct SimArgs {
-    /// Make this path a symbolic link to the pseudo-terminal.
+    /// Create a symbolic link to the pseudo-terminal at this path.
     ///
-    /// By default, the command prints the name of the pseudo-terminal
+    /// Without this option, the command prints the name of the pseudo-terminal
     #[arg(long, env = "JTC_SERIAL", value_name = "PATH")]
     pub serial: Option<PathBuf>,
     /// Simulate this arm, TOML or URDF (default: the built-in arm).
     ///
-    /// If the file is complete, the simulated controller also has this arm as its stored arm
+    /// If the file contains all parameters, the simulated controller also has this arm as its stored arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Attach a payload that the controller does not know.
     ///
-    /// KG is the mass, kg. X,Y,Z is its position in the flange frame, m
+    /// The payload is a point mass. KG is its mass, kg. X,Y,Z is its position in the flange frame, m. Default of the
+    /// position: 0,0,0
     #[arg(long, env = "JTC_SIM_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried)]
     pub payload: Option<jtc_core::Payload>,
     /// Choose the support of the arm while its drives are off
@@ -89,29 +90,31 @@ pub(crate) struct SimArgs {
     pub support: SimSupport,
     /// Set the gear stiffness between motor and link, N·m/rad.
     ///
-    /// Write one number for all joints, or one number for each joint. Default: rigid
+    /// Write one number for all joints, or six numbers with commas between them (100 to 1000000). Default: rigid
     #[arg(long, value_name = "K[,K2,…,K6]", value_parser = gears, allow_hyphen_values = true)]
     pub gear_stiffness: Option<[f64; JOINTS]>,
-    /// Set the speed at which the drives trip, rad/s.
+    /// Set the over-speed limit of the drives, rad/s.
     ///
-    /// Write one number for all joints, or one number for each joint. Default: 1.2 times the velocity limit
+    /// A drive reports a fault if its joint is faster. Write one number for all joints, or six numbers with commas
+    /// between them (0.01 to 100). Default: 1.2 times the velocity limit
     #[arg(long, value_name = "V[,V2,…,V6]", value_parser = over_speed, allow_hyphen_values = true)]
     pub over_speed: Option<[f64; JOINTS]>,
-    /// Keep the stored arm in this file, like the flash of a board.
+    /// Use this file as the non-volatile memory of the controller.
     ///
-    /// The simulator reads the file when it starts. `jtc arm push --store` writes the file
+    /// The simulator reads the stored arm from this file when it starts. `jtc arm push --store` writes the arm to the
+    /// file
     #[arg(long, env = "JTC_STORE_FILE", value_name = "FILE")]
     pub store: Option<PathBuf>,
     /// Set the rate of the simulated line, Bd (300 to 15000000).
     ///
-    /// The simulated line takes as much time per byte as a real serial line
+    /// Each byte takes as much time as on a real serial line of this rate
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200,
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
     pub baud: u32,
-    /// Send bytes over the line without delay
+    /// Send bytes without the delay of a serial line
     #[arg(long, env = "JTC_NO_THROTTLE", value_parser = on_off)]
     pub no_throttle: bool,
-    /// Set the speed of virtual time
+    /// Set the speed of the simulated time
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Realtime)]
     pub speed: SimSpeed,
     /// Set the seed of random numbers.
@@ -124,14 +127,14 @@ pub(crate) struct SimArgs {
     /// `jtc explain faults` shows the format
     #[arg(long, env = "JTC_FAULTS", value_name = "FILE")]
     pub faults: Option<PathBuf>,
-    /// Also connect the joint bus to this CAN URL.
+    /// Also connect the joint bus to the CAN bus at this URL.
     ///
     /// An example is multicast:239.74.163.2:43113
     #[arg(long, env = "JTC_BUS", value_name = "URL")]
     pub bus: Option<String>,
-    /// Record every millisecond from power-up, .mcap or .csv.
+    /// Record one sample per ms to this .mcap or .csv file.
     ///
-    /// The recording contains commanded and measured positions, velocities, torques and states
+    /// The recording starts at power-up. It contains commanded and measured positions, velocities, torques and states
     #[arg(long, env = "JTC_SIM_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]

@@ -131,10 +131,11 @@ fn capital(text: &str) -> String {
 /// Returns the text of `ucom help profile`: every key with its default, range, rule and meaning.
 pub fn profile_help() -> String {
     let mut text = String::from(
-        "A profile defines how the boards on a bus interpret the parts of the protocol that its published\n\
-         description leaves open. The format of `--profile FILE` is TOML. All keys are optional, and unknown\n\
-         keys are an error. `a.b = 1` and `[a]` with `b = 1` have the same meaning. `ucom probe` measures the\n\
-         keys that real boards can show.\n",
+        "The published description of the protocol leaves some details open. A profile defines these details\n\
+         for the boards on a bus. The format of `--profile FILE` is TOML. All keys are optional. Unknown keys\n\
+         are an error. `a.b = 1` and `[a]` with `b = 1` have the same meaning. `ucom probe` measures the keys\n\
+         that it can find out from real boards. Below, each key has its default. Numbers such as D-03 refer\n\
+         to docs/protocol-ucom.md.\n",
     );
     for key in KEYS {
         let _ = write!(text, "\n{} = {}\n    {} {}.\n", key.name, key.default, key.doc, capital(key.range));

@@ -30,36 +30,35 @@ pub(crate) struct UpdateArgs {
     pub image: PathBuf,
     /// Read files of any name as raw bytes.
     ///
-    /// Even with this option, the command never reads Intel HEX or S-records as raw bytes. The command reads text as raw
-    /// bytes only from a .bin file
+    /// This option has no effect on Intel HEX and S-records. The command reads text as raw bytes only from a .bin file
     #[arg(long)]
     pub raw: bool,
     /// Set the unit of the addresses in Intel HEX and S-records.
     ///
-    /// Default: words in S-records and bytes in Intel HEX. The command uses the other unit if the records follow each other
-    /// without gaps only in that unit
+    /// Default: words in S-records, and bytes in Intel HEX. If the records are without gaps only in the other unit, the
+    /// command uses the other unit
     #[arg(long, value_enum, value_name = "UNIT")]
     pub addresses: Option<Addresses>,
-    /// Fill gaps between records with FF, the erased state of flash
+    /// Fill gaps between records with 0xFF (erased flash)
     #[arg(long)]
     pub fill_gaps: bool,
     /// Require this flash number of the board
     #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
-    /// Write this flash date, or its 16 bits as 0x3AC1.
+    /// Write this flash date, or a 16-bit value such as 0x3AC1.
     ///
-    /// Default: today. A board that already shows the program keeps its date
+    /// Default: today. A board that is already up to date keeps its date
     #[arg(long, value_name = "YYYY-MM-DD")]
     pub date: Option<String>,
-    /// Check everything, but send nothing that changes a board
+    /// Check files and boards, but do not change any board
     #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
     /// Start the application afterwards, and check that it runs
     #[arg(long)]
     pub start: bool,
-    /// Write the board's flash number into the header.
+    /// Write the board's flash number into the image header.
     ///
-    /// Then no other board accepts the image
+    /// Only the board with this flash number then accepts the image
     #[arg(long, conflicts_with = "group")]
     pub name_target: bool,
     /// Program the named boards with one broadcast transfer.
@@ -67,7 +66,7 @@ pub(crate) struct UpdateArgs {
     /// Without this option, the command programs one board after the other
     #[arg(long)]
     pub group: bool,
-    /// Send this exloader for RAM.
+    /// First send this exloader (boot loader) to the RAM.
     ///
     /// The profile must set `prog.plan` to exloader-app
     #[arg(long, value_name = "FILE")]
@@ -82,24 +81,25 @@ pub(crate) struct UpdateArgs {
     /// The profile must set `prog.plan` to raw
     #[arg(long, value_name = "FILE")]
     pub second: Option<PathBuf>,
-    /// Require this Program ID at the end.
+    /// Require that the board reports this Program ID at the end.
     ///
     /// Use this option for images that do not contain the Program ID
     #[arg(long, value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
-    /// Accept an update that cannot be verified.
+    /// Accept an update that the command cannot verify.
     ///
-    /// The exit code is then 0 for `program-up-to-date`, and for a profile that leaves nothing to verify
+    /// The exit code is then 0 for the outcome `program-up-to-date`. It is also 0 if the profile does not allow a
+    /// verification
     #[arg(long)]
     pub unverified: bool,
-    /// Write even if the board already shows this program.
+    /// Write even if the board already reports this program.
     ///
-    /// The option does not skip any check
+    /// The command still makes all checks
     #[arg(long)]
     pub rewrite: bool,
     /// Read the flash numbers from this inventory file.
     ///
-    /// `ucom init` writes this file. Each update records the written image in it
+    /// `ucom init` writes this file. Each update adds a record of the image to the file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]

@@ -14,10 +14,10 @@ use super::{ForceArgs, OverwriteArgs, ValueEnum};
 pub(crate) struct SimArgs {
     /// Simulate this number of boards (0 to 31).
     ///
-    /// Default: the boards of the chain file
+    /// Default: all boards of the chain file
     #[arg(long, env = "UCOM_BOARDS", value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub boards: Option<u8>,
-    /// Set flash numbers along the chain, for example 0x21,0x42
+    /// Set the flash numbers, first board first, such as 0x21,0x42
     #[arg(long, env = "UCOM_FLASH_IDS", value_name = "LIST", value_delimiter = ',', value_parser = flash_id)]
     pub flash_ids: Vec<u16>,
     /// Listen at this address for socketcand clients.
@@ -43,12 +43,12 @@ pub(crate) struct SimArgs {
 /// Options of `ucom init`.
 #[derive(Args, Debug)]
 pub(crate) struct InitArgs {
-    /// Write this inventory; if it exists, first compare with it
+    /// Compare the boards with this inventory, and write it
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Write a new inventory without comparing it to the old one.
     ///
-    /// The command keeps the names and flash records of boards with the same flash number
+    /// Boards with the same flash number keep their names and their records of updates
     #[arg(long)]
     pub renew: bool,
     #[command(flatten)]
@@ -75,9 +75,9 @@ pub(crate) struct StatusArgs {
     /// Clear these bits
     #[arg(long, value_name = "BITS", value_parser = bits)]
     pub clear: Option<ucom::Status>,
-    /// Send one PC_SETSTATUS unchanged.
+    /// Send one PC_SETSTATUS frame unchanged.
     ///
-    /// Mask and value are hexadecimal bytes. The command also sends value bits outside the mask
+    /// Mask and value are hexadecimal bytes. The command also sends the bits of the value that are outside the mask
     #[arg(long, value_name = "MASK:VALUE", value_parser = raw_status, conflicts_with_all = ["set", "clear"])]
     pub raw: Option<(u8, u8)>,
     #[command(flatten)]
@@ -110,7 +110,7 @@ pub(crate) struct StopArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
-    /// Stop only control; the application continues to run
+    /// Stop only the control loop, not the application
     #[arg(long)]
     pub control_only: bool,
 }
@@ -123,7 +123,7 @@ pub(crate) struct IoArgs {
     pub boards: Boards,
     /// Write a template of a signal table to this TOML file.
     ///
-    /// The template contains all names. With -, the command writes to stdout
+    /// The template contains the names of all signals. With -, the command writes to stdout
     #[arg(long, env = "UCOM_TEMPLATE", value_name = "FILE")]
     pub template: Option<PathBuf>,
     #[command(flatten)]
@@ -138,12 +138,12 @@ pub(crate) struct IoArgs {
 /// Options of the cache of descriptions.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct CacheArgs {
-    /// Ask the boards even if the cache has their descriptions
+    /// Read descriptions from the boards, not from the cache
     #[arg(long, env = "UCOM_FRESH", value_parser = on_off)]
     pub fresh: bool,
-    /// Keep the cache of descriptions in this directory.
+    /// Use this directory for the cache of descriptions.
     ///
-    /// Default: ucom in the user's cache directory
+    /// Default: the directory ucom in the user's cache directory
     #[arg(long, env = "UCOM_CACHE", value_name = "DIR")]
     pub cache: Option<PathBuf>,
 }
@@ -156,12 +156,12 @@ pub(crate) struct CiArgs {
     pub board: u8,
     /// Name or index of the signal, and its value.
     ///
-    /// `ucom io` shows the names. You can use upper or lower case, and omit the unit of the name
+    /// `ucom io` shows the names. You can use upper or lower case. You can omit a unit in brackets at the end of a name
     #[arg(value_name = "NAME=VALUE")]
     pub values: Vec<Assignment>,
     /// Run the board under supervision for this time, s.
     ///
-    /// The outputs are enabled: the board moves
+    /// The command enables the outputs, and the motors move
     #[arg(long = "for", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     #[command(flatten)]
@@ -175,17 +175,17 @@ pub(crate) struct CiArgs {
 pub(crate) struct ParArgs {
     /// Board number, list, range, or all.
     ///
-    /// With --apply, all means all boards of the file, and numbers select some of these boards
+    /// With --apply, all means all boards of the file. Numbers select some of these boards
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
     /// Name or index of the signal, and its value.
     ///
-    /// `ucom io` shows the names. You can use upper or lower case, and omit the unit of the name
+    /// `ucom io` shows the names. You can use upper or lower case. You can omit a unit in brackets at the end of a name
     #[arg(value_name = "NAME=VALUE", conflicts_with = "apply")]
     pub values: Vec<Assignment>,
-    /// Write a parameter file, YAML; - writes to stdout.
+    /// Write a parameter file, YAML (- for stdout).
     ///
-    /// The file contains the values that this tool wrote last, and all other names as comments
+    /// The file contains the values that this tool wrote last. It contains all other names as comments
     #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
     pub save: Option<PathBuf>,
     /// Write the parameters of this file to the boards.
@@ -193,7 +193,7 @@ pub(crate) struct ParArgs {
     /// The command first checks the file against the boards
     #[arg(long, value_name = "FILE")]
     pub apply: Option<PathBuf>,
-    /// Check everything with --apply, but write nothing
+    /// With --apply, only check the file, and write nothing
     #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
     /// Read the names of the boards from this inventory file
@@ -240,16 +240,16 @@ pub(crate) struct RunArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Enable the outputs (boards move)
+    /// Enable the outputs (motors move)
     #[arg(long)]
     pub active: bool,
-    /// Set initial inputs, as BOARD.NAME=VALUE
+    /// Set initial inputs in the form BOARD.NAME=VALUE
     #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub ci: Vec<Assignment>,
-    /// Set parameters before the start, as BOARD.NAME=VALUE
+    /// Set parameters before the start, BOARD.NAME=VALUE
     #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub par: Vec<Assignment>,
-    /// Read parameters and first inputs from this YAML file.
+    /// Read parameters and initial inputs from this YAML file.
     ///
     /// `ucom help params` shows the format
     #[arg(long, value_name = "FILE")]
@@ -257,15 +257,15 @@ pub(crate) struct RunArgs {
     /// Read the names of the boards from this inventory file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// Set the action for a lost board.
+    /// Set the action if the heartbeats of a board stop.
     ///
-    /// Default: `on_lost` of the profile
+    /// Default: the key `on_lost` of the profile
     #[arg(long, value_enum, value_name = "POLICY")]
     pub on_lost: Option<OnLost>,
-    /// Make the boards send the texts of their applications
+    /// Make the boards send debug texts of their applications
     #[arg(long)]
     pub debug: bool,
-    /// Make the boards send all their texts (global debug)
+    /// Make the boards send all debug texts (global debug)
     #[arg(long)]
     pub global_debug: bool,
     /// End after this time, s
@@ -283,7 +283,7 @@ pub(crate) struct MonitorArgs {
     /// End after this number of views, one per second
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
-    /// Listen only, and send no frames, not even PC_INFO
+    /// Only listen: do not send any frame, not even PC_INFO
     #[arg(long, env = "UCOM_LISTEN_ONLY", value_parser = on_off)]
     pub listen_only: bool,
 }
@@ -309,9 +309,9 @@ pub(crate) struct RecordArgs {
 pub(crate) struct ReplayArgs {
     /// Recording: .log, .fzi or .mcap
     pub file: PathBuf,
-    /// Also send frames that change boards.
+    /// Also send frames that change boards or keep them running.
     ///
-    /// These frames reset, number, program, start or move boards
+    /// For example, these frames reset, number, program, start or move boards
     #[arg(long)]
     pub intrusive: bool,
     /// Set the speed as a factor of the original speed
@@ -324,14 +324,14 @@ pub(crate) struct ReplayArgs {
 /// Options of `ucom send`.
 #[derive(Args, Debug)]
 pub(crate) struct SendArgs {
-    /// Frames in the format of candump, ID#DATA.
+    /// Frames in the format of candump: ID#DATA.
     ///
     /// Examples are 240#, 1C1#0202, 12345678#11 and 123#R
     #[arg(value_name = "FRAME", required = true)]
     pub frames: Vec<String>,
-    /// Also send frames that change boards.
+    /// Also send frames that change boards or keep them running.
     ///
-    /// These frames reset, number, program, start or move boards
+    /// For example, these frames reset, number, program, start or move boards
     #[arg(long)]
     pub intrusive: bool,
 }
@@ -341,7 +341,7 @@ pub(crate) struct SendArgs {
 pub(crate) struct DecodeArgs {
     /// Recording, or - for stdin.
     ///
-    /// On stdin, the command reads a candump log, or frames without time and bus, such as 141#2100
+    /// On stdin, the command reads a candump log, or only frames such as 141#2100
     #[arg(default_value = "-")]
     pub file: PathBuf,
     /// Decode the live bus instead
@@ -358,14 +358,14 @@ pub(crate) struct ProbeArgs {
     /// Write the profile to this file (default: stdout)
     #[arg(long, env = "UCOM_PROBE_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Reset and number the chain to measure more.
+    /// Reset and number the chain to measure more properties.
     ///
-    /// Some properties can be measured only during the numbering
+    /// The command can measure some properties only while it numbers the boards
     #[arg(long)]
     pub init: bool,
-    /// Start a control loop to see which heartbeats count.
+    /// Start a control loop to test heartbeats.
     ///
-    /// The outputs stay safe
+    /// The command measures which heartbeats of the PC keep a board running. The outputs stay safe
     #[arg(long)]
     pub alive: bool,
     /// Find the checksum algorithm of Program IDs with this image.
@@ -387,12 +387,12 @@ pub(crate) struct ConformanceArgs {
     pub boards: Boards,
     /// Add tests that reset and number the chain.
     ///
-    /// These tests also set and clear status bits
+    /// These tests also set and clear status bits. This option needs all boards
     #[arg(long)]
     pub init: bool,
     /// Add tests that start applications and control loops.
     ///
-    /// Outputs stay safe. The tests take more than a minute per board
+    /// The outputs stay safe. The tests take about 80 s per board
     #[arg(long)]
     pub run: bool,
     /// Add tests that program the named board with this image.
@@ -413,9 +413,9 @@ pub(crate) struct ConformanceArgs {
     /// Run only these tests, for example D-T10,D-T11
     #[arg(long, value_name = "TESTS", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// Test even if another PC is on the bus.
+    /// Test even if another PC controls the bus.
     ///
-    /// Even with --force, the command does not test running boards with --init, --run or --program
+    /// With --init, --run or --program, the command refuses to test running boards, even with --force
     #[arg(long)]
     pub force: bool,
 }

@@ -33,7 +33,8 @@ pub(crate) struct ServeArgs {
     pub token_file: Option<PathBuf>,
     /// Accept this host name in addition to the address.
     ///
-    /// Requests to the agent may then use this host name. For several names, repeat the option or use commas
+    /// Clients can then use this host name in the address of the agent. For several names, repeat the option, or write
+    /// commas between the names
     #[arg(long = "name", env = "UCOM_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
     /// Print the dashboard link with the operator's token.
@@ -49,12 +50,12 @@ pub(crate) struct ServeArgs {
     pub command_log: Option<PathBuf>,
     /// Read the flash numbers from this inventory file.
     ///
-    /// `ucom init` writes this file. Each update records the written image in it
+    /// `ucom init` writes this file. Each update adds a record of the image to the file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Limit the size of the command log.
     ///
-    /// When the log reaches half of this size, the agent renames the log to FILE.1
+    /// When the log reaches half of this size, the agent renames the log to FILE.1, and starts a new log
     #[arg(long, env = "UCOM_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
     /// Use TLS with the certificate chain in this PEM file

@@ -1,4 +1,5 @@
-//! Arms: kinematics, masses, limits, gains and friction of one arm, read from TOML, URDF and CSV files.
+//! Arm model: kinematics, masses, limits, gains and friction of one arm. The values are read from TOML, URDF and CSV
+//! files.
 
 mod check;
 mod collect;
@@ -60,12 +61,12 @@ pub const AVENA_TOML: &str = include_str!("../../../arms/avena.toml");
 pub struct ArmChoice {
     /// Names of the six moving joints, base to wrist. `None` if the description has exactly six moving joints.
     pub joints: Option<Vec<String>>,
-    /// Name of the last link of the arm. Only joints on the path to this link can belong to the arm. `None` selects the flange, which is
-    /// fixed to the last joint.
+    /// Name of the last link of the arm. Only joints between the base and this link can belong to the arm. With
+    /// `None`, the arm ends at the flange that is fixed to the last joint.
     pub tip: Option<String>,
 }
 
-/// Arm that was read from a robot description, together with its gravity and its friction.
+/// Arm that was read from a robot description, with the gravity and the friction that the description contains.
 struct Described {
     arm: Arm,
     /// Acceleration of gravity in the base frame, m/s². In the frame of the robot description, z points upwards.
@@ -104,7 +105,7 @@ pub struct Arm {
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
     /// Named joint positions, rad. Poses are not sent to a controller and are not part of the hash of an arm.
     pub poses: Poses,
-    /// Warnings about values of the file that the loader ignored, changed or filled in.
+    /// Warnings about values of the file that the loader ignored, changed or completed with defaults.
     pub warnings: Vec<Warning>,
     /// Source of each number: the arm file, a proposal or a default.
     pub sources: Sources,
@@ -151,18 +152,19 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error if the text is not a valid URDF, or if `choice` does not select six revolute joints in a row.
+    /// Returns an error if the text is not a valid URDF, or if `choice` does not select a chain of six revolute
+    /// joints.
     pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         urdf::read(text, choice).map(|described| described.arm)
     }
 
-    /// Imports an arm from a URDF file. `choice` selects the joints of the arm. The [`RULES`] propose values that are missing in the file,
-    /// and the arm marks each proposed value.
+    /// Imports an arm from a URDF file. `choice` selects the joints of the arm. For numbers that are missing in the
+    /// file, the [`RULES`] propose values. The arm contains a mark for each proposed value.
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read, is not a valid URDF, or does not determine the six joints. Also returns an error if the
-    /// arm is physically impossible or its drives cannot move it.
+    /// Returns an error if the file cannot be read, is not a valid URDF, or does not determine the six joints. Also
+    /// returns an error if the arm is physically impossible or its drives cannot move it.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::import_text(&text, choice).map_err(|e| e.in_file(path))
@@ -207,7 +209,7 @@ impl Arm {
     /// Returns an error with the first invalid number of the model or of the limits.
     pub fn is_physical(&self) -> Result<(), FileError> {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
-        // J-35, J-43: rejects joint limits that the drives cannot respect, or at which the drives stop without a command.
+        // J-35, J-43: rejects joint limits that the drives do not support.
         self.config().check().map_err(|e| {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
@@ -223,8 +225,8 @@ impl Arm {
         format!("arm model, {kind} {name}")
     }
 
-    /// Returns the controller settings for this arm. If the arm does not have a value, the value of the default arm is used, but an unknown
-    /// rotor inertia is 0.
+    /// Returns the controller settings for this arm. A setting that the arm does not contain has the value of the
+    /// default arm. Exception: an unknown rotor inertia is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
         let mut config =
@@ -282,7 +284,8 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a controller setting that does not have its own key in an arm file. An arm file lists such a setting in `[settings]`.
+/// Returns `true` for a controller setting that has no key of its own in an arm file. Such a setting is stored in the
+/// `[settings]` table of the file.
 fn has_no_key(setting: &Setting) -> bool {
     setting.of_arm() && !setting.of_joint() && !setting.name.starts_with("gravity_")
 }

@@ -61,7 +61,7 @@ struct Positions {
 }
 
 impl Positions {
-    /// Returns the limit that `position` of joint `j` exceeds.
+    /// Returns the limit that `position` of joint `j` exceeds. Returns `None` if the position is within the limits.
     fn limit_beyond(&self, j: usize, position: f64) -> Option<f64> {
         let range = &self.ranges[j];
         let (low, high) = range.of_path(self.first[j]);
@@ -84,8 +84,8 @@ impl<'a> Checker<'a> {
     pub fn check(&self, trajectory: &Trajectory) -> Verdict {
         let mut verdict = Verdict::new(trajectory);
         self.counts(trajectory, &mut verdict);
-        // Trajectory points with the values that the controller will receive. A number outside the range of a serial frame is a problem,
-        // and the check continues with the unrounded number.
+        // Trajectory points with the rounded values that the controller will receive. A number that does not fit into
+        // a serial frame is a problem. The check then continues with the unrounded number.
         let points: Vec<SetPoint> = trajectory
             .points
             .iter()
@@ -110,7 +110,7 @@ impl<'a> Checker<'a> {
             let stands_there = self.start.is_some();
             holding::holds(self.config, dynamics, trajectory.step_ms, &points, stands_there, &mut verdict);
         }
-        // If the path cannot be executed at all, the ability to stop is not checked.
+        // A path that cannot be executed at all is not checked for the ability to stop.
         if let Some(dynamics) = dynamics.filter(|_| verdict.problems.iter().all(|p| !p.kind.stops_at_once()))
         {
             stopping::stops(self.config, &dynamics, trajectory.step_ms, &points, &mut verdict);
@@ -223,7 +223,8 @@ impl<'a> Checker<'a> {
             self.moment(a, i, 0.0, &places, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
             let senseless = self.step(a, b, i, h, verdict);
-            // A step of 1 ms has no millisecond between its points, so the check uses the middle of the step.
+            // With a step of 1 ms, there is no millisecond between two points. Then the speed of the positions is
+            // computed in the middle of the step.
             for k in 1..step_ms.max(2) {
                 let u = f64::from(k) / f64::from(step_ms.max(2));
                 for (figures, speed) in verdict.joints.iter_mut().zip(position_speed(a, b, h, u)) {
@@ -236,15 +237,16 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Finds jumps and contradictory values between two points. Returns `true` if there is a jump between the points.
+    /// Finds jumps and contradictory values between two points. Returns `true` if the positions of the two points
+    /// form a jump.
     fn step(&self, a: &SetPoint, b: &SetPoint, i: usize, h: f64, verdict: &mut Verdict) -> bool {
         let mut senseless = false;
         for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
             let j = joint.index();
             let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
             let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
-            // `expected` is the displacement that follows from the velocities of both points. `slack` is the tolerance for rounding and for
-            // the change of velocity.
+            // `expected` is the displacement that the velocities of both points would cause. `slack` is the tolerance
+            // for the rounding and for a change of the velocity between the points.
             let expected = 0.5 * h * (v0 + v1);
             let slack = 3.0 * POSITION_BIT
                 + h * (0.5 * (v1 - v0).abs() + 2.0 * VELOCITY_BIT)

@@ -14,7 +14,7 @@ use crate::{Error, Session, labels};
 /// Bit rates that the doctor tries if the received bytes do not contain a valid frame.
 pub const RATES: [u32; 8] = [115_200, 921_600, 3_000_000, 230_400, 460_800, 1_000_000, 2_000_000, 57_600];
 
-/// Interval at which an examination checks if the caller has ended it.
+/// Interval at which an examination checks if the caller wants to end it.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Facts that were observed on the link.
@@ -131,7 +131,8 @@ fn link(seen: &Observation, all: &mut Findings) {
         return;
     }
     let bad = seen.bad_bytes as f64 / seen.bytes as f64;
-    // The observation can begin in the middle of a status, so the bytes of one incomplete status are not a fault.
+    // The observation can begin in the middle of a status frame. Therefore the bytes of one incomplete status frame
+    // (175 bytes) are not a fault.
     if seen.bad_bytes > 175 && bad > 0.001 {
         all.add(
             Warning,
@@ -185,7 +186,7 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     }
 }
 
-/// Adds findings about a held stop with its cause, and about joints whose encoder position has jumped.
+/// Adds findings about a held stop and its cause, and about joints whose encoder position has jumped.
 fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactions>, all: &mut Findings) {
     if let Some((cause, ago_ms)) = cause {
         all.add(
@@ -195,8 +196,8 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
             held_stop::next_step(s, Some(cause)),
         );
     }
-    // The finding about the cause of the held stop already names the joint `said`, so this joint is not reported
-    // again.
+    // The finding about the cause of the held stop already names the joint `said`. Therefore no second finding
+    // reports the encoder jump of this joint.
     let said = cause.filter(|(cause, _)| cause.kind == StopKind::EncoderJump);
     let said = said.and_then(|(cause, _)| held_stop::joint(cause));
     let jumped = held_stop::joints(reactions.map_or(0, |reactions| reactions.jumped));
@@ -216,8 +217,8 @@ fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCa
     s.is_held_stop().then_some((cause, *ago_ms))
 }
 
-/// Finds errors in the status. `told` is `true` if the findings already contain the cause of a held stop. The cause
-/// is more precise than the error bits of the joints, so these bits are then not reported.
+/// Finds errors in the status. `told` is `true` if another finding already contains the cause of a held stop. This
+/// cause is more precise than the error bits of the joints, so the function then ignores these bits.
 fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {
@@ -320,7 +321,8 @@ fn set_up(s: &Status, all: &mut Findings) {
     }
 }
 
-/// Bearing temperature above which a warning is added, °C. Above this temperature, the friction and the service life become worse.
+/// Bearing temperature above which a warning is added, °C. Higher temperatures change the friction and shorten the
+/// service life.
 const HOT: u8 = 70;
 
 fn temperatures(s: &Status, all: &mut Findings) {

@@ -1,5 +1,5 @@
-//! Errors of this library. Each error has facts, a kind of failure and a next command. Each operation has its own error enum, and [`Error`]
-//! contains all these enums.
+//! Errors of this library. Each error contains facts, a kind of failure and the next command for the user. Each
+//! operation has its own error enum, and [`Error`] combines these enums.
 
 mod check;
 mod extension;

@@ -12,8 +12,8 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKi
 use crate::check::ProblemKind;
 use crate::labels;
 
-/// Declares the families of numbers. Each family has a meaning, a name, a title and a key, which is the text before the colon in
-/// `can:0x100`.
+/// Declares the families of codes. Each family has a meaning, a name, a title and a key. The key is the text before
+/// the colon, for example `can` in `can:0x100`.
 macro_rules! families {
     ($($(#[$meaning:meta])* $name:ident $key:literal, $title:literal;)+) => {
         /// Family of the number that a page explains.
@@ -24,7 +24,7 @@ macro_rules! families {
         }
 
         impl Family {
-            /// All families. A search for a number without a family uses this order.
+            /// All families, in the order in which a number without a family is looked up.
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
             /// Returns the key of the family, which is the text before the colon in `can:0x100`.
@@ -170,8 +170,8 @@ pub fn names(family: Family, word: u32) -> Vec<&'static str> {
 
 /// Returns the texts that commands print for the code of a page.
 fn shown(page: &Page) -> Vec<String> {
-    // A decoded frame is printed with the node numbers of the protocol instead of the joint numbers. A search must
-    // also find this text.
+    // A decoded frame is printed with the node numbers of the protocol instead of joint numbers. This text must also
+    // find the page.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }
@@ -214,7 +214,7 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
-    // If the query is the key of a family, the key has priority over a printed text that equals the key.
+    // If the query is the key of a family, the family is searched first, even if a printed text equals the key.
     if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
         return by_name_or_number(query);
     }
@@ -353,8 +353,8 @@ mod tests {
         assert_eq!(find("HoldPos").len(), 1);
     }
 
-    /// Each set bit of a word has one name. The names have the same order as the printed texts. A search for a name finds only the page
-    /// with this name.
+    /// Each set bit of a word has exactly one name, in the order of the printed texts. A search for a name finds only
+    /// the page with this name in its family.
     #[test]
     fn the_bits_of_a_word_have_the_names_of_their_pages() {
         for (family, word, words) in [
@@ -393,7 +393,8 @@ mod tests {
                 "{}",
                 p.name
             );
-            // A page of another family may have the same printed text.
+            // The search for the name of a page may also find a page of another family, if that page has the same
+            // printed text.
             let found = find(p.name);
             assert!(
                 found.contains(&p) && found.iter().all(|q| q.family != p.family || q == &p),

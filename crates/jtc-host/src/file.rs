@@ -226,7 +226,8 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    // If semicolons separate the cells, a comma counts as part of a number. A number with a comma is not valid.
+    // If the cells are separated by semicolons, a comma belongs to the number in the cell. Such a number is then
+    // rejected, because a number must not contain a comma.
     match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),

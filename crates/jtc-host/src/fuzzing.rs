@@ -21,8 +21,8 @@ fn sound(read: Result<Loaded, FileError>) {
     let t = &loaded.trajectory;
     assert!(t.step_ms > 0 && !t.points.is_empty());
     let finite = |v: &[f64; 6]| v.iter().all(|v| v.is_finite());
-    // A spline through very large numbers may overflow. After an overflow, the conversion to frames rejects the trajectory, because its
-    // numbers are out of range.
+    // A spline through very large numbers may overflow. The conversion to frames must then reject the trajectory,
+    // because its numbers are out of range.
     if !t.points.iter().all(|p| finite(&p.position) && finite(&p.velocity) && finite(&p.acceleration)) {
         assert!(t.raw().is_err());
         return;
@@ -38,7 +38,7 @@ fn sound(read: Result<Loaded, FileError>) {
 /// Checks that waypoints are read and converted to positions, or rejected with an error.
 fn waypoints(text: &str) {
     let Ok(file) = WaypointFile::parse(text) else { return };
-    // Inverse kinematics of thousands of waypoints needs much time and does not find further errors.
+    // Inverse kinematics of thousands of waypoints would take too long and would not find further errors.
     if file.waypoints.len() < 50 {
         let _ = file.positions(&Arm::avena());
     }
@@ -53,8 +53,8 @@ pub fn trajectory_csv(data: &[u8]) {
     waypoints(text);
 }
 
-/// Reads the data as a trajectory file with 19 columns and without a header. Then builds a file of this format from the data, with integers
-/// or with decimals, and reads this file.
+/// Reads the data as a trajectory file with 19 columns and without a header. Then builds a valid file of this format
+/// from the data, with integers or with decimals, and reads this file too.
 pub fn trajectory_table(data: &[u8]) {
     if let Some(text) = text(data) {
         sound(Loaded::parse(text, None));
@@ -89,8 +89,8 @@ pub fn trajectory_yaml(data: &[u8]) {
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// Checks an arm that was read from a file. The arm model must be physically possible. The parameters must fit into their serial frames
-/// unless the parameter check rejects them.
+/// Checks an arm that was read from a file. The arm model must be physically possible. The parameters must fit into
+/// their serial frames, or the parameter check must reject them.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };
     assert!(arm.model.check().is_ok());

@@ -79,7 +79,8 @@ pub struct Reacting {
     /// Last held stop; `None` if no held stop has occurred since the start of the controller, or since its occurred
     /// errors were last cleared (ClearOccurredErrors).
     pub last_held_stop: Option<HeldStop>,
-    /// Numbers, from 1, of the joints that yield to a push or lower their loads.
+    /// Numbers, from 1, of the joints that yield to a push, or that slowly lower a load because they cannot hold it
+    /// (J-70).
     pub yields: Vec<u8>,
     /// Numbers, from 1, of the joints whose encoder has jumped since their drives were last configured.
     pub encoder_jumped: Vec<u8>,

@@ -118,8 +118,8 @@ pub fn has_torque(s: &Status) -> bool {
     s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
 }
 
-/// Returns `true` if joint `j` (from 0) is marked as absent. While the torque is on, only an absent joint is in the state Start (J-20,
-/// J-53).
+/// Returns `true` if joint `j` (from 0) is marked as absent. The function uses the state Start of its drive: while
+/// the torque is on, only absent joints are in this state (J-20, J-53).
 pub fn is_absent(s: &Status, j: usize) -> bool {
     has_torque(s) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
 }
@@ -172,8 +172,8 @@ pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
-        // An active safety line switches off the torque of a drive. An unconfigured drive also sets the bit of the safety line, so this bit
-        // is ignored until the drive is configured.
+        // An active safety line switches off the torque of a drive. The safety-line bit is also set while a drive is
+        // not configured, so it is ignored until then.
         let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()
@@ -248,7 +248,8 @@ pub fn waiting_for(s: &Status) -> String {
     if missing.is_empty() { head } else { format!("{head}; {}", missing.join(", ")) }
 }
 
-/// Returns the next step after a held stop. The text begins with the action `cause`, which removes the cause of the held stop.
+/// Returns the next steps after a held stop: first the action `cause`, which removes the cause, and then the command
+/// that clears the held stop.
 pub(crate) fn after_removing(cause: &str) -> Next {
     let then = next!(
         ", wait until the arm is at rest, then {}; until then the controller holds the arm and executes no motion",
@@ -264,7 +265,7 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.is_held_stop() {
         after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
-        // The text names the full command first. As an alternative, it then names only the option `--defaults`.
+        // The advice first names the complete command. For the alternative it names only the option `--defaults`.
         next!("{}, or ", RecoverWithArm)
             .then(Next::typed(Action::RecoverWithDefaults, "--defaults"))
             .then(" for the arm that is built into the controller")
@@ -295,7 +296,7 @@ pub fn next_step(s: &Status) -> Next {
 mod tests {
     use super::*;
 
-    /// A cause is listed before its consequences. The safety line of an unconfigured drive is ignored.
+    /// A cause is listed before its consequences. The safety-line bit of an unconfigured drive is ignored.
     #[test]
     fn the_most_particular_cause_stands_first() {
         let mut s = Status {

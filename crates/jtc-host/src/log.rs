@@ -51,7 +51,7 @@ impl FlightLog {
         self.log().next().is_none()
     }
 
-    /// Returns the range of trajectory points that the log needs: the index of the first point and the number of
+    /// Returns the trajectory points that a replay of the log needs: the index of the first point and the number of
     /// points. `hash` identifies the trajectory. Returns `None` if the log contains no motion along this trajectory.
     pub fn needed_points(&self, hash: u32, total: usize) -> Option<(usize, usize)> {
         let mut needed: Option<(f64, f64)> = None;
@@ -83,7 +83,7 @@ impl FlightLog {
         }
         let (low, high) = needed?;
         let first = (low.max(0.0) as usize).saturating_sub(1).min(total);
-        // After the end of the trajectory, the replay uses the last point.
+        // Some points after the last position in the log are also needed, as far as the trajectory has them.
         let end = ((high as usize).saturating_add(3)).min(total);
         (end > first).then_some((first, end - first))
     }

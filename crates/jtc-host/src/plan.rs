@@ -54,25 +54,25 @@ use sampled::{least_s, sampled, step_ms};
 
 /// Time step between the points of planned moves, ms.
 const STEP_MS: u16 = 10;
-/// Duration of a change of the acceleration if the jerk is not limited, s. The duration is two steps. With a shorter
-/// duration, the interpolated acceleration between two points (J-32) would be higher than at the points.
+/// Time in which the acceleration changes if the jerk is not limited, s: two steps. With a shorter time, the
+/// interpolated acceleration between two points (J-32) would be higher than at the points.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
 /// Maximum share of the velocity and acceleration limits that a plan uses. The remaining 2 % are reserved for the rounding in serial
 /// frames.
 const SHARE: f64 = 0.98;
-/// Time in which the arm reaches full speed when it continues an interrupted trajectory, s. If the check rejects the
+/// Time from standstill to full speed when the arm continues an interrupted trajectory, s. If the check rejects the
 /// motion, the planner tries the longer times `RAMPS_S`.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Lowest bearing temperature that a plan assumes by default, °C. In a factory hall of this temperature, the friction
-/// of cold bearings is higher than usual.
+/// Lowest bearing temperature that a plan assumes by default, °C. This is the temperature of cold bearings in a
+/// factory hall. Cold bearings have more friction than bearings at operating temperature.
 pub const COLD: f64 = 20.0;
-/// Largest slow-down factor of a motion. A motion that needs a larger factor is rejected.
+/// Largest factor by which the planner slows down a motion. A motion that needs a larger factor is rejected.
 const SLOWEST: f64 = 50.0;
 /// Smallest and largest slow-down factor in one iteration of the planner.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Smallest slow-down factor in one iteration of the planner if a motion exceeds the torque margin. This factor is small, because the
-/// rounding of a trajectory increases the torque only slightly.
+/// Smallest slow-down factor in one iteration of the planner if a motion exceeds the torque margin. It is close to 1,
+/// because a rounded motion exceeds the margin only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
 /// Slow-down factor above which a note reports that the torque margin has slowed down a motion.
 const NOTED: f64 = 1.01;
@@ -94,7 +94,8 @@ pub struct Planner<'a> {
     /// waypoint. The distance is that of the joint that is furthest from the waypoint. If the blend is 0, the arm
     /// stops at each waypoint.
     pub blend: f64,
-    /// `true` if the jerk is limited. If the value is `false`, the acceleration changes within two steps.
+    /// `true` if the jerk is limited. If the value is `false`, the acceleration may change from one value to another
+    /// within two steps.
     pub jerk: bool,
     /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each torque limit, for masses and friction that the model does not contain.
     pub margin_pct: f64,
@@ -255,8 +256,8 @@ impl<'a> Planner<'a> {
         Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
-    /// Plans a motion within the limits. If the torque margin of a joint leaves no torque for the motion, the function plans without the
-    /// margin of this joint.
+    /// Plans a motion within the limits. If the torque margin leaves a joint no torque for the motion, the function
+    /// plans again without the margin of this joint.
     fn within(
         &self,
         plan: impl Fn(&Limits) -> Result<Motion, jtc_plan::PlanError>,
@@ -308,15 +309,15 @@ impl<'a> Planner<'a> {
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
-            // The planner checks with cold bearings first, and then with the bearing temperature during operation.
-            // The second check is needed because friction helps to brake: with less friction, the braking torque of
-            // the drives is higher.
+            // The planner first checks with cold bearings, and then with bearings at operating temperature. The
+            // second check is needed because friction helps to brake: with less friction, the drives need more torque
+            // to brake.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict =
                 if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
-            // If there is a warning and the step is long, the corners are closer together than one step. A slower
-            // motion would not help, because its steps would be even longer.
+            // A warning in combination with a long step means that the corners of the path are closer together than
+            // one step. A slower motion would not help, because its steps would be even longer.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
@@ -330,8 +331,8 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // The trajectory may exceed the torque limit that the margin allows, although the plan does not. The
-            // reasons are the rounding in serial frames, and the torque between the samples of the plan.
+            // The trajectory may exceed the torque limit that the margin allows, although the planned motion does
+            // not. The causes are the rounding in serial frames, and torques between the samples of the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -412,8 +413,8 @@ fn limit_name(kind: ProblemKind) -> &'static str {
     }
 }
 
-/// Returns the limits that determine the speed of a motion. If the motion was slowed down because of a problem, returns the limit of this
-/// problem for the whole motion.
+/// Returns the limits that determine the speed of a motion. If the motion was slowed down because of a problem, the
+/// result is only the limit of this problem, for the whole motion.
 fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> {
     if let Some(problem) = slowed {
         let (joint, limit) = (problem.joint.unwrap_or(Joint::ALL[0]), limit_name(problem.kind));

@@ -24,8 +24,8 @@ pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 
-/// Number of Stops and Pauses by other programs. These programs use either this program's port, or the agent that
-/// holds the port.
+/// Number of Stops and Pauses that other programs have sent. They send them through the port of this program, or
+/// through the agent that holds the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Halts {
     /// Number of Stops and Pauses.
@@ -52,13 +52,14 @@ pub trait Port {
     fn name(&self) -> String {
         "port".to_owned()
     }
-    /// Returns the reason why the last rejected frame did not reach the device. Returns `None` if the device itself rejected the frame.
-    /// Only a shared line returns a reason.
+    /// Returns the reason why the last rejected frame did not reach the device. Returns `None` if the frame reached
+    /// the device and the device rejected it. Only a line that is shared by several clients can return a reason.
     fn take_denial(&mut self) -> Option<String> {
         None
     }
-    /// Marks the start of a motion request. Frames that are written after this call belong to the request. A shared line rejects requests
-    /// that are older than another client's Stop. On a line that is not shared, this call has no effect.
+    /// Marks the start of a motion request. Frames that are written after this call belong to the request. A shared
+    /// line rejects a request that was made before another client's Stop. On a line that is not shared, this call has
+    /// no effect.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
@@ -67,9 +68,9 @@ pub trait Port {
     fn halts(&self) -> Halts {
         Halts::default()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), for a motion request that has waited, for example in a queue. `halts` is the value of
-    /// [`halts`](Self::halts) at the time of the request. If another program has stopped or paused the arm since then, the line rejects the
-    /// motion.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a motion request that was not executed at once, for example
+    /// because it was in a queue. `halts` is the value of [`halts`](Self::halts) at the time of the request. If
+    /// another program has stopped or paused the arm since then, the line rejects the motion.
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         let _ = halts;
         self.ask_to_move()

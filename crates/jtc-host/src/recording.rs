@@ -136,7 +136,7 @@ impl Recorder {
         self.finish()
     }
 
-    /// Passes all samples written so far to the operating system. Passed samples are not lost if this program ends.
+    /// Passes all samples written so far to the operating system. These samples are not lost if this program ends.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|e| e.at(&self.path))
     }
@@ -270,8 +270,8 @@ pub struct Scanned {
     pub cut: Option<String>,
 }
 
-/// Maximum number of samples in memory that still wait for messages from a later part of the file. 4096 samples fill
-/// several chunks of an MCAP file.
+/// Maximum number of incomplete samples in memory, whose missing messages may follow later in the file. 4096 samples
+/// fill several chunks of an MCAP file.
 const ROOM: usize = 4096;
 
 /// Calls `see` with each sample of a file that [`Recorder`] wrote, oldest first. The function keeps only a part of the file in memory, also

@@ -88,7 +88,8 @@ impl Leg {
 pub struct Ended {
     /// Last motion of the run.
     pub last: Leg,
-    /// `true` if the last motion finished, and the observer cancelled the run before the next motion.
+    /// `true` if the observer cancelled the run after the last motion had finished. The remaining motions were not
+    /// executed.
     pub cut: bool,
 }
 
@@ -100,7 +101,7 @@ pub trait Observer<P: Port> {
     /// Error type of the front end.
     type Failure;
 
-    /// Converts a [`StartError`] into an error of the front end. A `StartError` is the reason why a motion does not begin.
+    /// Converts a [`StartError`], the reason why a motion does not begin, into an error of the front end.
     fn refused(&mut self, error: StartError) -> Self::Failure;
 
     /// Converts an error that occurred before a motion began into an error of the front end. The error is [`Error::Cancelled`] if
@@ -134,8 +135,8 @@ pub trait Observer<P: Port> {
     /// Evaluates a status during the motion. Returns the action that the run must carry out next.
     fn status(&mut self, phase: Phase, status: &Status) -> Flow;
 
-    /// Receives the result of the action that [`Observer::status`] returned. If the controller rejects a change of speed or a Resume, the
-    /// motion continues.
+    /// Receives an action that [`Observer::status`] returned, and the result of this action. If the controller
+    /// rejects a change of speed or a Resume, the motion continues.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
     /// Reports the end of the motion. The run ignores the action that [`Observer::status`] returned for the last status.
@@ -145,17 +146,17 @@ pub trait Observer<P: Port> {
     /// If this method returns an error, the run ends with this error.
     fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
 
-    /// Reports that run `n` (from 1) has finished and that another run follows.
+    /// Reports that run `n` (from 1) has finished and that the next run follows.
     fn goes_on(&mut self, _n: u32) {}
 }
 
-/// Executes all motions of `order`. If a motion does not finish, the run ends early. `status` must be a status from an arm that the drives
-/// hold at rest. **The arm moves.**
+/// Executes all motions of `order`. `status` must come from an arm that the drives hold at rest. If a motion does not
+/// reach its end, no further motion follows. **The arm moves.**
 ///
 /// # Errors
 ///
-/// Returns a failure that occurs before a motion begins. If a motion itself fails, the run ends with `Ok`, and the failure
-/// is in [`Leg::outcome`].
+/// Returns a failure that occurs before a motion begins. If a motion itself fails, the function returns `Ok`, and the
+/// failure is in [`Leg::outcome`].
 pub fn run<P: Port, O: Observer<P>>(
     session: &mut Session<P>,
     order: &Order<'_>,
@@ -172,7 +173,8 @@ pub fn run<P: Port, O: Observer<P>>(
             if !last.is_finished() {
                 return Ok(Ended { last, cut: false });
             }
-            // The approach may have ended at a small distance from the first point, so the motion is checked again.
+            // The approach may have ended at a small distance from the first point. Therefore the motion is checked
+            // again from the measured position.
             here = positions(session, observer)?;
             let again = CheckedTrajectory::check(order.trajectory_of(n), order.arm, &here, order.options);
             checked = again.map_err(|error| observer.refused(error.into()))?;

@@ -69,8 +69,8 @@ impl JointSample {
         Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
     }
 
-    /// Returns the position error, rad. If no error was recorded, returns the commanded position of this sample minus its measured
-    /// position. Returns NaN if one of these positions is unknown.
+    /// Returns the position error, rad. If the sample contains no position error, returns the commanded minus the
+    /// measured position of this sample. Returns NaN if one of these positions is unknown.
     pub fn position_error(&self) -> f64 {
         if self.error.is_finite() { self.error } else { self.set_position - self.position }
     }
@@ -135,7 +135,8 @@ impl From<&Telemetry> for Sample {
             can_current: 0,
             joints: std::array::from_fn(|j| {
                 let own = &t.joints[j];
-                // In a state without torque, the values of a joint that is not measured are exactly zero.
+                // In a state without torque, the position and velocity of a joint that does not answer are exactly 0.
+                // Such a joint counts as not measured.
                 let torque_off = matches!(
                     t.state,
                     ControllerState::Start | ControllerState::Init | ControllerState::Error
@@ -221,13 +222,13 @@ mod tests {
         let sample = Sample::from_status(0.0, &status);
         assert!(sample.joints[2].position.is_nan() && sample.joints[2].torque.is_nan());
         assert_eq!((sample.joints[0].position, sample.joints[1].position), (0.0, 0.5));
-        // In this status, the joint answers again, but its error is still latched.
+        // The joint answers again, but its error is still latched. Its position must count as measured.
         status.joints[2].position = 0.3;
         assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
     }
 
-    /// The position error compares a measurement with the position that was commanded for the time of the measurement. If this commanded
-    /// position is unknown, the current commanded position is used.
+    /// The position error compares a measurement with the position that was commanded for the time of this
+    /// measurement. If the commanded position for that time is unknown, the present commanded position is used.
     #[test]
     fn j62_the_error_of_a_sample_is_that_of_the_time_of_the_measurement() {
         let now = JointTelemetry {

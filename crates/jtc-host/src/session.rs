@@ -1,9 +1,9 @@
-//! Session with the controller. Only the session writes to the port. The session receives the stream of statuses and
-//! a confirmation of each request.
+//! Session with the controller. Only the session writes to the port. It receives the stream of statuses, and a
+//! response record for each frame that it sends.
 //!
-//! The controller sends each response record only once (J-04). For each frame that the controller receives, exactly
-//! one status contains the response record of this frame. The response records are in the order of the frames. The
-//! session queues the response records, and passes each of them to the request that waits for it.
+//! The controller sends each response record only once (J-04), in exactly one status. The response records are in the
+//! order of the frames. The session stores the response records in a queue and passes each of them to the request to
+//! which it belongs.
 
 mod bench;
 mod capture_pose;
@@ -137,8 +137,8 @@ impl<P: Port> Session<P> {
         &self.port
     }
 
-    /// Returns the port, for calls that the session does not provide. If the caller writes bytes directly to the port, the session no
-    /// longer works correctly.
+    /// Returns the port, for calls that the session does not provide. The caller must not write bytes to the port,
+    /// because the session would then no longer work correctly.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -231,7 +231,7 @@ impl<P: Port> Session<P> {
     }
 
     /// Reads all received bytes, and discards response records and denials of earlier frames. Otherwise they could be
-    /// taken for the answer to the next frame.
+    /// mistaken for the answer to the next frame.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();
@@ -253,7 +253,7 @@ impl<P: Port> Session<P> {
                         self.extensions = Extensions::Asked(at);
                     }
                     let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
-                    // The encoded answer is as long as the received answer.
+                    // The buffer is large enough, because the encoded answer is as long as the received answer.
                     let n = answer.emit(&mut bytes).unwrap_or(0);
                     bytes.truncate(n);
                     self.answers.push_back(bytes);
@@ -322,14 +322,14 @@ impl<P: Port> Session<P> {
             let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
-                // The first response record that reports an unknown frame type may mean that the frame was damaged. A
-                // second equal response record means that the device does not know the frame type.
+                // A response record with the error "unknown frame type" may mean that the frame was damaged on the
+                // line. If the repeated frame gets an equal response record, the device does not know the frame type.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // If neither a response record nor a status has arrived, the device is late and has not lost the
-                // frame. Therefore the session repeats the frame only if it is a Stop or a Pause.
+                // If neither a response record nor a status has arrived, the device is probably only late and has not
+                // lost the frame. Therefore the session does not repeat the frame, unless it is a Stop or a Pause.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;
@@ -349,8 +349,8 @@ impl<P: Port> Session<P> {
         let mut limit = Limit::new(self.confirmation_time(len));
         loop {
             while let Some(record) = self.records.pop_front() {
-                // A response record of another frame type that reports no error belongs to an earlier request that
-                // has timed out.
+                // A response record without an error that belongs to another frame type answers an earlier request,
+                // which has timed out. It is ignored.
                 if record.status != FrameStatus::NoError || record.frame_type == kind {
                     return Ok(Some(record));
                 }
@@ -361,8 +361,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Reads bytes during the next wait of `limit`, and subtracts this wait from the limit. Returns `false` if no
-    /// time is left.
+    /// Reads bytes for the next part of the time `limit`, and subtracts this part from the limit. Returns `false` if
+    /// no time is left.
     fn wait_within(&mut self, limit: &mut Limit) -> Result<bool, LinkError> {
         let Some(wait) = limit.next_wait() else { return Ok(false) };
         let begun = self.port.now();

@@ -191,8 +191,8 @@ impl Point {
             let mut out = [0i16; JOINTS];
             for (joint, (to, v)) in Joint::ALL.into_iter().zip(out.iter_mut().zip(values)) {
                 let exact = v * 32767.0 / scale;
-                // The value is not clipped and does not wrap. A small tolerance allows for the rounding of the multiplication. NaN is
-                // outside every range.
+                // A value out of range is an error: it is neither clipped nor does it wrap. A small tolerance allows
+                // for the rounding of the multiplication. NaN is outside every range.
                 if !(-32768.0 - 1e-9..=32767.0 + 1e-9).contains(&exact) {
                     return Err(ScaleError { point: index, joint, channel, value: *v, limit: scale, unit });
                 }

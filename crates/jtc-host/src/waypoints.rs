@@ -112,7 +112,8 @@ impl Diagnose for WaypointError {
             Self::Pose { source, .. } => source.diagnosis(),
             Self::Route(e) => e.diagnosis(),
             Self::Flange { source, .. } => {
-                // Values that are not finite and quaternions of another length than 1 are not a valid pose for any arm.
+                // Values that are not finite, and quaternions whose length is not 1, are invalid for every arm. They
+                // are therefore errors in the use of the file.
                 let kind = match **source {
                     kinematics::PoseError::NotFinite { .. } | kinematics::PoseError::NotUnit { .. } => {
                         ErrorKind::Usage
@@ -170,7 +171,8 @@ impl WaypointFile {
         Ok(file)
     }
 
-    /// Checks that each `via` point is followed by the end of an arc, and that each arc is preceded by a `via` point.
+    /// Checks that each `via` point is followed by the end of an arc, and that each end of an arc follows a `via`
+    /// point.
     fn check_arcs(&self) -> Result<(), FileError> {
         let kind = |i: usize| self.waypoints.get(i).and_then(|w| w.leg);
         for (i, waypoint) in self.waypoints.iter().enumerate() {
@@ -200,8 +202,8 @@ impl WaypointFile {
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Returns the index of each flange pose whose previous waypoint is also a flange pose. Includes only legs
-    /// (segments between two waypoints) in joint space.
+    /// Returns the index of each flange pose that follows directly after another flange pose. Includes only flange
+    /// poses that are reached in joint space.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
@@ -319,7 +321,7 @@ impl WaypointFile {
                 .at(*position)
                 .and_then(|pose| kinematics.solve(&pose, before))
                 .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
-            // This branch is never reached, because `kinematics` is `Some` if a waypoint is a flange pose.
+            // This branch is never reached: if a waypoint is a flange pose, `kinematics` is `Some`.
             (Target::Flange(..), None) => Ok(*before),
         }
     }

@@ -1,5 +1,5 @@
-//! The test changes one number of an arm file at a time. A change removes the number, duplicates the number, or reverses its sign. The
-//! reader must detect each change.
+//! The tests change one number of an arm file at a time: they remove the number, duplicate it, or reverse its sign.
+//! The reader must detect each change.
 use std::ops::Range;
 
 use jtc_host::arm::{Arm, Source};
@@ -75,8 +75,8 @@ fn a_number_that_is_left_out_is_missed() {
                 let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, expected ");
                 assert!(named, "{} {text}: {e}", number.key);
             }
-            // A default value for a missing number must be listed as a default or cause a warning. If a rotor inertia is missing, the arm
-            // records that it is missing.
+            // If the reader replaces a missing number by a default, it must list the default or warn. A missing rotor
+            // inertia must be recorded as not given.
             Ok(arm) => {
                 let default = arm.values().iter().any(|v| v.name == number.key && v.from == Source::Default);
                 let listed = default || arm.warnings.iter().any(|w| w.problem.contains(number.key));
@@ -101,16 +101,16 @@ fn a_number_that_is_given_twice_is_refused() {
     }
 }
 
-/// The reader either rejects a number with the opposite sign or accepts it. If the reader accepts the number, no other value of the arm
-/// changes.
+/// The reader either rejects a number with the opposite sign or accepts it. If it accepts the number, all other
+/// values of the arm stay the same.
 #[test]
 fn a_number_of_the_other_sign_is_refused_or_is_what_differs() {
     let avena = Arm::parse(AVENA).unwrap();
     for number in numbers() {
         let text = &AVENA[number.at.clone()];
         let value: f64 = text.parse().unwrap();
-        // The arm uses polynomials instead of the friction tables. Therefore the reader only checks that the values of both table axes
-        // increase.
+        // The arm uses polynomials, so its friction tables are not used. Their axes are only checked for increasing
+        // values.
         let unused = ["temperature_c", "velocity_rad_s"].contains(&number.key);
         match Arm::parse(&with(number.at.clone(), &(-value).to_string())) {
             Ok(arm) if value != 0.0 && !unused => {

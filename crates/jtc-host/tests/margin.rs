@@ -81,15 +81,15 @@ fn friction_at(friction: Option<&Friction>, config: &Config, j: usize, v: f64, c
 /// Bearing temperatures of a plan and of a run, °C.
 const TEMPERATURES: [f64; 2] = [20.0, 30.0];
 
-/// Checks a plan that must leave the share `margin` of each torque limit unused. Returns all torque problems as text, and the smallest
-/// unused share of a limit.
+/// Checks a plan that must leave the share `margin` of each torque limit unused. Returns a text with all torque
+/// problems, and the smallest share of a limit that is unused.
 fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String, f64) {
     let (friction, mut wrong, mut left) = (arm.friction(), String::new(), f64::INFINITY);
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let end = (planned.trajectory.duration_s() * 1e3).round() as u32;
-    // The breakaway friction is the greatest friction at speeds from 0 to `fastest`. `fastest` is slightly above the
-    // speed range in which the friction changes its sign (`friction_sign_width`).
+    // Breakaway friction: the greatest friction at speeds up to `fastest`. Up to the speed `friction_sign_width`, the
+    // friction changes its sign gradually, and `fastest` is slightly above this speed.
     let breakaway: [f64; JOINTS] = std::array::from_fn(|j| {
         let fastest = config.friction_sign_width + config.joints[j].velocity_max / 128.0;
         let speeds = (-20..=20).map(|i| f64::from(i) / 20.0 * fastest);
@@ -190,8 +190,8 @@ fn stretched(share: f64) -> (Arm, Config) {
 
 const OUT: [f64; JOINTS] = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
 
-/// A pose that needs more torque than the margin permits can be the start or the end of a motion. The plan keeps the margin wherever the
-/// pose permits it. If the margin is below 10 %, the plan contains a warning.
+/// A pose that needs more torque than the margin permits can be the start or the end of a motion. At all other
+/// positions the plan keeps the margin. If the margin of the motion is below 10 %, the plan contains a warning.
 #[test]
 fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     for share in [0.6, 0.7, 0.8, 0.86, 0.9, 0.94] {

@@ -68,8 +68,8 @@ fn status(response: Response) -> [u8; jtc_wire::STATUS_LEN] {
     Status { response, ..Status::default() }.emit()
 }
 
-/// J-03: a Stop is sent between two frames. If a long frame is only partly written, the port drops the remaining part
-/// of the frame.
+/// J-03: the Stop of another program is never written inside a frame. If a long frame is only partly written, the
+/// port drops the rest of this frame before it writes the Stop.
 #[test]
 fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     let (mut far, path) = pair();
@@ -83,18 +83,19 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!((&got[..300], &got[300..]), (&segment[..300], &fixed::STOP[..]));
     let error = port.write_all(&segment[300..]).expect_err("it was given up");
     assert!(error.to_string().contains("a test stopped the arm after this motion was requested"), "{error}");
-    // The port blocks frames that move the arm, and still sends other frames.
+    // The port blocks uploads and frames that move or release the arm. It still sends other frames.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
-    // A Pause after the Stop would only pause the motion instead of stopping it.
+    // A Pause after the Stop could replace the Stop, and the motion could then be resumed. Therefore the port blocks
+    // the Pause.
     assert!(port.write_all(&fixed::PAUSE).is_err());
     port.write_all(&fixed::STOP).unwrap();
     port.write_all(&fixed::GET_INFO).unwrap();
     let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
     assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
-    // The port owner does not read. The port still finds the response record, and the port owner receives its bytes
-    // later.
+    // The port owner does not read. The door's thread still finds the response record of the Stop, and the received
+    // bytes are kept for the port owner.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
@@ -139,8 +140,8 @@ fn halt_unconfirmed(path: &str, halt: Halt) {
     std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
 }
 
-/// The client requested a motion before the Stop, and the request then waits, for example in a queue. The port rejects this request,
-/// because it is older than the Stop.
+/// A motion was requested before the Stop, but its frames come much later, for example because the request was in a
+/// queue. The port rejects these frames.
 #[test]
 fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
     let (_far, path) = pair();
@@ -179,8 +180,8 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     };
     halt_unconfirmed(&path, Halt::Pause);
     read(&mut far, &[fixed::PAUSE; 8]);
-    // After another program's Pause, the port owner may also send a Pause. A later Stop of another program replaces
-    // its Pause.
+    // After another program's Pause, the port owner may still send a Pause. After another program's Stop, every Pause
+    // is rejected.
     port.write_all(&fixed::PAUSE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     read(&mut far, &[fixed::PAUSE; 1]);
@@ -218,7 +219,8 @@ fn controller(
         let mut buffer = [0; 256];
         while !end.load(Ordering::SeqCst) {
             let n = far.read(&mut buffer).unwrap_or(0);
-            // Statuses are lost if the host does not read from the line for some time.
+            // The result is ignored, because statuses can be lost if the host does not read from the line for some
+            // time.
             let _ = far.write_all(&next(&buffer[..n]).emit());
         }
     });
@@ -229,8 +231,8 @@ fn is_in(bytes: &[u8], frame: &[u8]) -> bool {
     bytes.windows(frame.len()).any(|window| window == frame)
 }
 
-/// The port repeats the command that ends teaching until the statuses show the end of teaching. Until the statuses show the end of
-/// teaching, the arm is not considered at rest.
+/// The port repeats the command that ends teaching until the statuses show that teaching has ended. Until then, the
+/// arm does not count as at rest.
 #[test]
 fn the_end_of_teaching_is_written_until_statuses_show_it() {
     for heard in [1, 2, 5, u32::MAX] {
@@ -260,8 +262,8 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching was requested but has not begun, and would begin as soon as the arm is at rest. The port considers this
-/// teaching ended when the response record of the command that ends teaching has arrived.
+/// Teaching was requested but has not begun, so the statuses cannot show its end. The port considers it ended when
+/// the response record of the command that ends teaching has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {
@@ -315,8 +317,8 @@ fn a_pause_that_came_after_the_stop_is_stopped() {
     }
 }
 
-/// Two programs of the superuser may have one port open at the same time. The later program does not replace the socket of the earlier
-/// program, and removes only its own socket.
+/// Two programs of the superuser may have one port open at the same time. The later program does not replace the
+/// socket of the earlier program. Each program removes only a socket that it has created.
 #[test]
 fn a_socket_of_a_living_program_is_left_alone() {
     let (_far, path) = pair();
@@ -336,7 +338,8 @@ fn a_socket_of_a_living_program_is_left_alone() {
     std::fs::remove_file(&socket).unwrap();
 }
 
-/// A request whose bytes arrive slowly has one deadline for the whole request. Therefore the request cannot prevent the port from closing.
+/// The deadline applies to the whole request, even if its bytes arrive slowly. Therefore a slow request cannot
+/// prevent the port from closing.
 #[test]
 fn a_request_that_comes_byte_by_byte_is_given_up() {
     let (_far, path) = pair();

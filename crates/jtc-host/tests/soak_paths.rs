@@ -1,5 +1,5 @@
-//! Test that the paths of the simulator's soak run pass the check of the host. The check includes stops of the arm at any point of the
-//! path.
+//! Test that the paths of the simulator's endurance run pass the check of the host. The check includes the ability to
+//! stop at any point of the path.
 use jtc_host::check::Checker;
 use jtc_host::{Arm, Point, Trajectory};
 use proptest::prelude::*;

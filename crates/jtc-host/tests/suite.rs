@@ -1,5 +1,5 @@
-//! All tests of the crate are in one program, because one program reduces the time for linking. Each file in this folder is a module of
-//! this program.
+//! All tests of the crate are in one program, because linking one program takes less time than linking many. Each
+//! file in this folder is a module of this program.
 mod arm_numbers;
 mod codes_page;
 mod fuzz_regressions;

@@ -1,5 +1,5 @@
-//! Check of an arm. The check lists all values that are physically impossible, missing, or out of the range of the controller. The check
-//! also lists the joints that the drives cannot hold.
+//! Check of an arm. The check lists all values that are physically impossible, missing, or outside the range that the
+//! controller accepts. The check also lists the joints whose drives cannot hold the weight of the arm.
 
 mod borne;
 mod limits;
@@ -94,7 +94,7 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// Returns `true` if a finding is a problem, so a controller would refuse this arm.
+    /// Returns `true` if at least one finding is a problem. A controller would then refuse this arm.
     pub fn is_refused(&self) -> bool {
         self.findings.iter().any(|f| f.finding.severity == Severity::Problem)
     }
@@ -143,8 +143,8 @@ impl Arm {
     }
 
     fn find_model(&self, findings: &mut Vec<ArmFinding>) {
-        // The check of a model ends at the first fault. Therefore each joint and each link is checked in a model that is valid except for
-        // this joint or link.
+        // The check of a model ends at the first fault. To find the faults of all joints and links, each of them is
+        // checked alone, in a model in which everything else is valid.
         let good = Arm::avena().model;
         for index in 0..=JOINTS {
             let mut joint = ArmModel { links: good.links, ..good };
@@ -174,7 +174,8 @@ impl Arm {
             ModelError::NotFinite { value, .. } => ("a typing error", value, None),
             _ => ("a typing error", f64::NAN, None),
         };
-        // The text of the error begins with the number of the joint or link. The finding contains the name of the joint or link instead.
+        // The error text begins with the number of the joint or link. The finding replaces this number with the name
+        // of the joint or link.
         let text = error.to_string();
         let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
         let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
@@ -242,8 +243,8 @@ impl Arm {
         }
     }
 
-    /// Finds gains, friction and masses that are out of bounds. Skips the joints in `faulty`, because the limits of these joints are
-    /// invalid and the friction cannot be compared with them.
+    /// Finds gains, friction and masses that are out of bounds. Skips the joints in `faulty`: their limits are
+    /// invalid, so their friction cannot be compared with the limits.
     fn find_bounds(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let (set, bounds) = (self.parameter_set(), self.config().parameter_bounds);
         let beyond = |joint: Option<Joint>, name, e: OutOfBounds| {

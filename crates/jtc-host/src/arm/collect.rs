@@ -10,7 +10,7 @@ use super::csv::{self, Table};
 use super::{Arm, Change, ParameterSet, Warning, is_xml};
 use crate::file::{FileError, read_text};
 
-/// Friction compensation that is used if a file has a friction table and a friction polynomial.
+/// Choice between the friction table and the friction polynomial, for files that contain both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionChoice {
     /// The friction polynomial is used.
@@ -40,7 +40,8 @@ pub struct ParameterFile {
 }
 
 impl ParameterFile {
-    /// Reads an arm file (TOML, URDF), a CSV file with parameters, or all such files of a directory.
+    /// Reads parameters from an arm file (TOML, URDF) or a CSV file. If `path` is a directory, reads all such files
+    /// in it.
     ///
     /// # Errors
     ///
@@ -74,8 +75,8 @@ impl ParameterFile {
         Ok(all)
     }
 
-    /// Parses the text of one parameter table. The table of a single joint is copied to all six joints, because the check requires a table
-    /// of each joint.
+    /// Parses the text of one parameter table. A table for a single joint is copied to all six joints, because the
+    /// check requires a table for each joint.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn parse_table(text: &str) -> Result<Self, FileError> {
         let mut all = Self::default();
@@ -217,7 +218,7 @@ fn is_arm(text: &str) -> bool {
     is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// Tables of single joints, collected until each of the six joints has a table.
+/// Tables of single joints. They are collected until each of the six joints has a table.
 #[derive(Default)]
 struct JointTables {
     friction: PerJoint<TableOf<f32>>,
@@ -230,10 +231,10 @@ impl JointTables {
     }
 }
 
-/// Tables of all six joints, and the files of these tables.
+/// Tables of all six joints, with the files from which they were read.
 type Complete<T> = ([T; JOINTS], Vec<PathBuf>);
 
-/// Tables of one parameter, with the file of each joint.
+/// Tables of one parameter for single joints, each with the file from which it was read.
 struct PerJoint<T> {
     found: [Option<(PathBuf, T)>; JOINTS],
 }
@@ -264,8 +265,8 @@ impl<T> PerJoint<T> {
         Ok(())
     }
 
-    /// Returns the tables of all six joints, or `None` if no file contains a table of this parameter. If only some joints have a table,
-    /// returns an error that lists the missing files.
+    /// Returns the tables of all six joints, or `None` if no joint has a table of this parameter. If only some joints
+    /// have a table, returns an error that lists the missing files.
     fn complete(self) -> Result<Option<Complete<T>>, FileError> {
         let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
         let first = first.clone();

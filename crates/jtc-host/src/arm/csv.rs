@@ -138,7 +138,8 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
     let reversed = |c: &Vec<f64>| c.iter().rev().copied().collect::<Vec<f64>>();
     let wrong: Vec<usize> = (0..all.len()).filter(|i| !plausible(&all[*i].1)).collect();
     let turned = wrong.iter().filter(|i| plausible(&reversed(&all[**i].1))).count();
-    // If most rows are plausible only when read from right to left, the columns of the file are in the wrong order.
+    // Most rows are plausible only if their numbers are read from right to left. Then the columns of the file are in
+    // the wrong order.
     if turned * 2 > all.len() {
         let (line, row) = (all[wrong[0]].0, &all[wrong[0]].1);
         let problem = format!(

@@ -42,7 +42,8 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// Part of a message: the settings that are not sent together with the friction, the gains and the arm model.
+/// Text for messages: names of the settings that the host does not send together with the friction, the gains and the
+/// arm model.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
@@ -97,9 +98,9 @@ impl Arm {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the settings for the check of a motion on a controller that uses the settings `device`. Each limit in the result is the
-    /// stricter of the limits of the arm and the controller. The gravity, payload and rotor inertias in the result are the values of the
-    /// controller.
+    /// Returns the settings for the check of a motion on a controller with the settings `device`. Each limit is the
+    /// stricter of two limits: the limit of the arm and the limit of the controller. Gravity, payload and rotor
+    /// inertias are those of the controller.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;
@@ -160,8 +161,8 @@ mod tests {
         assert!(arm.device_differences(&on_a_wall).is_empty());
     }
 
-    /// A URDF file cannot contain a rotor inertia. The rotor inertia of a URDF arm is unknown and not 0, so it is not reported as a
-    /// difference.
+    /// A URDF file cannot contain a rotor inertia. For a URDF arm it is unknown, and not 0, so no difference from the
+    /// controller is reported.
     #[test]
     fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
         let urdf = Arm::parse(&Arm::avena().to_urdf()).unwrap();
@@ -169,13 +170,13 @@ mod tests {
             urdf.device_differences(&Config::avena()).iter().map(|d| d.name.clone()).collect();
         assert!(!names.contains(&"rotor_inertia_kg_m2".to_owned()), "{names:?}");
         assert_eq!(urdf.settings_not_given(), ["gravity", "rotor inertia"]);
-        // The check of a motion always uses the rotor inertias of the controller.
+        // For the check of a motion, the rotor inertias are always those of the controller.
         assert_eq!(
             urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
             Config::avena().joints[3].rotor_inertia
         );
-        // An arm file that is written from the URDF arm contains no rotor inertia either. In contrast, a rotor
-        // inertia of 0 in an arm file is a known value.
+        // An arm file that is written from the URDF arm contains no rotor inertia. If an arm file contains a rotor
+        // inertia of 0, the 0 is a known value.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);

@@ -24,10 +24,10 @@ const WINDOW: f64 = 5.0;
 const STEPS: i32 = 400;
 /// Lowest frequency of the frequency search, rad per tick.
 const SLOWEST: f64 = 1e-6;
-/// Possible ratios of a real rotor inertia to the proposed rotor inertia. The gains must be stable for this range until the rotor inertia
-/// is measured. Rotor inertias within one family of drives differ by such ratios.
+/// Range of the ratio of the real rotor inertia to the proposed rotor inertia. Rotor inertias within one family of
+/// drives differ by such ratios. Until the rotor inertia is measured, the gains must be stable for the whole range.
 pub(super) const PROPOSED_RANGE: RotorMargin = RotorMargin { down: 0.2, up: 3.0 };
-/// Smallest and largest factor of the rotor inertia in the search for the stable range.
+/// Smallest and largest factor that the search for the stable range applies to the rotor inertias.
 const FACTORS: (f64, f64) = (0.0, 1000.0);
 
 type Matrix = [[f64; JOINTS]; JOINTS];
@@ -127,8 +127,8 @@ fn is_positive(mut a: Matrix) -> bool {
     true
 }
 
-/// Returns `true` if the inertia of the arm with the given rotors is large enough in this pose: the mass matrix minus
-/// `reserve` times the lower limits in `stable` is positive definite.
+/// Returns `true` if the arm with the given rotors has enough inertia in this pose to be stable. Condition: the mass
+/// matrix minus `reserve` times the lower limits in `stable` is positive definite.
 pub(super) fn is_heavy_enough(
     m: &Matrix,
     rotor: &JointVec,
@@ -140,8 +140,9 @@ pub(super) fn is_heavy_enough(
     is_positive(a)
 }
 
-/// Returns `true` if the inertia of the arm with the given rotors is small enough in this pose: the upper limits in
-/// `stable` divided by `reserve`, minus the mass matrix, are positive definite.
+/// Returns `true` if the inertia of the arm with the given rotors is low enough in this pose for the arm to be
+/// stable. Condition: the upper limits in `stable` divided by `reserve`, minus the mass matrix, are positive
+/// definite.
 pub(super) fn is_light_enough(
     m: &Matrix,
     rotor: &JointVec,
@@ -153,8 +154,8 @@ pub(super) fn is_light_enough(
     is_positive(a)
 }
 
-/// Returns the smallest and largest factor for the rotor inertias of the joints `of`. Returns `None` if the arm is not stable with the
-/// rotor inertias `rotor`.
+/// Returns the smallest and largest factor by which the rotor inertias of the joints `of` can change while the arm
+/// stays stable. Returns `None` if the arm is not stable with the rotor inertias `rotor`.
 pub(super) fn rotor_margin(
     matrices: &[Matrix],
     rotor: &JointVec,
@@ -175,7 +176,8 @@ pub(super) fn rotor_margin(
     Some(margin)
 }
 
-/// Searches between 1 and `far` for the factor nearest to `far` for which `holds` returns `true`. `holds(1)` must be `true`.
+/// Searches for the limit of a range: the factor between 1 and `far` that is nearest to `far` and for which `holds`
+/// returns `true`. `holds(1)` must be `true`.
 fn end(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(far) {
         return far;

@@ -3,7 +3,8 @@
 use super::*;
 use crate::arm::Arm;
 
-/// Returns the magnitude of a joint's position error (rad) in the last third of `ticks`, divided by the magnitude in the second third.
+/// Simulates the control loop of a joint for `ticks` ticks. Returns the largest position error in the last third,
+/// divided by the largest error in the second third. A result above 1 means that the error grows.
 fn growth(gains: &PidGains, delay: u8, inertia: f64, ticks: usize) -> f64 {
     let mut torques = vec![0.0; usize::from(delay) + 1];
     let mut errors = [0.0; 6];
@@ -49,7 +50,8 @@ fn j41_j71_a_joint_is_stable_between_two_inertias_and_nowhere_else() {
             assert_eq!(most, f64::INFINITY);
             continue;
         }
-        // Near the upper stability limit the oscillation grows slowly, so the test simulates some hundred oscillations.
+        // Near the upper stability limit, the oscillation grows or decays slowly, so the test simulates some hundred
+        // oscillations.
         let slow = |inertia: f64| {
             let swing = std::f64::consts::TAU * (inertia / gains.kp).sqrt() / DT;
             growth(&gains, delay, inertia, ((300.0 * swing) as usize).clamp(6_000, 20_000_000))
@@ -78,7 +80,7 @@ fn j41_gains_that_hold_no_inertia_are_known() {
     }
 }
 
-/// The mass matrix in this test is zero, so only the rotor inertia determines the margin.
+/// With a mass matrix of zero, only the rotor inertia determines the margin of the rotor.
 #[test]
 fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     let arm = Arm::avena();
@@ -98,8 +100,8 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     assert_eq!(rotor_margin(&[both], &[0.01; JOINTS], &stable, [true; JOINTS]), None);
 }
 
-/// For every delay, the inertia that a controller requires is 1.1 to 1.7 times the stability limit of the control loop. Exception: if the
-/// delay is below two ticks and Kp is high, the required inertia may be as low as 0.85 times the stability limit.
+/// For every delay, the minimum inertia that a controller requires is 1.1 to 1.7 times the lowest stable inertia of
+/// the control loop. Exception: if the delay is below two ticks and Kp is high, the factor may be as low as 0.85.
 #[test]
 fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     for delay in 0..=7u8 {

@@ -128,8 +128,8 @@ impl Arm {
         compare: &mut impl FnMut(String, Option<Joint>, f64, f64, &'static str),
     ) {
         let has = device.friction();
-        // An arm file may contain both a friction table and a friction polynomial. The comparison uses the kind that
-        // the controller uses.
+        // An arm file may contain both a friction table and a friction polynomial. The one that the controller uses
+        // is compared.
         let own = match has {
             Some(Friction::Table(_)) => self.table.as_ref().map(|t| Friction::Table(**t)).or(self.friction()),
             _ => self.friction(),
@@ -148,7 +148,7 @@ impl Arm {
                         let torque = t.torque.into_iter().flatten();
                         t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
                     };
-                    // Two friction tables can differ in up to 440 numbers. The list contains only the first
+                    // Two friction tables can differ in up to 440 numbers, so the list contains only the first
                     // difference and the number of differences.
                     let pairs = numbers(own).into_iter().zip(numbers(has));
                     if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
@@ -158,7 +158,7 @@ impl Arm {
                     }
                 }
             }
-            // The file has a friction polynomial and the controller has a friction table, or the reverse.
+            // One of the two has a friction polynomial, and the other has a friction table.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");
@@ -221,7 +221,7 @@ fn tables(floats: &Floats<'_>) -> [TableOf<f32>; JOINTS] {
     })
 }
 
-/// Returns each number of two arm models: the name of the number and its two values.
+/// Returns each number of two arm models, as the name of the number, its value in `own` and its value in `has`.
 fn model_numbers(own: &ArmModel, has: &ArmModel) -> Vec<(String, f64, f64)> {
     let (own, has) = (model_rows(own), model_rows(has));
     let mut all = Vec::new();
@@ -262,7 +262,8 @@ mod tests {
         assert_eq!(Arm { pid: None, ..arm }.image(), Ok(None));
     }
 
-    /// Controller settings that do not have a key in the joint tables are written to the `[settings]` table of the arm file.
+    /// Controller settings without a key of their own are written to the `[settings]` table of the arm file and read
+    /// from it again.
     #[test]
     fn j53_settings_of_the_controller_travel_with_the_file() {
         let text =

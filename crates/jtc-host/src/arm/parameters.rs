@@ -47,7 +47,7 @@ pub enum ParameterError {
         joint: Joint,
         /// Name of the axis: "velocity" or "temperature".
         axis: &'static str,
-        /// Position on the axis, counted from 1, of the value that is not larger than the value before it.
+        /// Position on the axis, counted from 1. The value at this position is not larger than the previous value.
         place: usize,
         /// Value before position `place`.
         before: f32,
@@ -95,7 +95,8 @@ impl ParameterSet {
         self.friction.is_none() && self.pid.is_none() && self.model.is_none()
     }
 
-    /// Returns the names of the missing parameters. A controller needs all parameters before it enables an arm.
+    /// Returns the names of the missing parameters. A controller enables an arm only after it has received all
+    /// parameters.
     pub fn missing(&self) -> Vec<&'static str> {
         let parts = [
             (self.friction.is_none(), "friction"),
@@ -105,8 +106,8 @@ impl ParameterSet {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the first parameter that is out of the bounds of a controller with these settings (J-06). The error message uses this
-    /// parameter after a controller has refused the parameters.
+    /// Returns the first parameter that is out of the bounds of a controller with these settings (J-06). After a
+    /// controller has refused the parameters, this parameter is named in the error message.
     pub fn beyond(&self, config: &Config) -> Option<Beyond> {
         let bounds = &config.parameter_bounds;
         let joints = Joint::ALL.into_iter().zip(&config.joints);

@@ -64,7 +64,8 @@ impl Arm {
         }
     }
 
-    /// Returns the first joint that is outside its position range, with the lower and upper limit of this range (rad).
+    /// Returns the first joint whose value in `position` is outside its position range, with the lower and upper
+    /// limit of this range (rad).
     pub(crate) fn outside(&self, position: &[f64; JOINTS]) -> Option<(Joint, f64, f64)> {
         let config = self.config();
         Joint::ALL.into_iter().find_map(|joint| {
@@ -74,8 +75,8 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a valid name of a pose. A valid name is never a number. Therefore it can be used in a cell of a
-/// waypoint file, and in an option that also accepts lists of numbers.
+/// Returns `true` for a valid name of a pose. A valid name is never a number, so it cannot be mistaken for a position
+/// in a waypoint file or in an option.
 pub fn is_pose_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
@@ -152,8 +153,8 @@ pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     })
 }
 
-/// Applies one change to the `[poses]` table of a file and to the arm read from that file. After the change, the `[poses]` table and the
-/// arm must contain the same poses.
+/// Applies one change to the `[poses]` table of a file and to the arm that was read from this file. Afterwards the
+/// table and the arm must contain the same poses.
 fn edit(
     path: &Path,
     change: impl FnOnce(&mut dyn toml_edit::TableLike, &mut Arm) -> Result<(), PoseError>,
@@ -199,7 +200,7 @@ fn as_it_was(changed: &str, before: &str) -> String {
         _ => (*line).to_owned(),
     };
     let mark = before.starts_with(MARK).then(|| MARK.to_string());
-    // The last line of the old text may have no line ending.
+    // If the last old line has no line ending, the new line is used, because it may have one.
     let kept = |(new, old): (&&str, &&str)| if old.ends_with('\n') { (*old).to_owned() } else { fresh(new) };
     let (first, last) = (lines.iter().zip(&old).take(head).map(kept), old.len() - tail);
     let between = lines[head..lines.len() - tail].iter().map(fresh);
@@ -226,8 +227,8 @@ mod tests {
         (dir, path)
     }
 
-    /// The first saved pose creates the `[poses]` table. Each later change affects one line of the file. After all poses are removed, the
-    /// arm is the same as before.
+    /// The first saved pose adds the `[poses]` table at the end of the file, and each later pose changes one line.
+    /// After all poses are removed, the arm is the same as before.
     #[test]
     fn the_rest_of_the_file_stays_as_it_is() {
         let (_dir, path) = file(AVENA_TOML);
@@ -333,7 +334,7 @@ mod tests {
             let error = Arm::parse(&format!("{AVENA_TOML}\n[poses]\n{line}\n")).unwrap_err().to_string();
             assert!(error.contains(problem), "{line}: {error}");
         }
-        // The check reports a pose outside the limits, and this pose cannot be used.
+        // If a pose is outside the limits, the check reports it, and the pose cannot be used.
         let arm = Arm::parse(&format!("{AVENA_TOML}\n[poses]\nfar = [0, 2, 0, 0, 0, 0]\n")).unwrap();
         assert_eq!(
             arm.pose("far").unwrap_err().to_string(),

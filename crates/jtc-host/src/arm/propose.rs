@@ -1,7 +1,8 @@
-//! Starting values for the numbers that are missing in a robot description. A documented rule computes each starting value.
+//! Starting values for the numbers that are missing in a robot description. A documented rule computes each starting
+//! value.
 //!
-//! With starting values an arm can be simulated, and can be commissioned at low speed. The starting values are not measured. An arm file
-//! marks the starting values, and `jtc arm check` lists them until the operator has replaced them.
+//! The starting values are not measured. They are sufficient to simulate the arm, and to commission it at low speed.
+//! An arm file marks the starting values, and `jtc arm check` lists them until the operator has replaced them.
 
 use jtc_core::settings::TOOL_SPEED;
 use jtc_core::{JOINTS, PidGains};
@@ -65,39 +66,43 @@ pub const RULES: [Rule; 11] = [
     },
 ];
 
-/// Highest rate at which the damping in Teaching reduces a speed, 1/s (J-25).
+/// Upper limit of the proposed damping in Teaching, divided by the least inertia of the joint, 1/s (J-25). The
+/// damping reduces a speed at this rate.
 const TEACH_DAMPING_RATE: f64 = 100.0;
-/// Tool speed limit of an imported arm, m/s. ISO 10218 requires this limit while a person near the robot sets it up.
+/// Tool speed limit of an imported arm, m/s. ISO 10218 requires this limit while a person near the robot sets up the
+/// robot.
 const TOOL_SPEED_MAX: f64 = 0.25;
 /// Damping of the proposed gains, without a unit: Kd multiplied by the sum of the controller's delay and
 /// [`DERIVATIVE_AGE`], divided by the least inertia (J-71).
 const DAMPING: f64 = 0.7;
-/// Age of the derivative, s: half of the time window of the derivative, plus half a tick. A torque stays constant for one tick, so its
-/// average delay is half a tick.
+/// Age of the derivative, s: half of the time window of the derivative, plus half a tick. The half tick is the
+/// average delay of a torque that stays constant for one tick.
 const DERIVATIVE_AGE: f64 = 3e-3;
 /// Kp divided by Kd, 1/s.
 const STIFFNESS_RATE: f64 = 20.0;
 /// Ki divided by Kp, 1/s.
 const INTEGRAL_RATE: f64 = 2.0;
-/// Proposed Ki as a share of the greatest Ki that is stable without friction.
+/// Share of the greatest Ki that is stable without friction. The proposed Ki is at most this share.
 const INTEGRAL_PART: f64 = 1.0 / 3.0;
 /// Safety factor for the proposed gains: the gains must also be stable if the range of rotor inertias is extended by
 /// this factor at both ends.
 const RESERVE: f64 = 1.5;
 /// Maximum number of steps in the search for gains with the safety factor [`RESERVE`].
 const REDUCTIONS: usize = 60;
-/// Acceleration limit (rad/s²) for which a proposed torque limit is sufficient.
+/// Acceleration (rad/s²) that a joint must reach with its proposed torque limit.
 const ENOUGH_ACCELERATION: f64 = 3.0;
 /// Share of the available torque that the proposed acceleration uses. The available torque is the torque limit minus the gravity torque.
 const ACCELERATION_PART: f64 = 1.0 / 3.0;
-/// Maximum tracking error with the heaviest assumed rotor, as a share of the position error limit.
+/// Maximum tracking error if the real rotor has the largest assumed inertia, as a share of the position error limit.
 const ERROR_PART: f64 = 0.2;
-/// Acceleration of a drive without a load at full torque, rad/s². The proposed rotor inertia is computed from this acceleration.
+/// Acceleration of a drive at full torque without an arm, rad/s². The proposed rotor inertia is computed from this
+/// value.
 const ROTOR_ACCELERATION: f64 = 200.0;
-/// Smallest proposed acceleration limit, rad/s², which is also used if gravity requires the whole torque limit.
+/// Smallest proposed acceleration limit, rad/s². It also applies if the gravity torque needs the whole torque limit.
 const LEAST_ACCELERATION: f64 = 0.5;
 
-/// Rounds `value` down to `digits` significant digits. More digits would look like a measured value, and rounding up could exceed a limit.
+/// Rounds `value` down to `digits` significant digits. Rounding up could exceed a limit, and more digits would look
+/// like a measured value.
 fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -148,8 +153,9 @@ impl Arm {
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
                 let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];
-                // The arm model contains only the proposed rotor inertia. If the real rotor is heavier, the model
-                // torque is too low, and the controller supplies the missing torque only through a position error.
+                // If the real rotor is heavier than the proposed rotor, the model torque is too low. The controller
+                // supplies the missing torque only through a position error, so the acceleration is limited until
+                // this error is small enough.
                 let unknown = (PROPOSED_RANGE.up - 1.0) * to.rotor_inertia;
                 let kp = self.pid.map_or(f64::INFINITY, |pid| pid[j].kp);
                 let lag = ERROR_PART * to.position_error_max * kp / unknown;

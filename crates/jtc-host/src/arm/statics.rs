@@ -1,5 +1,5 @@
-//! Load on the drives of an arm at rest: the greatest gravity torque over all positions, and the inertia that each joint
-//! moves.
+//! Gravity torques and inertias of an arm at rest: the greatest gravity torque of each joint over all positions, and
+//! the inertia that each joint moves.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -158,7 +158,8 @@ mod tests {
         arm.joints.map(|j| (j.position_min, j.position_max))
     }
 
-    /// Compares the greatest torque with the torques on a grid of all positions that affect the torque.
+    /// The computed greatest gravity torque is compared with the torques on a grid of all positions that affect the
+    /// torque. No torque on the grid may be greater.
     #[test]
     fn the_greatest_gravity_torque_is_no_less_than_any_on_a_grid() {
         let arm = Arm::avena();

@@ -38,7 +38,8 @@ fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     // Older arm files do not have a `format` key. The reader reads these files in the same way.
     assert_eq!(Arm::parse(&AVENA_TOML.replace("\nformat = 2\n", "\n")).unwrap(), whole);
     for other in ["3", "1", "\"two\""] {
-        // The reader reports the error about the format before errors about unknown keys.
+        // If the format number is not supported, the reader reports only this error, and not the unknown key
+        // `new_key`.
         let text = AVENA_TOML.replace("\nformat = 2\n", &format!("\nformat = {other}\nnew_key = 1\n"));
         let message = Arm::parse(&text).unwrap_err().to_string();
         assert!(message.contains(&format!("format = {other} is not supported")), "{message}");
@@ -88,8 +89,8 @@ fn a_plain_urdf_is_carried_over_exactly() {
     assert!(arm.warnings.is_empty(), "{:?}", arm.warnings);
 }
 
-/// If all axes are −z, each joint turns in the opposite direction. The torques must equal the torques of the mirrored motion with opposite
-/// sign.
+/// If all joint axes are −z instead of z, each joint turns in the opposite direction. For the mirrored motion, the
+/// torques must have the same magnitude and the opposite sign.
 #[test]
 fn joints_about_minus_z_keep_positions_and_torques() {
     let (plain, turned) = (Arm::avena(), Arm::parse(&urdf("0 0 -1", "revolute")).unwrap());
@@ -105,8 +106,8 @@ fn joints_about_minus_z_keep_positions_and_torques() {
     }
 }
 
-/// A tool on the last link and a plate between two joints become parts of links. The imported arm equals an arm whose links have the
-/// combined masses.
+/// A tool on the last link and a plate between two joints are merged into the links that carry them. The imported arm
+/// equals an arm whose links have the combined masses.
 #[test]
 fn fixed_bodies_become_part_of_their_link() {
     let tool = "<link name=\"tool\"><inertial><origin xyz=\"0 0 0.1\"/><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" \
@@ -129,12 +130,12 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
     assert!(error_of(&urdf("0 0 0", "revolute")).contains("no direction"));
     assert!(error_of("<robot name=\"x\"></robot>").contains("0 rotary joints"));
-    // If the description has too few joints, another file format or option does not help. Therefore the hint must not
-    // suggest one.
+    // If the description has too few joints, another file format or another option would not help. Therefore the hint
+    // must suggest neither.
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
-    // A `>` in the value of an attribute does not end the tag.
+    // A `>` inside an attribute value does not end the tag, so these tags also count as nested.
     assert!(error_of(&"<a x='/>'>".repeat(60_000)).contains("nested"));
     assert!(error_of(&"<a x=\"'/>\">".repeat(60_000)).contains("nested"));
     assert!(
@@ -212,7 +213,8 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     assert_eq!((arm.joint_names[5].as_str(), arm.model.joints[6]), ("j6", Arm::avena().model.joints[6]));
     let arm = import(&branch, None, Some("l6")).unwrap();
     assert_eq!(arm.model.joints[6], Origin::default(), "the flange is the tip");
-    // The selected tip is a link after a gripper. The joint of the gripper is fixed at zero.
+    // The selected tip is the link that the gripper joint carries. The importer fixes this joint at position 0, so
+    // the flange does not change.
     let arm = import(&seven, names("j1,j2,j3,j4,j5,j6"), Some("of_gripper")).unwrap();
     assert_eq!(arm.model.joints[6], Arm::avena().model.joints[6]);
 
@@ -242,7 +244,8 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     );
 }
 
-/// A seventh joint in the middle of the chain is fixed at zero. The imported arm equals the arm without this seventh joint.
+/// The importer fixes a seventh joint in the middle of the chain at position 0. The imported arm equals the arm
+/// without this joint.
 #[test]
 fn a_joint_that_is_held_keeps_its_place() {
     let plain = urdf("0 0 1", "revolute");
@@ -387,8 +390,8 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert_eq!(kp(ParameterFile::load_all(&backwards).unwrap()), expected);
     assert_eq!(kp(ParameterFile::load(dir.path()).unwrap()), expected);
 
-    // The test passes only one of the six files to the loader, although all six files exist. The loader does not read files that were not
-    // passed to it.
+    // The test passes only one of the six existing files to the loader. The loader reads no other file, so it reports
+    // that five files are missing.
     let error_of = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
     let text = error_of(&all[2..3]);
     assert!(

@@ -69,8 +69,8 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
     Ok(Described { arm, gravity, friction })
 }
 
-/// Checks that joint names and link names are unique and that no link has two parents. If a name occurs twice, the reader returns an error,
-/// because it cannot know which joint or link is meant.
+/// Checks that joint names and link names are unique, and that no link has two parents. The reader rejects a
+/// duplicate name, because it cannot know which of the two joints or links is meant.
 fn only_once(robot: &Robot) -> Result<(), FileError> {
     fn twice(mut names: Vec<&str>) -> Option<&str> {
         names.sort_unstable();
@@ -123,7 +123,7 @@ impl<'a> Chain<'a> {
         self.warnings.push(Warning::new(change, place, problem));
     }
 
-    /// Warns if the sixth joint may be a gripper, because an arm with five axes and a gripper also has six joints.
+    /// Warns if the sixth joint may be a gripper: an arm with five axes and a gripper also has six joints.
     fn doubt_gripper(&mut self, choice: &ArmChoice) {
         let last = self.rotary[JOINTS - 1];
         let words = format!("{} {}", last.name, last.child.link).to_lowercase();
@@ -145,8 +145,9 @@ impl<'a> Chain<'a> {
         frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
-    /// Finds the joints from the last link to the flange. If `tip` is set, these joints form the path to `tip`. Without `tip`, the result
-    /// is one fixed joint on the last link: the joint with a usual flange name, or else the first fixed joint.
+    /// Finds the joints from the last link to the flange. With `tip`, these are the joints on the path to the link
+    /// `tip`. Without `tip`, this is one fixed joint on the last link: the joint with a usual flange name, or else
+    /// the first fixed joint.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -244,8 +245,8 @@ impl<'a> Chain<'a> {
         Ok(model)
     }
 
-    /// Warns about each joint below the base of the arm that has an offset. A joint below the base does not move, but its offset changes
-    /// the position of the base.
+    /// Warns about each joint between the base of the arm and the root of the description that has an offset. Such a
+    /// joint does not move, but its offset changes the position of the base.
     fn look_below(&mut self, base: &str) {
         let mut at = base.to_owned();
         for _ in 0..self.robot.joints.len() {

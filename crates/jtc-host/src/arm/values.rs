@@ -11,13 +11,13 @@ use super::{Arm, Source};
 /// Number of an arm, with its unit, range, default and source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmValue {
-    /// Key of the number in an arm file. If the key is a table or a list, the name of the element follows after a dot, for example
-    /// `pid.kp`, `com_xyz_m.x`.
+    /// Key of the number in an arm file. If the value of the key is a table or a list, the element follows after a
+    /// dot: `pid.kp`, `com_xyz_m.x`.
     pub name: &'static str,
     /// Joint to which the number belongs; `None` for a number of the flange, of a link or of the whole arm.
     pub joint: Option<Joint>,
-    /// Index of the link to which the number belongs; 0 is the base. The origin of a joint has the index of the link that the joint
-    /// carries. The flange has index 7.
+    /// Index of the link to which the number belongs; 0 is the base. The origin of a joint has the index of the link
+    /// that the joint moves. The flange has index 7.
     pub link: Option<usize>,
     /// Value of the number; `None` if the number is missing.
     pub value: Option<f64>,
@@ -68,11 +68,12 @@ const FRICTION: [(&str, &str); 6] = [
     ("friction_polynomial.c5", "°C"),
 ];
 
-/// List of the numbers in a value of the type `T`. Each item contains the properties of a number and a function that reads the number.
+/// List of all numbers in a value of the type `T`. Each entry consists of the properties of a number and a function
+/// that reads the number from the value.
 pub(super) type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
 
-/// Returns the properties of a setting of the joints or of the controller. The range of the setting is the range in the settings table,
-/// narrowed to the range of the drives.
+/// Returns the properties of a controller setting or joint setting. Its range is the range in the settings table,
+/// reduced to the range of the drives.
 fn setting(row: &Setting, drives: &Config) -> Kind {
     let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
     let (low, high) = match row.name {
@@ -86,7 +87,7 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "position_error_max_rad" => Some(POSITION_ERROR_DEFAULT),
         "rotor_inertia_kg_m2" => Some(0.0),
         "torque_gain" => Some(1.0),
-        // There is no single default, because it depends on the torque limit of the joint.
+        // The default is not a constant, because it depends on the torque limit of the joint.
         "teach_damping_nm_s_rad" => None,
         // The other numbers of a joint have no default, because an arm file must contain them.
         _ if row.of_joint() => None,
@@ -173,7 +174,7 @@ impl Arm {
             all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
             all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
         }
-        // The list already contains gravity, so gravity is not added again with the settings of the controller.
+        // The list already contains gravity, so gravity is left out of the controller settings here.
         let of_controller =
             |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
         for row in settings::TABLE.iter().filter(of_controller) {
@@ -213,7 +214,7 @@ mod tests {
         assert_eq!((of("pid.kd", 1).from, of("pid.kd", 1).value), (Source::Proposed, Some(80.0)));
         assert_eq!(of("friction_polynomial.c0", 3).value, arm.polynomial.map(|c| c[2][0]));
         // Expected number of values: 3 for gravity, 19 for each of 6 joints, 6 for each of 7 frames and 13 for each
-        // of 7 links. `own` is the number of controller settings that are not counted in these numbers.
+        // of 7 links. `own` is the number of controller settings that do not belong to these groups.
         let own = settings::count(true) - 6 * 8 - 3;
         assert_eq!(all.len(), 3 + 6 * 19 + 7 * 6 + 7 * 13 + own);
         let missing = Arm { pid: None, ..arm }.values();

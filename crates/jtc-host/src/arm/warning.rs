@@ -23,7 +23,7 @@ pub enum Change {
     LimitAssumed,
     /// A number of the robot description is not imported.
     NotCarried,
-    /// A number of a robot description is used only as a starting value.
+    /// A value of the robot description is doubtful, so it is used only as a starting value.
     Doubtful,
     /// Some numbers of the file are proposals of `jtc arm import`.
     Proposed,

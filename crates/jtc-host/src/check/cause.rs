@@ -30,7 +30,7 @@ pub struct Cause {
     pub warning: bool,
 }
 
-/// Points at which each kind of problem occurs.
+/// For each kind of problem, the indices of the points at which it occurs.
 pub(super) type Places = BTreeMap<ProblemKind, BTreeSet<usize>>;
 
 /// Returns one cause for each kind of problem, in the order of `problems`. Warnings get their own cause.
@@ -84,7 +84,7 @@ impl fmt::Display for Cause {
         if self.points > 1 {
             write!(f, ", at {} points", self.points)?;
         }
-        // The first line already contains the text of the kind, so the other lines omit this text.
+        // The first line already contains the text of the kind, so the texts of the occurrences do not repeat it.
         let short = |words: &str| words.replacen(&format!("{}: ", self.words), "", 1);
         write!(f, "\n    worst: {}", short(&worst))?;
         if self.first != self.worst {

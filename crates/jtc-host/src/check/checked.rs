@@ -21,9 +21,9 @@ static PASSED: AtomicU64 = AtomicU64::new(1);
 pub struct CheckOptions {
     /// Division of the trajectory into segments for the upload. The check includes the number of segments.
     pub upload: UploadOptions,
-    /// `true` if the limits, the gravity and the rotor inertia may differ between the arm file and the controller. With `true` the caller
-    /// confirms that the controller's values are safe for this arm. With `false` the check refuses an arm whose values differ from the
-    /// controller (J-55).
+    /// `true` if the check accepts an arm whose limits, gravity or rotor inertia differ from the controller. The
+    /// caller then confirms that the controller's values are safe for this arm. With `false`, the check refuses such
+    /// an arm (J-55).
     pub accept_device_limits: bool,
     /// Settings of the controller. The default is the built-in settings of the controller. For a controller with extensions, use the result
     /// of [`Session::device_config`](crate::Session::device_config).
@@ -101,8 +101,8 @@ impl CheckedTrajectory {
         start: &[f64; JOINTS],
         options: &CheckOptions,
     ) -> Result<Self, CheckError> {
-        // The fields of `Arm` are public, so the numbers of the arm may be invalid. With physically impossible numbers, any torque could
-        // pass the check.
+        // The fields of `Arm` are public, so a caller may have set physically impossible numbers. With such numbers,
+        // any torque could pass the check.
         arm.is_physical()?;
         let differences = arm.device_differences(&options.device);
         if !differences.is_empty() && !options.accept_device_limits {
@@ -140,7 +140,7 @@ impl CheckedTrajectory {
     /// Returns [`PlanError::Refused`] with the verdict on the remainder of the path.
     pub fn check_rest(&self, device: &Config, from_ms: u32) -> Result<(), PlanError> {
         let (arm, checked_with) = &*self.basis;
-        // A changed path speed needs no check, because it can only slow down the motion.
+        // A change of the path speed needs no new check, because it can only make the motion slower.
         let config = Config { speed: checked_with.speed, ..arm.config_on_device(device) };
         if config == *checked_with {
             return Ok(());
@@ -166,7 +166,7 @@ impl CheckedTrajectory {
         &self.options
     }
 
-    /// Returns the age of a measurement when the resulting command takes effect, in ticks (J-62).
+    /// Returns the time from a measurement until the command that is computed from it takes effect, in ticks (J-62).
     pub(crate) fn delay_ticks(&self) -> u8 {
         self.delay_ticks
     }

@@ -17,8 +17,8 @@ impl Verdict {
             let over = (p.value / p.limit).abs();
             speed = speed.min(match p.kind {
                 Velocity => 0.95 / over,
-                // The value of this problem comes from one step between two points, but the joint may be faster in
-                // another step. Therefore the peak velocity of the joint is also used.
+                // The value of this problem is the speed in one step between two points, but the joint may be faster
+                // in another step. Therefore the peak velocity of the joint is also considered.
                 PositionSpeed => {
                     let peak = p
                         .joint

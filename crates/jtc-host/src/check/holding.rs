@@ -1,9 +1,10 @@
-//! Check that the drives can hold the arm at rest: at the start, at the end, and at rests along the path.
+//! Check that the drives can hold the arm at rest: at the start, at the end, and wherever the arm stops along the
+//! path.
 //!
-//! If a holding torque is close to the torque limit, the arm falls after some time, even without a motion. The gains amplify the encoder
-//! noise, so the commanded torque exceeds the limit repeatedly. The controller reports an error if a torque exceeds its limit for more than
-//! 10 ms within 100 ms (J-43). The check accepts a path that passes through a pose with a high holding torque without stopping, although a
-//! Pause could stop the arm there.
+//! If a joint needs nearly its whole torque limit at rest, the arm falls after some time. The cause is the encoder
+//! noise: the gains amplify it, so the commanded torque exceeds the limit again and again. The controller reports an
+//! error if a torque exceeds its limit for more than 10 ms within 100 ms (J-43). The check accepts a path that passes
+//! such a pose without stopping, although a Pause could stop the arm there.
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
@@ -14,8 +15,9 @@ use super::{HOLD_SHARE, ProblemKind, Verdict};
 /// Speed up to which a joint counts as at rest, rad/s. For comparison, the smallest velocity in a serial frame is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
-/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the arm is at rest on the path. If
-/// `stands_at_start` is `true`, the start pose is not checked, because the arm is already at rest in this pose before the motion.
+/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit while the arm is at rest on
+/// the path. If `stands_at_start` is `true`, the arm is already at rest in the start pose before the motion, so this
+/// pose is not checked.
 pub(super) fn holds(
     config: &Config,
     dynamics: &Dynamics,

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-/// Maximum share of a joint's torque limit that may be needed to hold the arm, without friction. Arms that needed 98 % have fallen.
+/// Maximum share of a joint's torque limit that may be needed to hold the arm, without friction. In practice, arms
+/// that needed 98 % have fallen.
 pub const HOLD_SHARE: f64 = 0.97;
 
 /// Declares the kinds of problems. Each kind has a meaning, a name and a text. If the problem has a value, the kind also has a unit.
@@ -78,7 +79,7 @@ kinds! {
     NotAtRest, "not at rest at an end" in "rad/s";
     /// The arm is not at the first point (J-34).
     StartPose, "the arm is not at the first point" in "rad";
-    /// The velocities in the file change at other rates than the accelerations in the file.
+    /// The rate at which the velocities in the file change differs from the accelerations in the file.
     AccelerationMismatch, "velocities and accelerations disagree" in "rad/s²";
 }
 
@@ -91,7 +92,8 @@ impl ProblemKind {
         }
     }
 
-    /// Returns `true` if the path cannot be executed at all, or if the problem ends the motion before an operator could stop the arm.
+    /// Returns `true` if a problem of this kind makes the path impossible to execute, or ends the motion before an
+    /// operator could stop the arm.
     pub(super) fn stops_at_once(self) -> bool {
         use ProblemKind::*;
         !matches!(

@@ -11,7 +11,8 @@ use super::Verdict;
 /// than its model may reach the torque limit.
 pub const MARGIN_LOW_PCT: f64 = 10.0;
 
-/// Smallest share of a torque limit that a motion does not use, with the time at which this margin occurs.
+/// Torque margin of a motion: the smallest share of a torque limit that the motion leaves unused, with the time at
+/// which this occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueMargin {
     /// Torque margin, % of the torque limit; negative if the torque is above the limit.
@@ -59,7 +60,8 @@ impl fmt::Display for TorqueMargin {
 }
 
 impl Verdict {
-    /// Updates the smallest torque margin with the torque of a joint at a millisecond of the path, computed for a bearing temperature (°C).
+    /// Updates the smallest torque margin with the torque of one joint at one millisecond of the path. The torque was
+    /// computed for the given bearing temperature (°C).
     pub(super) fn take_margin(
         &mut self,
         joint: Joint,
@@ -74,7 +76,8 @@ impl Verdict {
         }
     }
 
-    /// Returns the verdict with the smaller torque margin: its own margin or `other`. `other` must be a margin of the same trajectory.
+    /// Returns the verdict with the smaller of two torque margins: its own and `other`. Both must belong to the same
+    /// trajectory.
     pub(crate) fn or_less(mut self, other: Option<TorqueMargin>) -> Self {
         if let Some(other) = other
             && self.margin.is_none_or(|margin| other.percent < margin.percent)

@@ -45,7 +45,7 @@ pub struct Problem {
     /// Limit for the value. If positions, velocities or accelerations contradict each other, `limit` is the value of
     /// the other quantity.
     pub limit: f64,
-    /// Number of milliseconds, points or steps with the problem.
+    /// Number of occurrences: milliseconds, points or steps, depending on the kind of problem.
     pub count: usize,
     /// `true` if the problem is only a warning: the trajectory can be executed, but the feed-forward torque is less accurate.
     pub warning: bool,
@@ -58,8 +58,9 @@ impl Problem {
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// Returns the worst value relative to its limit, for sorting. If the problem has no limit, returns the absolute
-    /// value. If positions, velocities or accelerations contradict each other, returns the difference.
+    /// Returns a number for sorting the problems: the worst value relative to its limit. If there is no limit,
+    /// returns the absolute value. If positions, velocities or accelerations contradict each other, returns the
+    /// difference.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
@@ -131,7 +132,7 @@ impl Seen {
 /// Formats a number with three significant digits.
 fn three_digits(value: f64) -> String {
     let before = if value > 0.0 { value.log10().floor() } else { 0.0 };
-    // Seven decimals are finer than the resolution of every serial frame.
+    // Seven decimals are finer than the resolution of any value in a serial frame.
     let decimals = (2.0 - before).clamp(0.0, 7.0) as usize;
     format!("{value:.decimals$}")
 }

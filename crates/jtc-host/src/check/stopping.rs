@@ -1,9 +1,10 @@
 //! Check that the arm can stop from every point of a path within the stop time of Pause and Stop (J-33).
 //!
-//! The path is executed at the rate r, and r changes with the slope s. The torque of the arm model is g + r²·f + s·h (Bobrow 1985; Pham &
-//! Pham 2018). The torque g holds the arm, f is the torque of the motion at full speed, and h is the torque for the change of rate. The
-//! torques g, f and h are computed once for each checked time of the path. The torques during a ramp to standstill are then weighted sums
-//! of g, f and h.
+//! The rate r of the path time is 1 at full speed and 0 at rest. A ramp is the decrease of r to 0, with the slope s.
+//! During a ramp, the torque of the arm model is g + r²·f + s·h (Bobrow 1985; Pham & Pham 2018). The term g is the
+//! torque that holds the arm. The term f belongs to the motion at full speed, and h belongs to the change of r. The
+//! check computes g, f and h once for each checked time of the path. The torque during a ramp is then a weighted sum
+//! of these terms.
 
 use std::collections::VecDeque;
 
@@ -15,12 +16,14 @@ use super::{ProblemKind, Verdict};
 
 /// Time between two checks of the torque, along the path and along each ramp, ms.
 const SPACING: f64 = 10.0;
-/// Durations of the tried ramps, as shares of the allowed stop time. The arm can stop if one of these ramps is feasible.
+/// Durations of the ramps that the check tries, as shares of the allowed stop time. The arm can stop if the torques
+/// of at least one of these ramps are within the limits.
 const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
-/// Share of the ramp time during which the slope increases. At the end of the ramp, the slope decreases during an equal share.
+/// Share of the ramp time in which the slope increases to its maximum. In an equal share at the end of the ramp, the
+/// slope decreases to 0.
 const CORNER: f64 = 0.2;
 
-/// Terms of the torque at one time of the path, N·m.
+/// Terms of the torque of each joint at one time of the path, N·m.
 struct Place {
     /// Index of the last point at or before this time of the path. `ms` is the time since this point, ms.
     point: usize,
@@ -38,8 +41,8 @@ struct Load {
     torque: f64,
 }
 
-/// Adds a problem for every checked time of the path from which the arm cannot stop within `config.stop_ms`. From such a time, each tried
-/// ramp exceeds a torque limit. The torque is computed with the arm model, without friction.
+/// Adds a problem for every checked time of the path from which the arm cannot stop within `config.stop_ms`: each
+/// tried ramp would exceed a torque limit. The torque is computed with the arm model, without friction.
 pub(super) fn stops(
     config: &Config,
     dynamics: &Dynamics,
@@ -50,7 +53,7 @@ pub(super) fn stops(
     let end = points.len().saturating_sub(1) as f64 * f64::from(step_ms);
     let last = (end / SPACING).ceil() as usize;
     let stop_ms = f64::from(config.stop_ms).max(SPACING);
-    // During a ramp, the path time advances by half of the ramp's duration. Therefore the window must contain this
+    // During a ramp, the path time advances by half of the ramp's duration, so the window must contain at least this
     // part of the path.
     let ahead = (0.5 * stop_ms / SPACING).ceil() as usize + 1;
     let mut window = VecDeque::with_capacity(ahead + 1);
@@ -92,7 +95,8 @@ fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint]
     }
 }
 
-/// Returns the greatest load during a ramp of `length` ms that begins at the first element of `window`.
+/// Returns the torque that comes closest to its limit during a ramp of `length` ms. The ramp begins at the first
+/// element of `window`.
 fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     let mut worst = Load { share: 0.0, joint: Joint::ALL[0], torque: 0.0 };
     let samples = (length / SPACING).ceil().max(2.0);
@@ -122,8 +126,8 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     worst
 }
 
-/// Returns the completed share of the ramp and its slope after the share `x` of the ramp time. The ramp is a straight line with rounded
-/// ends.
+/// Returns how much of the ramp is completed (0 to 1) after the share `x` of the ramp time, and the slope at this
+/// time. The ramp is a straight line with rounded ends.
 fn profile(x: f64) -> (f64, f64) {
     let steepest = 1.0 / (1.0 - CORNER);
     let end = 1.0 - x;

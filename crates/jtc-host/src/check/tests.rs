@@ -31,7 +31,7 @@ fn a_planned_move_passes_with_torque_and_start_pose() {
     assert!(verdict.joints[1].torque_peak_nm.unwrap() > 1.0);
 }
 
-/// J-34: the check compares the start pose with the first point.
+/// J-34: the check compares the start pose with the first point, with the controller's start tolerance.
 #[test]
 fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     let config = Config::avena();
@@ -47,7 +47,8 @@ fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     assert!(!Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth()).is_ok());
 }
 
-/// J-32: two points are within the limits, but the controller's interpolation between these points exceeds a limit.
+/// J-32: two points are within the limits, but the controller's interpolation exceeds a limit between them. The check
+/// must find this.
 #[test]
 fn j32_limits_are_checked_between_points() {
     let at = |q: f64, v: f64| Point {
@@ -55,7 +56,8 @@ fn j32_limits_are_checked_between_points() {
         velocity: [0.0, v, 0.0, 0.0, 0.0, 0.0],
         ..Point::default()
     };
-    // Joint 2 overshoots its position limit (1.57 rad), although both points are below the limit.
+    // Between two points, joint 2 exceeds its position limit (1.57 rad), although its position is 1.5 rad at both
+    // points.
     let t =
         Trajectory { step_ms: 1000, points: vec![at(1.5, 0.0), at(1.5, 1.0), at(1.5, -1.0), at(1.5, 0.0)] };
     let verdict = check(&t);
@@ -93,8 +95,8 @@ fn all_problems_are_reported_with_their_worst_place() {
     );
 }
 
-/// If all velocities were 0, the arm would stop at every point. The check refuses this trajectory, because its
-/// positions contradict its velocities.
+/// With all velocities 0, the arm would stop at every point. The check refuses this trajectory, because its positions
+/// change although its velocities are 0.
 #[test]
 fn channels_that_contradict_each_other_all_along_are_refused() {
     let mut t = smooth();
@@ -126,7 +128,8 @@ fn torque_along_the_path_is_held_against_the_limits() {
     let arm = Arm::avena();
     let mut config = arm.config();
     config.joints[1].torque_max = 100.0;
-    // In the horizontal pose, joint 2 needs about 130 N·m to hold the arm, which is more than its limit of 100 N·m.
+    // In the horizontal pose, joint 2 needs about 130 N·m to hold the arm. Its limit in this test is 100 N·m, so the
+    // check must refuse the motion.
     let t = plan::joint_move(&[0.0; 6], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     let verdict = Checker { model: Some(&arm.model), ..Checker::new(&config) }.check(&t);
     assert_eq!(
@@ -153,7 +156,8 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     assert!(verdict.hint().to_string().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());
     assert!(slow.is_ok(), "{slow}");
-    // The trajectory was checked at half of the file's speed. The suggested percentage must still refer to the file's own speed.
+    // The trajectory was checked at half of the file's own speed. The suggested speed must still be a percentage of
+    // the file's own speed.
     let half = check(&plan::at_speed(&t, 50.0).unwrap());
     assert!(
         half.hint_for("my.csv", 50.0).to_string().contains("traj check my.csv --speed 9`"),
@@ -222,8 +226,7 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     let bump = verdict.refusals().next().expect("refused");
     assert_eq!((bump.kind, bump.joint), (ProblemKind::PositionSpeed, Joint::from_number(5)), "{verdict}");
     assert!((19..=20).contains(&bump.point) && bump.ms > 0.0, "{verdict}");
-    // This position limit is beyond the range of the drives. The check uses the limit of the drives (2.9905 rad)
-    // instead.
+    // This position limit is beyond the range of the drives, so the check uses the limit of the drives (2.9905 rad).
     let mut config = Config::avena();
     config.joints[0].position_max = 3.05;
     let mut out = Trajectory { step_ms: 100, points: vec![Point::default(); 3] };
@@ -232,8 +235,8 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
 }
 
-/// Returns settings in which the limits of joint 2 lie between two positions that a serial frame can represent. The nearest representable
-/// positions, 1.150041 and −0.550044 rad, are outside the limits.
+/// Returns settings in which each limit of joint 2 lies between two positions that a serial frame can represent. The
+/// representable positions nearest to the limits are 1.150041 and −0.550044 rad, slightly outside the limits.
 fn between_steps() -> Config {
     let mut config = Config::avena();
     (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
@@ -267,8 +270,8 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
 #[test]
 fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     let config = between_steps();
-    // In the serial frames, the end positions of these motions are the raw values 11 997, −5 739, 12 100 and 15 000. The rounding of the
-    // velocities changes the interpolated positions by some µrad.
+    // `excess` is the expected excess over the limit. In the serial frames, the end positions are the raw values 11
+    // 997, −5 739, 12 100 and 15 000. The rounding of the velocities changes the interpolated positions by some µrad.
     for (end, excess) in [(1.150233, 0.000233), (-0.550236, 0.000236), (1.160108, 0.0101), (1.438151, 0.288)]
     {
         let verdict = Checker::new(&config).check(&of_joint_2(0.2, end));
@@ -338,7 +341,8 @@ fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     Trajectory { step_ms: 10, points: (0..=steps).map(point).collect() }
 }
 
-/// J-33: the torque limit is sufficient for the motion, but not for a stop while the stretched arm moves downwards.
+/// J-33: the torque limit is sufficient for the motion, but not to stop the stretched arm while it moves downwards.
+/// The check refuses this path.
 #[test]
 fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     let arm = Arm::avena();
@@ -364,7 +368,8 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
 }
 
-/// J-43: if a joint needs nearly its whole torque limit to hold the arm, the arm falls after some time, even without a motion.
+/// J-43: the check refuses a path on which a joint at rest needs nearly its whole torque limit, because the arm would
+/// fall after some time.
 #[test]
 fn j43_torque_is_in_hand_where_the_arm_stands() {
     let arm = Arm::avena();
@@ -391,7 +396,8 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     let last = there.points.len() - 1;
     for share in [0.98, 0.975] {
         let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
-        // At the last points of the motion, the speed is so low that the arm counts as at rest.
+        // Near its end, the motion is so slow that the arm already counts as at rest. Therefore the problem may be
+        // found some points before the last point.
         assert!(
             joint == Joint::from_number(2) && over && (last - 5..=last).contains(&point),
             "{point} of {last}"
@@ -417,8 +423,8 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     }
     let text = check(&there, 0.98, None).to_string();
     assert!(text.contains("joint 2: rest at point") && text.contains("98.0 % of the torque limit"), "{text}");
-    // While the arm is in the pose with the high holding torque, joint 1 rotates about the vertical axis. Therefore
-    // the arm is not at rest there, and the check accepts the motion.
+    // Joint 1 now rotates about the vertical axis while the arm is in the pose with the high holding torque.
+    // Therefore the arm is not at rest there, and the check accepts the motion.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {
         let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();
@@ -444,8 +450,8 @@ fn the_existing_trajectories_pass() {
         let checker =
             Checker { model: Some(&arm.model), friction: friction.as_ref(), ..Checker::new(&config) };
         let verdict = checker.check(&t);
-        // At five joins between pieces of the trajectory, the positions are one sample ahead of the velocities. The
-        // check reports only warnings.
+        // The trajectory consists of several pieces. At five joins between them, the positions are one sample ahead
+        // of the velocities. The check reports only warnings.
         assert!(verdict.is_ok(), "{name}: {verdict}");
         assert!(
             verdict.warnings().all(|p| p.kind == ProblemKind::VelocityMismatch && p.count == 5),

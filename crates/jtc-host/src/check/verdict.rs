@@ -12,8 +12,8 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of points with a contradiction between positions, velocities and accelerations that the check tolerates.
-/// Existing files have such points at the joins between two pieces.
+/// Number of points with a contradiction between positions, velocities and accelerations up to which the check only
+/// warns. Existing files have such points at the joins between two pieces.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.
@@ -61,8 +61,8 @@ impl JointFigures {
 pub enum Suspicion {
     /// No probable fault was found.
     Nothing,
-    /// Positions are far outside the range of a joint, but would be plausible after division by 57.3. Therefore the positions are probably
-    /// in degrees.
+    /// Positions are far outside the range of a joint, but would be plausible after division by 57.3, the number of
+    /// degrees per radian. Therefore they are probably in degrees.
     Degrees,
     /// The trajectory consists of pieces whose ends do not match.
     Pieces,
@@ -92,7 +92,8 @@ pub struct Verdict {
     pub margin: Option<TorqueMargin>,
 }
 
-/// Step time from which the points count as waypoints instead of samples of a motion, ms.
+/// Shortest step time at which the points count as waypoints, ms. With a shorter step time, the points count as
+/// samples of a motion.
 const WAYPOINTS_MS: u16 = 100;
 
 impl Verdict {
@@ -174,7 +175,8 @@ impl Verdict {
         places.sort_unstable();
         places.dedup();
         let all = 5 * places.len() >= self.points || self.step_ms >= WAYPOINTS_MS;
-        // The join between two pieces of a trajectory affects only one step. Jumps in many consecutive steps belong to one move.
+        // The join between two pieces of a trajectory affects only one step. If jumps occur in many consecutive
+        // steps, they belong to a move that is too fast.
         let on_the_way = |point: usize| {
             let has = |p: Option<usize>| p.is_some_and(|p| places.binary_search(&p).is_ok());
             let (before, after) = (point.checked_sub(1), Some(point + 1));
@@ -261,7 +263,8 @@ impl fmt::Display for Verdict {
         let (mut shown, mut left) = (self.causes.len(), 0);
         if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
             write!(f, "\n  the positions look like degrees: {} is at {:.1}", far.0, far.1)?;
-            // If the unit of the positions is wrong, all other problems are consequences of the wrong unit.
+            // If the unit of the positions is wrong, the wrong unit causes all other problems, so these are not
+            // shown.
             shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
             left = self.causes.len().saturating_sub(shown);
         }

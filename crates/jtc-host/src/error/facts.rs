@@ -11,7 +11,7 @@ use crate::held_stop::HeldStop;
 use crate::plan::{MARGIN_PCT_MAX, PlanError};
 use crate::{explain, held_stop, labels};
 
-/// Returns the usual cause from the page of `jtc explain` that belongs to the text `words`.
+/// Returns the usual cause of a problem. The text `words` selects the page of `jtc explain` that contains this cause.
 fn cause(words: &str) -> Option<&'static str> {
     explain::find(words).first().map(|page| page.cause)
 }
@@ -37,7 +37,7 @@ pub(crate) fn of_verdict(verdict: &Verdict) -> Facts {
     }
 }
 
-/// Returns the lower or upper limit of a range that a value exceeds.
+/// Returns the limit that `value` exceeds: `low` or `high`.
 fn nearest(value: f64, low: f64, high: f64) -> f64 {
     if value < low { low } else { high }
 }

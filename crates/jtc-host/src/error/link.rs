@@ -207,8 +207,8 @@ fn after_refused_execution(
             TrajCheck
         ));
     }
-    // In this state, the controller refuses Execute with another code, and the session does not send Resume.
-    // Therefore the code NotAllowed can only be the answer to Pause or Stop.
+    // In HoldPos without a motion, the controller refuses Execute with another code, and the session does not send
+    // Resume. Therefore the code NotAllowed can only be the answer to Pause or Stop.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then(|| {
         next!(
@@ -219,8 +219,8 @@ fn after_refused_execution(
     })
 }
 
-/// Returns `true` if the code means that the arm is not in the required position. If extended codes are not enabled on the serial line, the
-/// controller sends code 6 instead of the codes 7 and 8 (J-51).
+/// Returns `true` if the code can mean that the arm is not in the required position. If extended codes are not
+/// enabled on the serial line, the controller sends the general code 6 instead of the codes 7 and 8 (J-51).
 fn is_place(code: DataStatus) -> bool {
     matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }

@@ -65,8 +65,8 @@ pub enum MotionError {
     },
 }
 
-/// Returns the cause of the held stop in one line. If the held stop has ended and its cause is unknown, returns the
-/// errors that have occurred since the start of the motion.
+/// Returns the cause of the held stop in one line. If the held stop has already ended and its cause is unknown,
+/// returns the joint errors that have occurred since the start of the motion.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
         labels::why_held(status, cause)
@@ -195,8 +195,8 @@ impl Diagnose for MotionError {
 mod tests {
     use super::*;
 
-    /// J-34: after a Pause request the trajectory state stays Execute until the arm has stopped. A Resume command before the arm has
-    /// stopped has its own error message.
+    /// J-34: after a Pause request, the trajectory state stays Execute until the arm has stopped. If Resume is
+    /// requested before that, the error message differs from the message for a Resume without a Pause.
     #[test]
     fn a_resume_too_early_is_told_from_one_without_a_pause() {
         let early = MotionError::NotPaused {

@@ -40,8 +40,9 @@ pub enum StateError {
         /// Status that shows that the controller is not ready.
         status: Box<Status>,
     },
-    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive's speed has another scale. The controller executes
-    /// no trajectory until the drives are configured again.
+    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive reports the speed in another
+    /// scale than the controller expects. The controller executes no trajectory until the drives are configured
+    /// again.
     #[error(
         "{}: the position is not reliable, because the encoder has jumped or the speed of the drive does not match; the controller executes no \
          trajectory until the drive is reset",
@@ -63,7 +64,7 @@ pub enum StateError {
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The arm moves, but a pose must be saved at rest.
+    /// The arm moves, but a pose can be saved only at rest.
     #[error("{what}, but a pose can be saved only at rest; nothing was saved")]
     Moving {
         /// Text that names the moving joint or the motion.
@@ -75,7 +76,7 @@ pub enum StateError {
         /// Joint with the unknown position.
         joint: Joint,
     },
-    /// The arm moves, and would fall if the nodes lost their torque.
+    /// The arm moves, so it would fall if the reset of these nodes switched off their torque.
     #[error("{nodes} cannot be reset in {state}: the arm would fall")]
     WouldFall {
         /// Names of the nodes that the caller wanted to reset.

@@ -9,8 +9,9 @@ const STEP_MS: u16 = 10;
 const MOTION: [(f64, f64, f64); 6] =
     [(0.0, 1.5, 1.0), (0.45, 0.4, 2.0), (-1.5, 0.35, 2.0), (0.5, 0.6, 2.0), (0.9, 0.7, 1.0), (0.0, 0.5, 3.0)];
 
-/// Returns the motion of `jtc demo`: a smooth motion of all joints from the zero pose and back. The motion of each joint is the sum of a
-/// deflection and a windowed oscillation. The motion begins and ends at rest. Position, velocity and acceleration have no steps.
+/// Returns the motion of `jtc demo`: a smooth motion of all joints from the zero pose and back. The position of each
+/// joint is the sum of a deflection and an oscillation that begins and ends with amplitude 0. The motion begins and
+/// ends at rest. Position, velocity and acceleration change without steps.
 pub fn demo_motion() -> Trajectory {
     let count = (TIME * 1e3) as usize / usize::from(STEP_MS) + 1;
     let omega = std::f64::consts::TAU / TIME;
@@ -19,8 +20,8 @@ pub fn demo_motion() -> Trajectory {
         let mut p = Point::default();
         for (j, (bend, swing, n)) in MOTION.into_iter().enumerate() {
             p.position[j] = bend * 0.375;
-            // The position is B·sin⁴(πs) + A·sin²(πs)·sin(2πns). The formula is written as a sum of sines and cosines, because they have
-            // simple derivatives.
+            // With s from 0 to 1 over the duration, the position is B·sin⁴(πs) + A·sin²(πs)·sin(2πns). The formula is
+            // written as a sum of sines and cosines, because these have simple derivatives.
             for (a, b, n) in [
                 (0.0, -0.5 * bend, 1.0),
                 (0.0, 0.125 * bend, 2.0),

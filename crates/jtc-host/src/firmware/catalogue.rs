@@ -12,7 +12,8 @@ use super::{FLASH, FirmwareError, Image};
 const FILE: &str = "firmware.json";
 /// Folder in which packages install the images, relative to the installation prefix.
 const INSTALLED: &str = "share/openjtc/firmware";
-/// Environment variable that contains a folder with a catalogue. The folder in this variable replaces the default folders.
+/// Environment variable with the path of a folder that contains a catalogue. If the variable is set, only this folder
+/// is searched.
 const VARIABLE: &str = "OPENJTC_FIRMWARE";
 
 /// Entry in the catalogue about one image.
@@ -59,8 +60,9 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Returns the folders in which the program searches for a catalogue. If the environment variable is set, its value is the only folder.
-    /// Otherwise the program searches in the installation prefix of the program and in the folder into which packages install images.
+    /// Returns the folders in which the program searches for a catalogue. If the environment variable is set, its
+    /// value is the only folder. Otherwise these are the folder in the program's own installation prefix, and the
+    /// folder into which packages install images.
     pub fn folders() -> Vec<PathBuf> {
         if let Some(folder) = env::var_os(VARIABLE).filter(|folder| !folder.is_empty()) {
             return vec![folder.into()];

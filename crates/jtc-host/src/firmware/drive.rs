@@ -28,8 +28,8 @@ const CODES: [(&str, &str); 6] = [
 pub struct Drive {
     /// Mount point of the drive.
     pub path: PathBuf,
-    /// Label of the drive; `None` if the operating system does not report it. If the block device is unknown, the label is the name of the
-    /// folder.
+    /// Label of the drive; `None` if it is unknown. If the block device is unknown, the name of the mount folder is
+    /// used as the label.
     pub label: Option<String>,
     /// Board number in `MBED.HTM`; `None` if the file does not contain a board number.
     pub code: Option<String>,
@@ -44,7 +44,8 @@ pub struct Drive {
     pub volume: Option<u64>,
 }
 
-/// USB device of a board's ST-LINK. The USB device presents a drive, a serial port and a debugger.
+/// Number of the file system at the mount point; `None` if the operating system has no such numbers. If the drive is
+/// removed, its path belongs to another file system, so the number shows the removal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
     /// Folder of the USB device in the device tree of the operating system. The name of this folder contains the
@@ -166,8 +167,9 @@ pub(super) fn same_board(board: &str) -> &str {
     board.strip_suffix("-ldo").unwrap_or(board)
 }
 
-/// Returns `true` if the processor core of this board has two possible power supplies. Each image is built for one of these supplies. In
-/// ST's board names, `-q` means that the board has a switching regulator in addition to the linear regulator.
+/// Returns `true` if the core of the processor on this board can be supplied in two ways. Each image is built for one
+/// of the two supplies. In ST's board names, `-q` means that the board has a switching regulator in addition to the
+/// linear regulator.
 pub(super) fn has_two_supplies(board: &str) -> bool {
     same_board(board).ends_with("-q") || same_board(board) != board
 }
@@ -212,8 +214,8 @@ mod tests {
         for (label, code, of_h745, of_h743) in [
             ("NOD_H745ZIQ", None, Same, Other),
             ("NOD_H743ZI2", None, Other, Same),
-            // The older NUCLEO-H743ZI is a different board with other LEDs. The label of the older board equals the truncated label of the
-            // newer board.
+            // The older NUCLEO-H743ZI is a different board with other LEDs. Its full label equals the truncated label
+            // of the newer board, so the label alone does not identify the board.
             ("NODE_H743ZI", None, Other, Unknown),
             ("NODE_H743ZI", Some("0836"), Other, Same),
             ("NODE_H743ZI", Some("0813"), Other, Other),

@@ -81,7 +81,7 @@ pub enum FirmwareError {
         /// Mount points of the drives.
         drives: Vec<PathBuf>,
     },
-    /// Before flashing, the program must query the board over a serial port, but the port cannot be used.
+    /// The program must query the board over a serial port before it flashes the board, but the port cannot be used.
     #[error("the board must report its state over {port} before it is flashed: {source}")]
     NotAsked {
         /// Name of the serial port.
@@ -135,12 +135,13 @@ pub enum FirmwareError {
         /// Board for which the image was built.
         board: String,
     },
-    /// The wiring of the board may use a core supply that does not match the image.
+    /// The image needs one of two core supplies, and the wiring of the board may use the other one.
     #[error("the image is for {board}, {}", as_supplied(board, runs))]
     Supply {
         /// Board for which the image was built.
         board: String,
-        /// Board of the running program; `None` if the controller does not report its board, or if this board is the board of the image.
+        /// Board for which the running program was built; `None` if the controller does not report it, or if it is
+        /// the board of the image.
         runs: Option<String>,
     },
     /// The drive does not have space for the image file.
@@ -186,7 +187,7 @@ pub enum FirmwareError {
     NotTaken {
         /// Observed behaviour of the drive.
         seen: DriveAfter,
-        /// Error that the operating system reported during the copying.
+        /// Error that the operating system reported while the image was copied. The copy may still be complete.
         doubt: Option<String>,
     },
     /// The running program differs from the image.

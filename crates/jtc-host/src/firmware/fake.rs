@@ -85,7 +85,7 @@ struct Flashed {
     program: Option<Program>,
     board: String,
     started: Instant,
-    /// Time for which the board had already run when the test began, ms.
+    /// Uptime of the board when the test begins, ms.
     before_ms: u64,
     status: Status,
 }
@@ -178,10 +178,10 @@ impl Board {
 pub(super) enum Behaviour {
     /// The ST-LINK writes the file into the flash. The drive disappears and appears again.
     Takes,
-    /// Like `Takes`, but a part of the flash stays empty after the write. A real ST-LINK behaves like this if the bytes arrive in another
-    /// order.
+    /// Like `Takes`, but a part of the flash stays empty. A real ST-LINK causes such a gap if the bytes arrive in an
+    /// unexpected order.
     LeavesHole,
-    /// Like `Takes`, but the previous program restarts once before the ST-LINK stops the processor.
+    /// Like `Takes`, but before the ST-LINK stops the processor, the previous program restarts once.
     StartsBeforeAnew,
     /// The ST-LINK creates `FAIL.TXT` with this text.
     Fails(&'static str),
@@ -210,8 +210,8 @@ impl StLink {
             let mut length = 0;
             while !end.load(Ordering::Relaxed) {
                 thread::sleep(Duration::from_millis(5));
-                // The thread skips a path that is not a regular file. If the path is a link to a device such as `/dev/full`, reading would
-                // never end and would use all memory.
+                // The thread skips a path that is not a regular file. If the path is a link to a device such as
+                // `/dev/full`, reading would never end and would need all memory.
                 let file = at.join("openjtc.bin");
                 if !file.symlink_metadata().is_ok_and(|data| data.is_file()) {
                     continue;
@@ -259,7 +259,8 @@ fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
             if *behaviour == Behaviour::LeavesHole {
                 bytes[0x800..0xA00].fill(0);
             }
-            // The delay until the program starts must be longer than the tolerance for clock differences.
+            // The program starts only after this delay. The delay is longer than the tolerance for clock differences,
+            // so that the start is recognised as later than the copying.
             thread::sleep(Duration::from_millis(400));
             if *behaviour == Behaviour::StartsBeforeAnew {
                 board.start_with(&name, before);

@@ -14,7 +14,7 @@ use super::{Catalogue, FirmwareError};
 pub const FLASH: u32 = 0x0800_0000;
 /// Size of bank 1 of the flash, bytes. Bank 1 contains the program.
 pub(super) const BANK1: usize = 1024 * 1024;
-/// Offset of the flash memory for the stored arm. An image must end before this offset.
+/// Offset in the flash at which the storage for the arm begins. An image must end before this offset.
 pub(super) const STORED_ARM: usize = 0x1C_0000;
 /// Number of words in the vector table at the beginning of a program. The table contains the stack pointer and the interrupt vectors of the
 /// core and the chip.
@@ -22,8 +22,8 @@ const VECTORS: usize = 166;
 /// Value of a byte in erased flash.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Memories that can contain a stack: the tightly coupled memory and the memory on the AXI bus. Each entry contains the first address of
-/// the memory and the first address after the memory.
+/// Memories in which a stack can be: the tightly coupled memory and the memory on the AXI bus. Each entry contains
+/// the first address of the memory and the first address after it.
 const STACKS: [(u32, u32); 2] = [(0x2000_0000, 0x2002_0000), (0x2400_0000, 0x2408_0000)];
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
@@ -106,7 +106,8 @@ impl Image {
     ///
     /// Returns [`FirmwareError::NoImage`] if the file is not firmware for these boards.
     pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
-        // An ELF file contains the lengths of all its segments, so the parser detects a truncated ELF file.
+        // An ELF file contains the lengths of all its segments, so the parser notices if the end of the file is
+        // missing.
         let whole = elf::is_elf(&bytes);
         let flat = if whole { elf::flat(&bytes) } else { Ok(bytes) };
         let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
@@ -207,12 +208,13 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
     Ok(record)
 }
 
-/// Returns `true` if the program of the second core is at the beginning of bank 2, with its first instructions.
+/// Returns `true` if bank 2 contains the reset address of the second core, and the image contains the instructions at
+/// this address.
 fn starts_second_core(bytes: &[u8]) -> bool {
     let bank2 = FLASH + BANK1 as u32;
     let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    // The program of the second core begins with an endless loop: its second instruction jumps back to its first
-    // instruction.
+    // The program of the second core is an endless loop of two instructions of 2 bytes. Therefore the image must
+    // contain 4 bytes from the reset address.
     reset.is_some_and(|reset| {
         reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
     })
@@ -284,14 +286,15 @@ mod tests {
         let path = folder.path().join("nucleo-h743zi2.bin");
         fs::write(&path, image_bytes("nucleo-h743zi2", 7)).unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
-        // A catalogue that does not list the file, and an invalid catalogue, have no effect on the image.
+        // If the catalogue does not list the file, or if the catalogue is invalid, it does not prove that the image
+        // is complete.
         catalogue(folder.path(), &["nucleo-h745zi-q"]);
         assert!(!Image::read(&path).unwrap().is_whole());
         fs::write(folder.path().join("firmware.json"), "{").unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
         catalogue(folder.path(), &["nucleo-h743zi2"]);
         assert!(Image::read(&path).unwrap().is_whole());
-        // The test truncates the file at a position at which only the catalogue shows the truncation.
+        // The test cuts off the end of the file at a position at which only the catalogue can detect this.
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..0xFF0]).unwrap();
         assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());
@@ -303,7 +306,7 @@ mod tests {
         let image = parsed(image_bytes("nucleo-h743zi2", 7)).unwrap();
         let program = program_of(image.bytes());
         assert_eq!(image.is_what_runs(program), Ok(()));
-        // The comparison ignores the words of the second core in bank 2 and the filler bytes before bank 2.
+        // The comparison ignores the program of the second core in bank 2, and the filler bytes before bank 2.
         for gap in [0, 0xFF] {
             let mut longer = image.bytes().to_vec();
             longer.resize(BANK1, gap);

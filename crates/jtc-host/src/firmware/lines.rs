@@ -70,9 +70,9 @@ impl Lines {
         Ok(Preflight { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
     }
 
-    /// Returns the serial line on which the new program is verified. This is the line of the board's ST-LINK. If the
-    /// ST-LINK has no known serial line, it is the line that the user selected. The second value is `true` if the
-    /// line belongs to the drive's USB device, and `None` if this is unknown.
+    /// Returns the serial line on which the new program is verified: the line of the board's ST-LINK, or else the
+    /// line that the user selected. The second value is `true` if the line belongs to the drive's USB device, and
+    /// `None` if this is unknown.
     pub fn proving(&self) -> Option<(&str, Option<bool>)> {
         self.0.first().map(|line| (line.port.as_str(), line.same_device))
     }

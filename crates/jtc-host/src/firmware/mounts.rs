@@ -87,8 +87,8 @@ impl Places {
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
-        // A drive may still be mounted after its USB device was removed. Such a drive is ignored, because its USB
-        // device is not found.
+        // A drive may still be mounted after its USB device was removed. Then no USB device is found for the drive,
+        // and the drive is ignored.
         let here = self.at(&drive.path).ok().filter(|found| connector(found) == own);
         here.or_else(|| {
             own.as_ref()?;
@@ -301,8 +301,9 @@ mod tests {
     #[test]
     fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
         let mut desk = Desk::new();
-        // Two NUCLEO-H743ZI boards are connected, and the operating system has appended the digit 2 to the folder
-        // name of the second drive. This folder name must not be used as the label of the drive.
+        // Two NUCLEO-H743ZI boards are connected. The operating system has appended a 2 to the folder name of the
+        // second drive, because both drives have the same label. This folder name must not be used as the label of
+        // the drive.
         let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
         let drive = desk.places.at(&path).unwrap();
         assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));

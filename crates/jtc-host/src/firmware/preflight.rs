@@ -1,8 +1,9 @@
-//! Check of a board before flashing. The check reads the state of the controller and determines if the controller can be stopped safely.
+//! Check of a board before flashing. The check reads the state of the controller and decides if the controller can be
+//! stopped safely.
 //!
-//! Flashing resets the processor of the board. After the reset, the drives no longer receive frames, and an arm that is held by the drives
-//! falls. Therefore a board is never flashed while its controller reports torque. If the report is incomplete, or may come from another
-//! controller, an operator must confirm the flashing.
+//! Flashing resets the processor of the board. The drives then receive no more frames and switch off their torque,
+//! and a held arm falls. Therefore a board is never flashed while its controller reports torque. If the report is
+//! incomplete, or may come from another controller, an operator must confirm the flashing.
 
 use std::time::Duration;
 
@@ -168,7 +169,7 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
         return silent(session);
     }
     // While the program waited for the operator, old status frames may have accumulated in the receive buffer. The
-    // answer to this request arrives after them, so the status that is read next is current.
+    // answer to this request arrives after these frames, so the next status is current.
     let info = answered(session.info())?.flatten().map(Box::new);
     match answered(session.fresh_status())? {
         Some(status) => Ok(controller(&status, info)),
@@ -257,7 +258,8 @@ pub fn may_flash(
             board: board.clone(),
         });
     }
-    // A running program proves that the board has the core supply of this program. Software cannot read the solder bridges.
+    // A program that already runs on the board proves that the board has the core supply of this program. Software
+    // cannot read the solder bridges that select the supply.
     let mut runs = before.own_info().map(|info| info.board.as_str());
     let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
     let supply_known = !has_two_supplies(board) || runs_this;

@@ -15,8 +15,8 @@ mod before;
 mod lines;
 
 const H745: &str = "nucleo-h745zi-q";
-/// Time limits for tests in which the expected event occurs immediately. `SHORT` contains the limits for tests in which the expected event
-/// never occurs.
+/// Time limits for tests in which the expected event occurs immediately. `SHORT` contains the time limits for tests
+/// in which the awaited event never occurs.
 const LIMITS: Limits = Limits { wait: Duration::from_secs(20), pause: Duration::from_millis(20) };
 const SHORT: Limits = Limits { wait: Duration::from_millis(300), pause: Duration::from_millis(20) };
 
@@ -89,8 +89,8 @@ fn j67_the_program_of_before_may_start_anew_before_it_is_stopped() {
 
 #[test]
 fn a_controller_that_never_has_read_its_flash_is_not_waited_for() {
-    // The clock of this simulated controller does not advance, so the device always appears to have just started. The
-    // program must still stop waiting.
+    // The clock of this simulated controller stands still, so the controller always seems to have just started. The
+    // program must still stop waiting for its flash report.
     let mut asked = 0;
     let port = crate::port::test::ScriptedPort::new(Some(9_600), move |_, bytes| {
         if bytes.is_empty() {
@@ -116,7 +116,8 @@ fn what_fail_txt_says_is_reported() {
     let error = verification.unwrap_err();
     assert!(error.to_string().ends_with("The target flash is write protected"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Device);
-    // The failure text of an earlier attempt is not a report about the next attempt.
+    // The failure text of an earlier attempt stays on the drive. It must not be used as the result of the next
+    // attempt.
     let (drive, new) = (link.drive(), image(H745, 2));
     let written = write_image(&drive, &new, &mut |_| {}).unwrap();
     assert_eq!(written.failure_before.as_deref(), Some("The target flash is write protected"));
@@ -148,7 +149,8 @@ fn a_drive_that_does_not_come_back_is_no_success_where_the_system_is_in_doubt() 
     let drive = link.drive();
     let written = write_image(&drive, &image(H745, 2), &mut |_| {}).unwrap();
     let doubtful = Written { doubt: Some("Input/output error".into()), ..written.clone() };
-    // A drive that never disappears has not accepted the image. A drive that was removed may have accepted the image.
+    // If the drive never disappears, it has not accepted the image. If the drive was removed, it may have accepted
+    // the image.
     let stayed = wait_for_drive(&places(), &drive, &written, SHORT).unwrap_err();
     assert!(stayed.to_string().contains("has not disappeared"), "{stayed}");
     fs::remove_dir_all(&link.path).unwrap();

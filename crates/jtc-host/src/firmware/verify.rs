@@ -14,8 +14,8 @@ use crate::session::{Session, Timeouts};
 
 /// Maximum time that a device needs after its start to read its flash (J-67).
 const READ_WITHIN: Duration = Duration::from_secs(3);
-/// Tolerances for the comparison of a device's clock with the clock of this computer: relative clock error, and
-/// maximum delay until the program notices that the device has started.
+/// Tolerances for the comparison of a device's clock with the clock of this computer: the relative clock error, and
+/// the maximum delay between the start of the device and its detection.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
 
 /// Time after the copying during which the previous program may still run before the ST-LINK stops it.
@@ -106,8 +106,8 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // A failure report from before the copying stays on the drive until the drive disappears. Such a report does
-        // not concern the copied image.
+        // A failure report from before the copying stays on the drive until the drive disappears. It is not about the
+        // new image, so it is ignored.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
@@ -196,9 +196,9 @@ pub fn verify_program(
     }
 }
 
-/// Returns `true` if the ST-LINK has finished, so it will not replace the running program any more. Until then, the
-/// program that answers may be the previous program. The previous program can start again before the ST-LINK writes,
-/// and after a reset without a write.
+/// Returns `true` if the ST-LINK has finished and will not replace the running program any more. Until then, an
+/// answer may come from the previous program, which can restart before the ST-LINK writes or after a reset without a
+/// write.
 fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
     let written = watch.written;
     watch.seen == DriveAfter::CameBack
@@ -206,14 +206,14 @@ fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
         || written.began.elapsed() >= limits.wait
 }
 
-/// Returns `true` if the device certainly started during the last `time`. The result includes the clock tolerances
+/// Returns `true` if the device certainly started during the last `time`, even with the clock tolerances
 /// [`CLOCKS_DIFFER`].
 fn started_since(info: &Info, time: Duration) -> bool {
     let (share, late) = CLOCKS_DIFFER;
     Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
 }
 
-/// Returns `true` if the device has just started and may still be reading its flash.
+/// Returns `true` if the device has just started, so that it may still be reading its flash to compute its report.
 fn still_reads(info: &Info) -> bool {
     info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
 }
@@ -269,8 +269,8 @@ mod tests {
         let since = |uptime_ms, time_s| {
             started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
         };
-        // In the first case, the copying began 10 s ago, and the device started 50 ms earlier. The clock of the
-        // device is 5 % slow, so the device reports about 9.55 s.
+        // First case: the copying began 10 s ago, and the device had started 50 ms before. The clock of the device is
+        // 5 % slow, so it reports about 9.55 s. This must not count as a start after the copying.
         assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
         assert!(since(1_000, 10.0) && since(0, 0.4));
     }

@@ -30,14 +30,14 @@ pub struct Written {
     pub doubt: Option<String>,
 }
 
-/// Copies the image to the drive. `progress` receives the number of bytes copied so far. Does not write if the drive was removed, because
-/// the folder would then be on a disk of this computer.
+/// Copies the image to the drive. `progress` receives the number of bytes copied so far. If the drive was removed,
+/// the function writes nothing, because the folder would then be on a disk of this computer.
 ///
 /// # Errors
 ///
-/// Returns [`FirmwareError::Changed`] or [`FirmwareError::NotOpened`] if no byte was written. Returns [`FirmwareError::DriveFull`] or
-/// [`FirmwareError::NotWritten`] if the copying failed. After a failed copy, the board has the previous program or only a part of a
-/// program.
+/// Returns [`FirmwareError::Changed`] or [`FirmwareError::NotOpened`] if no byte was written. Returns
+/// [`FirmwareError::DriveFull`] or [`FirmwareError::NotWritten`] if the copying failed. The board then has the
+/// previous program or only a part of a program.
 pub fn write_image(
     drive: &Drive,
     image: &Image,
@@ -84,7 +84,8 @@ fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let not_opened =
         |source| FirmwareError::NotOpened { path: path.to_owned(), device: drive.device.clone(), source };
     let file = OpenOptions::new().write(true).create(true).truncate(true).open(path).map_err(not_opened)?;
-    // The drive may have been removed since the first check. An open file always stays on its file system, so no later check is needed.
+    // The drive may have been removed since the first check. From here on no further check is needed, because an open
+    // file always stays on its file system.
     if file.metadata().is_ok_and(|found| !found.is_file() || is_drive(&found)) {
         return Ok(file);
     }

@@ -17,11 +17,11 @@ pub enum Worth {
     Same,
     /// The original controller computed different outputs in this tick.
     Differs,
-    /// The tick was computed while an input was missing. Until the next snapshot, the computed values may differ from the original values.
-    /// The measured values are correct even if an input was missing.
+    /// The tick was computed while an input was missing. Until the next snapshot, the computed values may differ from
+    /// the original values, but the measured values are correct.
     Unsure,
-    /// The tick was not computed, because the arm or the trajectory used at that time is missing. A tick that was not computed contains
-    /// only the measured values.
+    /// The tick was not computed, because the arm or the trajectory that the device used is missing. The tick
+    /// contains only the measured values.
     Measured,
 }
 
@@ -34,16 +34,16 @@ pub struct Tick {
     pub boots: u32,
     /// Computed and measured values of the tick.
     pub sample: Sample,
-    /// Status that the controller would have reported, with the errors of the drives. The status contains only the fields that the replay
-    /// can compute.
+    /// Status that the controller would have reported in this tick, with the errors of the drives. It contains only
+    /// the fields that the replay can compute.
     pub status: Status,
-    /// Inputs of the tick. `None` if the tick is the state in a snapshot.
+    /// Inputs of the tick. `None` if the tick is a state that was read from a snapshot.
     pub inputs: Option<RecordedInputs>,
     /// Reliability of the values of the tick.
     pub worth: Worth,
 }
 
-/// Ticks that are missing in a log.
+/// Range of ticks that are missing in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Gap {
     /// Last tick before the gap.
@@ -76,9 +76,9 @@ pub struct Replayed {
     pub difference: Option<Difference>,
     /// Number of ticks that were computed while an input was missing.
     pub unsure: usize,
-    /// Number of ticks that were recorded with a different arm than the available arm.
+    /// Number of ticks that were recorded with an arm that differs from the arm used for the replay.
     pub other_arm: usize,
-    /// Number of ticks during a trajectory that is not available.
+    /// Number of ticks during a motion along a trajectory that is not available.
     pub other_points: usize,
     /// Gaps in the log.
     pub gaps: Vec<Gap>,

@@ -41,8 +41,8 @@ pub struct Timeline {
 }
 
 impl Event {
-    /// Returns the time from another event to this event, ms. Returns `None` if the other event is later or belongs to another start of the
-    /// device, because the time between two starts is unknown.
+    /// Returns the time from `other` to this event, ms. Returns `None` if `other` is later. Also returns `None` if
+    /// the device was restarted between the two events, because the time between two starts is unknown.
     fn ms_after(&self, other: &Self) -> Option<u64> {
         self.tick.checked_sub(other.tick).filter(|_| self.boots == other.boots)
     }
@@ -97,7 +97,7 @@ impl Timeline {
                 .map_or_else(|| format!("{:.3} s after a later start", event.time_s), after);
             lines.push(format!("{when}: {}", event.text));
         }
-        // The event nearest to the error is listed first. The number of listed events is limited.
+        // The event nearest to the error is listed first, and the number of listed events is limited.
         let ago = self.events[..first].iter().rev().map_while(|event| Some((at.ms_after(event)?, event)));
         let before: Vec<(u64, &Event)> = ago.take_while(|(ms, _)| *ms <= BEFORE_MS).take(BEFORE).collect();
         if !before.is_empty() {
@@ -307,7 +307,8 @@ impl Narrator<'_> {
                 self.push_joint(tick, false, joint, "safety line active");
             }
         }
-        // Error bits of the controller are added only if the tick has no error event of a joint, the bus or an input.
+        // An error event for the error bits of the controller is added only if the tick has no other error event. The
+        // error of a joint, the bus or an input is more specific.
         let begins = tick.sample.errors & !last.sample.errors;
         if begins != 0 && !self.events.iter().rev().any(|event| event.tick == tick.tick && event.error) {
             self.push(tick, true, labels::errors(begins).join(", "));
@@ -346,8 +347,8 @@ impl Narrator<'_> {
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
         let name = labels::joint_errors(bit).first().copied().unwrap_or("an unnamed error");
         let j = joint.index();
-        // In the tick of the error, the controller switches off the torque and deletes the commanded value. Therefore the function also
-        // uses the previous tick.
+        // In the tick of the error, the controller switches off the torque and deletes the commanded value. Therefore
+        // the function uses the larger of two values: in this tick and in the previous tick.
         let larger = |value: fn(&JointSample) -> f64| {
             let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];
             if values[1].abs() > values[0].abs() { values[1] } else { values[0] }
@@ -390,8 +391,8 @@ fn computed(s: &JointSample) -> f64 {
 mod tests {
     use super::*;
 
-    /// A damaged log can contain two starts of the device. The times between events of two starts are unknown, so only the events of the
-    /// start with the error get a delay.
+    /// A damaged log can contain two starts of the device. The time between the two starts is unknown, so only events
+    /// after the same start as the error get a delay.
     #[test]
     fn j56_events_of_two_starts_are_listed_without_a_delay_between_them() {
         let event = |boots, tick: u64, error| Event {

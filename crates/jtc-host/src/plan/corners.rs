@@ -103,7 +103,8 @@ mod tests {
         Planner { blend, jerk: false, ..Planner::new(&config) }.through(&waypoints)
     }
 
-    /// Returns a corner between two segments of the same length. In each segment, only one joint moves.
+    /// Returns three waypoints with a corner at the second. Both segments have the length `length`, and only one
+    /// joint moves in each segment.
     fn corner(length: f64) -> [[f64; JOINTS]; 3] {
         [[0.0; JOINTS], [length, 0.0, 0.0, 0.0, 0.0, 0.0], [length, length, 0.0, 0.0, 0.0, 0.0]]
     }
@@ -158,7 +159,8 @@ mod tests {
         let there_and_back = [a, b, c, b, a, b, c, a, b, c, a, b];
         let note = cut(&there_and_back, 0.2).unwrap();
         assert!(note.contains("waypoints 2, 4, 6 and "), "{note}");
-        // A straight continuation and a reversal with a stop are not corners.
+        // A straight continuation and a reversal, at which the arm stops, are not corners. Therefore the function
+        // returns no note.
         let [straight, back] = [[a, b, b.map(|q| 2.0 * q)], [a, b, a]];
         assert_eq!((cut(&straight, 0.2), cut(&back, 0.2)), (None, None));
     }

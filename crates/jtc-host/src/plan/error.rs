@@ -40,7 +40,7 @@ pub enum PlanError {
         /// Requested torque margin, % of each torque limit.
         percent: f64,
     },
-    /// The blend is too large, so it is probably in a wrong unit.
+    /// The blend is too large. Its unit is probably wrong.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
     Blend {
         /// Requested blend.

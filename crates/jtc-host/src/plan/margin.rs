@@ -22,8 +22,8 @@ use crate::trajectory::Trajectory;
 pub const MARGIN_PCT: f64 = 15.0;
 /// Largest valid torque margin, % of each torque limit.
 pub const MARGIN_PCT_MAX: f64 = 100.0 * jtc_plan::MARGIN_MAX;
-/// Largest difference between the requested and the actual torque margin that is not reported, % of the limit. If the
-/// difference is larger, a note reports the actual margin.
+/// Difference (% of the limit) between the requested and the actual torque margin up to which no note is needed. If
+/// the difference is larger, a note reports the actual margin.
 const SHORT_PCT: f64 = 0.1;
 /// Relative rounding error up to which a torque counts as within the limit.
 const ROUNDING: f64 = 1e-9;
@@ -95,7 +95,8 @@ pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics
             if torque[j].abs() <= usable * (1.0 + ROUNDING) {
                 continue;
             }
-            // `still` is the torque that a slower motion does not reduce: the gravity torque and nearly all of the friction.
+            // `still` is the part of the torque that a slower motion does not reduce: the gravity torque and nearly
+            // all of the friction torque.
             let still = (slow[j] * torque[j].signum()).min(torque[j].abs());
             let (needed, left) = (torque[j].abs() - still, usable - still);
             let stretch = if left > 0.0 { (needed / left).sqrt() } else { f64::INFINITY };

@@ -91,8 +91,8 @@ mod tests {
             assert!(verdict.is_ok(), "{from_ms}: {verdict}");
             for ms in (0..(rest.duration_s() * 1e3) as u32).step_by(7) {
                 let at = rest.at_ms(ms).unwrap().position;
-                // The test searches for the nearest position of the path, at any path time. It checks that the motion
-                // stays on the path, and ignores when the arm reaches a position.
+                // The test searches for the nearest position of the original path at any time. Only the path must be
+                // the same: the remainder reaches each position at another time.
                 let aside = (from_ms.saturating_sub(5)..=10_000)
                     .map(|k| near(&at, &whole.at_ms(k).unwrap().position));
                 let aside = aside.fold(f64::INFINITY, f64::min);

@@ -35,7 +35,8 @@ impl Planner<'_> {
         if share < 1.0 {
             planned.trajectory = at_speed(&planned.trajectory, (100.0 * share).max(1.0))?;
             planned.waypoint_times.iter_mut().for_each(|t| *t /= share);
-            // The new motion was slowed down to the duration of the original motion, so no limit determines its speed.
+            // No limit determines the speed of the new motion, because it was slowed down to the duration of the
+            // original motion.
             planned.binding.clear();
         }
         Ok(planned)

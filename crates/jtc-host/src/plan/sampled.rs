@@ -6,7 +6,8 @@ use jtc_plan::{Motion, State};
 use super::{PlanError, STEP_MS};
 use crate::trajectory::{Point, Trajectory};
 
-/// Minimum number of steps of a trajectory, unless the steps would be too short.
+/// Minimum number of steps of a trajectory. A very short motion has fewer steps, so that no step is shorter than
+/// [`STEP_MIN_MS`].
 const STEPS_MIN: f64 = 20.0;
 /// Shortest step of a trajectory, ms. In a shorter step, a position would change by less than its rounding.
 const STEP_MIN_MS: f64 = 2.0;
@@ -14,9 +15,9 @@ const STEP_MIN_MS: f64 = 2.0;
 const STEP_MAX_MS: f64 = 1000.0;
 /// Maximum deviation of a trajectory from the motion between two points, rad.
 const ASIDE: f64 = 1e-3;
-/// Minimum number of points for each sharp corner. With fewer points, the trajectory deviates more from the motion. A
-/// corner is sharp under two conditions: its change of direction exceeds `CORNER_TURN` (a share of the path length),
-/// and its segments are longer than `CORNER_LEG` (rad).
+/// Minimum number of points for each sharp corner. With fewer points, the trajectory deviates more from the motion.
+/// At a sharp corner, both segments are longer than `CORNER_LEG` (rad). In addition, the unit directions of the
+/// segments differ by more than `CORNER_TURN` in at least one joint.
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;
@@ -42,10 +43,10 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     if step <= STEP_MAX_MS { Ok(step as u16) } else { Err(PlanError::TooLong { seconds }) }
 }
 
-/// Converts the motion into a trajectory after the duration of the motion is multiplied by `stretch`. A trajectory has a whole number of
-/// steps, so the motion is slowed down further to fill the last step. If `kept` is `true`, the motion is not slowed down further, and the
-/// arm is at rest until the end of the last step. The first point of the trajectory is `first`, and the last point is exactly the end of
-/// the motion.
+/// Converts the motion into a trajectory. The duration of the motion is first multiplied by `stretch`. A trajectory
+/// has a whole number of steps, so the motion is slowed down further until it fills the last step. If `kept` is
+/// `true`, the motion is not slowed down further, and the arm rests until the end of the last step. The first point
+/// of the trajectory is `first`, and the last point is exactly the end of the motion.
 ///
 /// # Errors
 ///
@@ -65,8 +66,8 @@ pub(super) fn sampled(
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // The first and the last point are exactly the requested positions. If the acceleration jumps at the start, its
-    // values before and after the jump are both correct. Therefore the acceleration is not changed.
+    // The first point is exactly the requested position, at rest. If the acceleration jumps at the start, the values
+    // before and after the jump are both correct, so the acceleration is not changed.
     if let Some(point) = points.first_mut() {
         (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }

@@ -31,8 +31,8 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     if (step - step.round()).abs() < 1e-9 && (1.0..=1000.0).contains(&step) {
         return Ok(Trajectory { step_ms: step.round() as u16, points: own.iter().map(slower).collect() });
     }
-    // The new time step would not be a whole number of milliseconds, or would be outside 1 to 1000 ms. Therefore each
-    // channel (position, velocity, acceleration) is resampled from its own samples (J-32).
+    // The new time step would not be a whole number of milliseconds, or would be outside 1 to 1000 ms. Therefore
+    // positions, velocities and accelerations are interpolated (J-32) at the points of another time step.
     let seconds = trajectory.duration_s() / s;
     let step_ms = f64::from(STEP_MS).max((seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil());
     if step_ms > 1000.0 {
@@ -52,9 +52,9 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     Ok(Trajectory { step_ms: step_ms as u16, points: points.collect() })
 }
 
-/// Returns the setpoint (position, velocity, acceleration) between two points, for resampling. In some files the
-/// velocities differ from the speed of the positions by more than rounding, for example because all velocities are 0.
-/// In this case, the derivatives of the position replace the velocity and the acceleration.
+/// Returns the setpoint (position, velocity, acceleration) between two points, for resampling. In some files, the
+/// velocities contradict the positions by more than rounding, for example because all velocities are 0. Then the
+/// velocity and the acceleration are derived from the positions.
 fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     // The acceleration is computed from the speeds at two times, 0.0005 of the interval before and after `u`. This distance is precise
     // enough for a polynomial, and both times stay inside the interval.

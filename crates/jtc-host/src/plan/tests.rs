@@ -133,7 +133,7 @@ fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(points.last().unwrap().position, t.points[0].position);
     // The arm is outside its limits by more than the start tolerance, so no approach is possible. Only a jog can move
-    // the arm back.
+    // the arm back inside the limits.
     assert!(order.start(1, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0]).is_err());
 }
 
@@ -171,7 +171,8 @@ fn any_length_fits_or_is_refused() {
     assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
 }
 
-/// The planner respects the times of waypoints, or returns an error with the shortest possible time.
+/// The motion passes each waypoint at the given time. If this is impossible, the planner returns an error with the
+/// shortest possible time.
 #[test]
 fn given_times_are_kept_or_refused() {
     let config = Config::avena();
@@ -221,8 +222,8 @@ fn a_pose_that_can_be_held_can_be_left() {
     assert!(masses > 0);
 }
 
-/// The error contains the waypoint at which the drives cannot hold the arm, and the necessary torque. The error also contains the share of
-/// the limit that may be used to hold the arm.
+/// With a payload that is too heavy, the error contains the waypoint at which the drives cannot hold the arm. It also
+/// contains the necessary torque, and the share of the limit that may be used to hold the arm.
 #[test]
 fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let error = lowered_with(8.0).unwrap_err();
@@ -251,9 +252,9 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// A motion that takes too long even at the highest speed is rejected at once, before the planner checks that the
-/// drives can hold the arm in the last pose. If the same waypoints are in degrees, the planner reports a position
-/// outside the limits instead.
+/// A motion that takes too long even at the highest speed is rejected at once. The planner does not first check that
+/// the drives can hold the arm in the last pose. If the positions of the same waypoints are in degrees, the planner
+/// reports a position outside the limits instead.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();
@@ -275,7 +276,8 @@ fn too_long_a_way_is_refused_at_once() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// The lower bound of the duration never exceeds the duration of the plan, even if most waypoints are inside a blend.
+    /// The lower bound of the duration never exceeds the duration of the plan, even if most waypoints are nearer to
+    /// each other than the blend.
     #[test]
     fn no_plan_is_shorter_than_the_least_time(places in prop::collection::vec(pose(), 2..20), dense: bool, blend in 0.0..BLEND_MAX, speed in 20.0..100.0f64) {
         let config = Config::avena();

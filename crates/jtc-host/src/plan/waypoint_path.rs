@@ -11,7 +11,8 @@ const ASIDE_M: f64 = 5e-4;
 /// Options for the path through waypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WayOptions {
-    /// `true` if the flange moves along a straight line in each segment for which the file does not specify the motion.
+    /// `true` if the flange moves along a straight line in each segment for which the file does not specify another
+    /// motion.
     pub line: bool,
     /// Size of a rounded corner, rad. The path leaves the straight segments only within this distance from the
     /// waypoint. The distance is that of the joint that is furthest from the waypoint. If `blend` is 0, the arm stops
@@ -48,8 +49,9 @@ impl<'a> WaypointPath<'a> {
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop at a waypoint is always within the blend. At a sharp corner, a stop may be faster than a small
-            // rounding. Therefore the planner gets one route with rounded corners and one route with stops.
+            // A path that stops at a waypoint always respects the blend, and at a sharp corner a stop may be faster
+            // than a small rounding. Therefore the planner gets two routes, one with rounded corners and one with
+            // stops, and uses the faster route.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
         } else {
@@ -89,8 +91,8 @@ impl<'a> WaypointPath<'a> {
     /// Returns the largest deviation of the flange from the straight line between two poses of the flange. Returns `None` if the deviation
     /// is smaller than 0.5 mm.
     pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
-        // With the option `line`, the user has explicitly selected joint space for each segment that is not a line.
-        // Therefore no deviation is reported for these segments.
+        // With the option `line`, each segment in joint space was explicitly requested by the user. Therefore no
+        // deviation from a straight line is reported.
         let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
         furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
     }

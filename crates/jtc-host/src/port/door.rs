@@ -18,7 +18,8 @@ use super::runtime;
 
 /// Maximum number of client programs that a door (control socket) serves at the same time.
 const ASKERS: usize = 8;
-/// Interval at which the door's thread checks if the door was closed. A new connection wakes the thread earlier.
+/// Interval at which the door's thread checks if the door was closed. A new connection wakes the thread before the
+/// interval ends.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 /// Pause after an attempt to accept a connection has failed.
 const RETRY: Duration = Duration::from_millis(20);
@@ -78,9 +79,9 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// Creates the socket at `path`. Replaces a socket file that a killed program has left. Returns an error if a running
-/// program still serves the socket. This can happen only to a program of the superuser, because only the superuser
-/// can open a port that is already open.
+/// Creates the socket at `path`. Replaces a socket file that a killed program has left. Returns an error if another
+/// running program serves the socket. This is possible only for the superuser, who can open a port that is already
+/// open.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());
@@ -104,7 +105,8 @@ fn serve(listener: &UnixListener, line: &Line) {
                 Ok((stream, _)) => stream,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
                 Err(_) => {
-                    // The cause may be too many open files. Without a pause, the next accept would fail with the same error.
+                    // A failed accept may be caused by too many open files. Without a pause, the next attempts would
+                    // fail at once with the same error.
                     std::thread::sleep(RETRY);
                     continue;
                 }
@@ -153,7 +155,7 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     let answer = Answer::of(line.path.clone(), line.baud, done);
     write_line(stream, &answer)?;
     if !answer.confirmed {
-        // The answer already tells the client about the failure, so the client does not wait for a final message.
+        // The answer already reports that the controller did not confirm the frame, so no final message follows.
         return Ok(());
     }
     let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };

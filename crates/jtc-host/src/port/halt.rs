@@ -28,8 +28,8 @@ pub(super) const REQUEST_MAX: usize = 1024;
 const ANSWER_MAX: usize = 4096;
 /// Maximum size of a final message, bytes.
 pub(super) const END_MAX: usize = 1024;
-/// Timeout for the answer of the program that holds the port. The timeout is longer than the time in which the holder of the port writes a
-/// Stop eight times.
+/// Timeout for the answer of the program that holds the port. This program may write a Stop up to eight times before
+/// it answers, so the timeout is longer than eight writes.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Timeout for the final message. The timeout is longer than the time in which an arm comes to rest after a Stop.
 const REST: Duration = Duration::from_secs(6);
@@ -102,7 +102,8 @@ pub struct End {
     /// Trajectory execution state.
     #[serde(default)]
     pub trajectory: String,
-    /// `true` if the arm is in a held stop. During a held stop, a joint that still moves either yields to a push or lowers its load.
+    /// `true` if the arm is in a held stop. If a joint still moves during a held stop, it yields to a push or lowers
+    /// a load that it cannot hold.
     #[serde(default)]
     pub held_stop: bool,
 }
@@ -296,7 +297,8 @@ pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option
         let holder = format!("{} (process {})", answer.program, answer.pid);
         return Err(PortError::NotHalted { path: answer.port, holder, what: answer.error });
     }
-    // A missing final message is not an error. The Stop can cause the other program to exit before the arm is at rest.
+    // A missing final message is not an error: the other program may exit because of the Stop, before the arm is at
+    // rest.
     let end = stream.set_read_timeout(Some(REST)).and_then(|()| read_line(&stream, END_MAX)).ok();
     Ok(Some((answer, end)))
 }
@@ -342,7 +344,8 @@ mod tests {
         assert_eq!((peer(&one), peer(&other)), (Some(own), Some(own)));
     }
 
-    /// The message tells the user to wait, because the emergency stop would drop an arm that is lowering its load.
+    /// If the arm still moves in a held stop, the message tells the user to wait. An emergency stop would drop an arm
+    /// that is lowering its load.
     #[test]
     fn j70_an_arm_that_still_moves_in_a_held_stop_is_waited_for() {
         let standstill = Standstill::after(Halt::Stop);

@@ -23,28 +23,31 @@ use super::{Halts, PortError, line_time};
 
 /// Timeout for a write if the line accepts no byte.
 const STALL: Duration = Duration::from_secs(5);
-/// Maximum number of bytes per write. A small number of bytes per write limits the delay until a stalled line is detected, and the delay of
-/// a Stop.
+/// Maximum number of bytes per write. Small writes shorten two delays: until a stalled line is detected, and until a
+/// Stop can be written.
 const CHUNK: usize = 256;
-/// Gap on the line after an abandoned frame. The gap is the 5 ms of J-03 plus a reserve, because some adapters shorten gaps.
+/// Gap on the line after a frame that was not completed. The controller needs a gap of 5 ms (J-03). The rest is a
+/// reserve, because some adapters shorten gaps.
 const GAP: Duration = Duration::from_millis(8);
-/// Maximum time between two pieces of one frame. A piece that is written later starts a new frame.
+/// Maximum time between two pieces of one frame. If more time has passed, the next bytes count as a new frame.
 const PIECE: Duration = Duration::from_millis(50);
 /// Timeout for the response record of a Stop, in addition to the transmission time of three status frames.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Maximum number of times that a Stop is written. If the controller does not confirm any of these Stops, the Stop has failed.
+/// Maximum number of times that a Stop is written. If the controller confirms none of them, the Stop has failed.
 const TRIES: u32 = 8;
 /// Timeout for the response record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
-/// Time after another program's Stop in which motion requests are rejected. An agent rejects motion requests for the same duration.
+/// After a Stop of another program, motion requests are rejected for this time. An agent rejects motion requests for
+/// the same time.
 const CALM: Duration = Duration::from_secs(3);
-/// Maximum age at which a status or a jog still describes the current state of the arm.
+/// Maximum age of a status or a jog. Older ones do not describe the current state of the arm.
 const RECENT: Duration = Duration::from_millis(300);
-/// Interval at which a Stop or the end of teaching is repeated, until the status frames show the effect.
+/// Interval at which a frame is repeated until the status frames show its effect. The repeated frames are Stops and
+/// the frames that end teaching.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Maximum time in which an arm comes to rest after a Stop.
 const REST: Duration = Duration::from_secs(5);
-/// Maximum number of received bytes in the buffer while the port owner does not read.
+/// Maximum number of received bytes that are stored while the port owner does not read.
 const KEPT: usize = 1 << 16;
 
 /// Result of a Stop or Pause from another program.
@@ -67,11 +70,11 @@ pub(super) struct Line {
     /// Number of Stops that wait for access to the output. These Stops are written before the next piece of the port
     /// owner's frame.
     urgent: AtomicUsize,
-    /// Number of Stops and Pauses of other programs together. `stops` counts only the Stops. Both numbers change
-    /// together with `Output::halted`.
+    /// Number of Stops and Pauses of other programs. `stops` counts only the Stops. Both numbers change together with
+    /// `Output::halted`.
     halts: AtomicU64,
     stops: AtomicU64,
-    /// Lock that is held until a Stop is written and confirmed. Therefore Stops are executed one after the other.
+    /// Lock that is held until a Stop is written and confirmed, so that only one Stop is executed at a time.
     turn: Mutex<()>,
     input: Mutex<Input>,
     seen: Mutex<Seen>,
@@ -88,7 +91,8 @@ struct Output {
     free_at: Instant,
     /// `true` if the current frame was aborted because of a Stop.
     given_up: bool,
-    /// Last Stop or Pause from another program. The next motion request of the port owner removes this entry.
+    /// Last Stop or Pause from another program. It blocks motion frames until the next motion request of the port
+    /// owner.
     halted: Option<Halted>,
     /// Time of the last jog that the port owner sent.
     jogged: Option<Instant>,
@@ -108,19 +112,19 @@ struct Input {
     pending: VecDeque<u8>,
 }
 
-/// Data from all received status frames. Either the thread of the port owner or the thread of the door has read these
-/// frames.
+/// Data from all received status frames. The frames are read by the thread of the port owner, or by the thread of the
+/// door.
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
-    /// Time at which the last status of a moving arm was read.
+    /// Time at which the last status that showed a moving arm was read.
     moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
-    /// `true` if the port owner has switched on teaching and no later response record has confirmed that teaching is
-    /// off.
+    /// `true` if the port owner has switched on teaching, and no response record has confirmed since then that
+    /// teaching is off.
     teaching: bool,
-    /// Execute, Pause and Stop frames without a response record so far, oldest first. Frames that the door wrote have
+    /// Execute, Pause and Stop frames that have no response record yet, oldest first. A frame that the door wrote has
     /// a number.
     written: VecDeque<(Instant, Option<u64>)>,
     numbers: u64,
@@ -225,8 +229,8 @@ impl Line {
     }
 
     /// Permits the frames of a motion. `after` is the number of Stops and Pauses at the time of the motion request.
-    /// The frames stay blocked if another Stop or Pause has arrived since the request, or if the last one is less
-    /// than 3 s old.
+    /// The frames stay blocked in two cases: another Stop or Pause has arrived since the request, or the last one is
+    /// less than 3 s old.
     pub(super) fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }
@@ -256,8 +260,8 @@ impl Line {
     }
 
     /// Writes the Stop or Pause of another program, and repeats the frame until the controller has received it.
-    /// Returns `None` if the controller does not confirm the command. A program that closes the port waits until
-    /// `halt` has ended, because the Stop may be the reason for closing the port.
+    /// Returns `None` if the controller does not confirm the command. A program that closes the port waits for this
+    /// function, because the Stop may be the reason why the program ends.
     pub(super) fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
             // No Pause is written after a Stop, because a stopped motion cannot be paused.
@@ -271,7 +275,7 @@ impl Line {
 
     fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
-        // First, the line blocks all frames of the port owner that move the arm.
+        // The frames of the port owner that move the arm are blocked first.
         self.urgently(|output| {
             if halt == Halt::Pause && output.is_stopped() {
                 return Err(output.refusal());
@@ -303,8 +307,8 @@ impl Line {
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            // If the port owner has not read for some time, the first status frames that arrive here are old.
-            // Therefore earlier signs of a motion also count.
+            // After a time in which the port owner did not read, the first status frames are old and may not show the
+            // motion. Therefore the motion that earlier status frames showed also counts.
             moved: moved || taught || self.moved_since(begin),
             status,
         }))
@@ -324,12 +328,13 @@ impl Line {
             {
                 if halt == Halt::Stop && written_at.elapsed() >= AGAIN {
                     written_at = Instant::now();
-                    // A write error is ignored here. If the line does not accept bytes, the status frames show that the arm is not at rest.
+                    // A write error is ignored here: if the frame does not arrive, the status frames show that the
+                    // arm is not at rest.
                     let _ = self.insist(&status);
                 }
                 standstill.see(at.duration_since(self.start), &status);
-                // Teaching that was requested earlier may begin as soon as the arm is at rest. Until this teaching
-                // has been ended, the arm is not considered at rest.
+                // Teaching that was requested before the Stop may begin as soon as the arm is at rest. The arm does
+                // not count as at rest until the end of this teaching is confirmed.
                 if lock(&self.seen).teaching && halt == Halt::Stop {
                     standstill.begin_again();
                 }
@@ -343,8 +348,8 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// Repeats the frames of a Stop whose effect the status frames do not show yet. If teaching is still on or may
-    /// still begin, the function ends teaching again. If a Pause of another sender arrived after the Stop, the
+    /// Repeats the frames of a Stop that has not yet taken full effect according to the status frames. If teaching is
+    /// on or may still begin, the function ends teaching again. If another sender's Pause arrived after the Stop, the
     /// function sends the Stop again.
     fn insist(&self, status: &Status) -> Result<(), PortError> {
         if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
@@ -449,8 +454,8 @@ impl Line {
             || is(FrameType::TeachingModeEnable)
             // An upload prepares a motion, so upload frames are checked like frames that move the arm.
             || is(FrameType::Trajectory);
-        // While an older controller decelerates after a Stop, it accepts a Pause, and the motion could be resumed
-        // afterwards. Therefore a Pause is rejected after a Stop.
+        // While an older controller decelerates after a Stop, it still accepts a Pause. The motion could then be
+        // resumed, although it was stopped. Therefore a Pause is rejected after a Stop.
         let weakens = bytes == fixed::PAUSE && output.is_stopped();
         if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());
@@ -494,8 +499,8 @@ impl Line {
         work(&mut lock(&self.output))
     }
 
-    /// Waits until all pending Stops are written. The wait is necessary because a mutex does not guarantee the order of the threads. The
-    /// transmission of a Stop takes only a short time.
+    /// Waits until all pending Stops are written. A mutex alone does not guarantee that a Stop gets access before the
+    /// next piece of a frame. The transmission of a Stop takes only a short time.
     fn let_urgent_pass(&self) {
         let end = Instant::now() + STALL;
         while self.urgent.load(Ordering::SeqCst) > 0 && Instant::now() < end {
@@ -567,7 +572,7 @@ impl Seen {
         }
     }
 
-    /// Removes the frames whose response record is overdue, and old response records that no thread has read.
+    /// Removes frames whose response record is overdue, and response records that no thread has fetched.
     fn forget(&mut self) {
         self.written.retain(|(at, _)| at.elapsed() < RECORD_TIME);
         let excess = self.answered.len().saturating_sub(16);

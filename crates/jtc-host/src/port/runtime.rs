@@ -23,8 +23,9 @@ pub fn folders() -> Vec<PathBuf> {
     all.into_iter().filter(|folder| is_own(folder)).collect()
 }
 
-/// Returns the folders for these values of the environment variables. If a program has an unusual runtime folder, it
-/// uses only this folder and the folder for temporary files. Therefore the program is isolated from other programs.
+/// Returns the folders for these values of the environment variables. With an unusual runtime folder, the list
+/// contains only this folder and the folder for temporary files. A program can be isolated from other programs in
+/// this way.
 fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
     let user = name.trim_start_matches("openjtc-");
     let usual = Path::new("/run/user").join(user);
@@ -112,7 +113,7 @@ mod tests {
         assert_eq!(all(Some("/run/user/1000"), "/tmp"), [runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000/"), "/tmp"), [runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000"), "/y"), [runtime, "/y/openjtc-1000", tmp]);
-        // An unusual runtime folder isolates the programs that use it.
+        // With an unusual runtime folder, the usual runtime folder is not searched.
         assert_eq!(all(Some("/z"), "/y"), ["/z/openjtc", "/y/openjtc-1000"]);
         assert_eq!(all(Some("/run/user/0"), "/tmp"), ["/run/user/0/openjtc", tmp]);
     }

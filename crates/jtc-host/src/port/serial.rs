@@ -48,11 +48,12 @@ impl SerialPort {
     ///
     /// Returns the errors of [`SerialPort::open`].
     pub fn open_without_door(path: &str, baud: u32) -> Result<Self, PortError> {
-        // The builder reports a missing port in several ways, so the file system is checked first.
+        // For a missing port, the library `serialport` returns several different errors. Therefore the file system is
+        // checked first.
         if cfg!(unix) && !std::path::Path::new(path).exists() {
             return Err(PortError::NotFound { path: path.to_owned() });
         }
-        // For a regular file, the operating system would report "not a typewriter".
+        // If the path is a regular file, the operating system would only report "not a typewriter".
         #[cfg(unix)]
         if std::fs::metadata(path).is_ok_and(|m| !m.file_type().is_char_device()) {
             return Err(PortError::NoPort { path: path.to_owned() });
@@ -80,7 +81,7 @@ fn opening(path: &str, baud: u32, error: serialport::Error) -> PortError {
         serialport::ErrorKind::NoDevice if error.description.contains("busy") => {
             PortError::Busy { path: named }
         }
-        // If another program has opened the port in shared mode, the lock of that program causes the error "try again".
+        // If another program has opened the port in shared mode, its lock causes the error "try again" here.
         serialport::ErrorKind::Io(io::ErrorKind::WouldBlock) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice if cfg!(unix) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice => PortError::NotFound { path: named },

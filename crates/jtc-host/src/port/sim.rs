@@ -81,8 +81,8 @@ impl Port for SimPort {
     }
 }
 
-/// Longest lag behind real time that the simulation catches up. A longer lag, for example after the computer was
-/// suspended, is skipped completely.
+/// Longest delay behind real time that the simulation makes up for. A longer delay, for example after the computer
+/// was suspended, is skipped completely.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
 /// Port to a simulated world that runs in real time, like a real controller.

@@ -54,8 +54,8 @@ impl Standstill {
         self.reached = now.saturating_sub(since) >= STILL;
     }
 
-    /// Returns `true` if a Stop has not yet taken full effect. After a Stop, the arm must hold its position, and
-    /// there must be no motion that can be resumed.
+    /// Returns `true` if a Stop has not yet taken full effect: the arm is still in teaching, or a motion can still be
+    /// resumed.
     fn is_incomplete(&self, status: &Status) -> bool {
         self.halt == Halt::Stop && (status.state == ControllerState::Teaching || is_paused(status))
     }
@@ -88,7 +88,8 @@ mod tests {
         status
     }
 
-    /// Evaluates one status every 50 ms for one second. Returns `true` if the arm is at rest at the end.
+    /// Evaluates one status every 50 ms for one second. Returns `true` if the arm counts as at rest after this
+    /// second.
     fn stands_after(halt: Halt, statuses: impl Fn(u32) -> Status) -> bool {
         let mut standstill = Standstill::after(halt);
         (0..20).for_each(|i| standstill.see(Duration::from_millis(50) * i, &statuses(i)));
@@ -104,8 +105,8 @@ mod tests {
                 let reached = stands_after(Halt::Stop, |_| status(state, velocity));
                 assert_eq!(reached, stands, "{state:?} {velocity}");
             }
-            // The joint swings: its speed is 0.1 rad/s in every fourth status, and 0 in the others. The arm is not
-            // considered at rest.
+            // A joint oscillates: its speed is 0.1 rad/s in every fourth status, and 0 in the others. The arm must
+            // not count as at rest.
             let swings = |i: u32| status(state, if i % 4 == 3 { 0.1 } else { 0.0 });
             assert!(!stands_after(Halt::Stop, swings), "{state:?}");
         }
@@ -121,7 +122,8 @@ mod tests {
             assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state:?}");
             assert!(stands_after(Halt::Pause, |_| paused(state)), "{state:?}");
         }
-        // Without torque, a paused motion cannot be resumed, so the arm is considered at rest.
+        // Without torque, a paused motion cannot be resumed. Therefore the pause does not prevent that the arm counts
+        // as at rest.
         assert!(stands_after(Halt::Stop, |_| paused(Error)));
     }
 }

@@ -10,7 +10,7 @@ pub(super) struct Encoder {
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 impl Encoder {
-    /// Begins a new message in the memory of the previous message.
+    /// Begins a new message and reuses the memory of the previous message.
     pub(super) fn start(&mut self) -> &mut Self {
         self.bytes.clear();
         self.bytes.extend(HEADER);

@@ -1,6 +1,6 @@
-//! CSV files with a header that contains the units, followed by one row per sample. An unknown value is an empty field. If a run did not
-//! finish, comment lines that begin with `#` report how the run ended. The comment lines are after all rows, so that a reader without
-//! support for comments can still read the whole table.
+//! CSV files with a header that contains the units, followed by one row per sample. An unknown value is an empty
+//! field. If a run did not finish, comment lines that begin with `#` report how the run ended. These lines follow
+//! after all rows, so a reader that does not know comments can still read the whole table.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
@@ -107,8 +107,8 @@ impl<W: Write + Send> Writer for CsvWriter<W> {
     }
 }
 
-/// Formats a number with nine decimals. The resolution of 1 nrad is much finer than the resolution of any sensor. A number with nine
-/// decimals needs half the space of a number with all digits.
+/// Formats a number with nine decimals. Its resolution of 1 nrad is much finer than that of any sensor. The text is
+/// half as long as with all digits of the number.
 fn number(row: &mut String, value: f64) {
     use std::fmt::Write as _;
     if value.is_finite() {
@@ -186,8 +186,9 @@ fn whole<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// Parses a number like [`str::parse`], but faster for short numbers such as the numbers that this program writes. If the digits and the
-/// power of ten are exact as floats, only the quotient is rounded. The result is therefore correctly rounded (Clinger 1990).
+/// Parses a number like [`str::parse`], but faster for short numbers such as those that this program writes. The
+/// digits and the power of ten are exact as floats, so only their quotient is rounded. Therefore the result is
+/// correctly rounded (Clinger 1990).
 fn decimal(field: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];

@@ -8,7 +8,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 /// Reason why a recording could not be written or read.
 #[derive(Debug)]
 pub enum RecordingError {
-    /// The extension of the file name is neither `.mcap` nor `.csv`.
+    /// The file name has neither the extension `.mcap` nor the extension `.csv`.
     UnknownFormat {
         /// The file.
         path: PathBuf,

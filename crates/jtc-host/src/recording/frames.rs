@@ -67,9 +67,9 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// Writes the message with the transforms of a sample. Writes nothing if all positions are unknown, or if a
-    /// message was already written in the same interval ([`EVERY_NS`]). The message does not contain joints whose
-    /// position is unknown.
+    /// Writes the message with the transforms of a sample. A joint whose position is unknown is left out. Writes
+    /// nothing if all positions are unknown, or if a message was already written in the same interval of
+    /// [`EVERY_NS`].
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,

@@ -86,7 +86,7 @@ pub struct RecordingInfo {
     pub arm: String,
     /// Source of the samples: "simulator", or the name of the serial port.
     pub source: String,
-    /// Client that commanded the motion, if several clients share the line. With a single client, the field is empty.
+    /// Name of the client that commanded the motion, if several clients share the line; otherwise empty.
     pub commanded_by: String,
     /// Name of the trajectory.
     pub trajectory: String,
@@ -111,8 +111,8 @@ pub struct RecordingInfo {
     pub commanded: Option<Arc<Trajectory>>,
     /// Number of runs that the user requested, including the first run; only in MCAP files. `None` if the number was not recorded.
     pub runs: Option<u32>,
-    /// Trajectory of all runs except the first run, if it differs from `commanded`. A different trajectory means that the first run was the
-    /// remainder of an interrupted run.
+    /// Trajectory of all runs after the first run, if it differs from `commanded`. In this case, the first run was
+    /// the remainder of an interrupted run.
     pub then: Option<Arc<Trajectory>>,
 }
 

@@ -13,8 +13,8 @@ use crate::sample::Sample;
 
 /// Maximum delay until recorded samples are passed to the operating system.
 pub const FLUSH: Duration = Duration::from_millis(200);
-/// Maximum number of samples that wait to be written to the disk. 16,384 samples correspond to 16 s with a simulator, or to many minutes on
-/// a serial line.
+/// Maximum number of samples that are in memory before they are written to the disk. 16,384 samples correspond to 16
+/// s with a simulator, or to many minutes on a serial line.
 const WAITING_MAX: usize = 1 << 14;
 
 enum Message {
@@ -28,7 +28,8 @@ enum Message {
 pub struct SampleSink(SyncSender<Message>);
 
 impl SampleSink {
-    /// Passes a sample to the recorder. After an error, which the recorder has already reported, further samples are ignored.
+    /// Passes a sample to the recorder. After a write error, which the recorder has already reported, samples are
+    /// ignored.
     pub fn write(&self, sample: &Sample) {
         let _ = self.0.send(Message::Sample(Box::new(*sample)));
     }
@@ -41,8 +42,8 @@ pub struct LiveRecorder {
 }
 
 impl LiveRecorder {
-    /// Begins the recording in `file` and writes the header to the disk. Therefore this function returns an error if the disk is full. The
-    /// extension of `path` selects the format. If writing fails, the writing thread calls `on_error` once.
+    /// Begins the recording in `file` and writes the header to the disk, so a full disk causes an error at once. The
+    /// extension of `path` selects the format. If writing fails later, the writing thread calls `on_error` once.
     pub fn begin(
         file: File,
         path: &Path,
@@ -121,8 +122,8 @@ mod tests {
         }
     }
 
-    /// The test does not complete the recording. As after `kill -9`, the file contains only the data that were passed
-    /// to the operating system.
+    /// The test reads the file before the recording is completed. As after `kill -9`, the file contains only the data
+    /// that were passed to the operating system.
     #[test]
     fn what_was_recorded_is_readable_while_it_goes_on() {
         let dir = tempfile::tempdir().unwrap();

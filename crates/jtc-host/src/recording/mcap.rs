@@ -230,7 +230,7 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     let mut see = |record: records::Record<'_>| match record {
         records::Record::Metadata(metadata) if metadata.name == METADATA => {
             info = Some(RecordingInfo::from_map(&metadata.metadata));
-            // The header was found. The error value only ends the search.
+            // The header was found. The error value is used only to end the search.
             Err(RecordingError::Empty { path: PathBuf::new() })
         }
         _ => Ok(()),
@@ -239,8 +239,9 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     info
 }
 
-/// Reads a file that [`McapWriter`] wrote, up to the first damaged record. Messages of other topics are ignored. Calls `see` with each
-/// sample in time order. Up to `room` samples wait for messages that follow later in the file. `info` is the result of [`read_info`].
+/// Reads a file that [`McapWriter`] wrote, up to the first damaged record. Messages of other topics are ignored.
+/// Calls `see` with each sample in time order. Up to `room` incomplete samples are kept in memory, because their
+/// missing messages may follow later in the file. `info` is the result of [`read_info`].
 pub(super) fn scan(
     file: impl Read,
     mut info: Option<RecordingInfo>,

@@ -81,8 +81,8 @@ pub(super) fn measured(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.position), j.map(|j| j.velocity), j.map(|j| j.torque)]
 }
 
-/// Returns the commanded values. The effort is only the torque of the model. The controller adds feedback and
-/// friction compensation to this torque.
+/// Returns the commanded values. The effort contains only the torque of the arm model, and not the feedback torque
+/// and the friction compensation that the controller adds.
 pub(super) fn commanded(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.set_position), j.map(|j| j.set_velocity), j.map(|j| j.torque_model)]
 }

@@ -8,15 +8,16 @@ use crate::sample::Sample;
 struct Reassembled {
     time_ns: u64,
     sample: Sample,
-    /// Mask of the messages received so far, with one bit for each topic.
+    /// Topics of which the message of this sample was received, as a mask with one bit for each topic.
     came: u8,
 }
 
-/// Reassembler of samples with a buffer of at most `room` incomplete samples. If the buffer is full, the oldest sample is released, because
-/// no more messages of this sample are expected.
+/// Reassembler of samples. Its buffer contains at most `room` incomplete samples. If the buffer is full, the oldest
+/// sample is released, because no more of its messages are expected.
 ///
-/// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may group messages by topic.
-/// The reassembler still matches messages of one sample if their distance in the file is at most one chunk.
+/// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may
+/// group the messages by topic. The reassembler can still match messages whose distance in the file is at most one
+/// chunk.
 pub(super) struct Reassembler {
     /// Incomplete samples, sorted by time.
     waiting: VecDeque<Box<Reassembled>>,
@@ -28,7 +29,7 @@ pub(super) struct Reassembler {
     spare: Option<Box<Reassembled>>,
 }
 
-/// Error for a message that arrives after its sample, or a later sample, was released.
+/// Error for a message that arrives too late: its sample, or a later sample, was already released.
 #[derive(Debug)]
 pub(super) struct Late;
 
@@ -103,9 +104,9 @@ mod tests {
 
     use super::*;
 
-    /// Reassembles samples from messages, with a buffer of `room` samples. Each message is a time and the bit of its
-    /// topic. Checks that each sample has both messages, and returns the times of the samples in the order of their
-    /// release.
+    /// Reassembles samples from messages, with a buffer of `room` samples. Each message consists of a time and the
+    /// bit of its topic. The function checks that each sample has the messages of both topics. It returns the times
+    /// of the samples in the order of their release.
     fn gathered(messages: &[(u64, u8)], room: usize) -> Result<Vec<u64>, Late> {
         let mut gatherer = Reassembler::new(room);
         let mut given = Vec::new();

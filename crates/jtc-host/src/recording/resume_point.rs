@@ -12,15 +12,16 @@ use crate::trajectory::Trajectory;
 
 /// Maximum path time that the arm needs to come to rest after a Stop, ms.
 const RAMP_MS: u32 = 1000;
-/// Maximum distance (rad) at which an arm at rest is considered to be at a position of the path.
+/// Maximum distance (rad) between an arm at rest and a position of the path at which the two count as equal.
 const AT_REST: f64 = 0.01;
-/// Maximum distance between the commanded positions in a recording and the trajectory of the recording, rad.
+/// Maximum distance between a commanded position in a recording and the recorded trajectory at which the two count as
+/// equal, rad.
 const SAME: f64 = 2e-3;
 
 /// Position on the path that the arm has certainly reached, according to the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResumePoint {
-    /// Path time of the last position that the recording shows, ms; 0 if the motion had not begun.
+    /// Path time of the last position on the path that the recording contains, ms; 0 if the motion had not begun.
     pub last_ms: u32,
 }
 
@@ -29,8 +30,8 @@ pub struct ResumePoint {
 pub struct Resumption {
     /// Path time, ms.
     pub ms: u32,
-    /// `true` if the controller reports this point, because the motion continued after the end of the recording. `false` if the point comes
-    /// from the recording.
+    /// `true` if the controller reports this point, because the motion continued after the last recorded sample.
+    /// `false` if the point comes from the recording.
     pub shown: bool,
     /// `true` if the arm is at this point.
     pub stands: bool,
@@ -133,7 +134,8 @@ impl Recording {
             let own = |of: Option<&Arc<Trajectory>>| of.is_some_and(|own| **own == *trajectory);
             let own = own(info.and_then(|info| info.commanded.as_ref()))
                 || own(info.and_then(|info| info.then.as_ref()));
-            // The interrupted motion was the approach to the first point, so the arm has not moved along the trajectory.
+            // The recorded motion was the approach to the first point of the trajectory, so the run on the trajectory
+            // has not begun.
             return if own { Ok(ResumePoint { last_ms: 0 }) } else { Err(NothingLeft::Other) };
         }
         if is_end || last.point >= end_ms(trajectory) {
@@ -144,8 +146,8 @@ impl Recording {
 }
 
 impl Recording {
-    /// Returns the number of completed runs of a repeated motion. The first run is on the trajectory `first`, and all other runs are on
-    /// `then`. Approaches between the runs are not counted.
+    /// Returns the number of completed runs of a repeated motion. The first run must follow the trajectory `first`,
+    /// and all later runs must follow `then`. Approaches between the runs are not counted.
     pub fn runs_finished(&self, first: &Trajectory, then: &Trajectory) -> u32 {
         let mut finished = 0;
         for (leg, ended) in self.executions() {
@@ -155,15 +157,15 @@ impl Recording {
         finished
     }
 
-    /// Returns the samples of each execution, and `true` if the execution reached its end. An execution is considered complete if another
-    /// execution follows or if the controller reports the end.
+    /// Returns the samples of each execution, and `true` if the execution reached its end. The end counts as reached
+    /// if another execution follows or if the controller reports the end.
     fn executions(&self) -> Vec<(Vec<&Sample>, bool)> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let mut all: Vec<(Vec<&Sample>, bool)> = Vec::new();
         for sample in &self.samples {
             match all.last_mut() {
                 Some((leg, ended)) if moving(sample) && !*ended => match leg.last() {
-                    // The point index starts from the beginning again, so another execution begins here.
+                    // The point index has decreased, so another execution begins at this sample.
                     Some(before) if sample.point < before.point => {
                         *ended = true;
                         all.push((vec![sample], false));
@@ -197,8 +199,8 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
         let far = away(&trajectory.at_ms(ms)?.position, &stood);
         match nearest {
             Some((_, least)) if far < least => nearest = Some((ms, far)),
-            // After this point, the path leads away from the position of the arm. The search ends here, even if the path reaches this
-            // position again later.
+            // From this point on, the path leads away from the position of the arm, so the search ends. The path may
+            // return to this position later, but that time is not the time of the Stop.
             Some(_) if far > AT_REST => break,
             None if far <= AT_REST => nearest = Some((ms, far)),
             _ => {}
@@ -253,8 +255,8 @@ mod tests {
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
         let at = |last_ms| Ok(ResumePoint { last_ms });
-        // With both outcomes, the run was interrupted: the link was lost, the program was killed, or the controller
-        // ended the run.
+        // The outcome is empty or `fault`. In both cases the run was interrupted: the link was lost, the program was
+        // killed, or the controller ended the run.
         for outcome in ["", "fault"] {
             assert_eq!(of(&way, outcome), at(4_000));
         }
@@ -290,7 +292,7 @@ mod tests {
             }
         };
         let run = || recording(&whole, "");
-        // Status frames arrive every 40 ms, so the end of a run may not appear in any of them.
+        // Status frames arrive every 40 ms, so a recording may contain no status from the end of a run.
         let unseen = || recording(&whole[..3], "");
         let part = || recording(&whole[..2], "");
         let approach = || recording_of(&other, &[(0, Execute), (9_960, Execute), (10_000, Finish)], "");
@@ -314,7 +316,8 @@ mod tests {
                 parts.len()
             );
         }
-        // This recording contains the remainder of a run, followed by two complete runs.
+        // This recording contains the remainder of a run on the path `other`, then one complete run, and then a run
+        // that was interrupted.
         let rest = joined(&[approach(), run(), part()], "stopped");
         assert_eq!(rest.runs_finished(&other, &demo), 2);
         assert_eq!(rest.resume_point(&demo), Ok(ResumePoint { last_ms: 5_000 }));
@@ -338,9 +341,9 @@ mod tests {
             let found = stood(3_400, ms).resume_point(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
-        // The path reverses its direction at 5 s, so it has the same position at 4.9 s and at 5.1 s. The recorded
-        // motion ends at 4.9 s, and the arm is at rest at this position. The function returns the earlier time, so
-        // the resumed run repeats the reversal instead of skipping it.
+        // The path reverses its direction at 5 s, so its position is the same at 4.9 s and at 5.1 s. The recorded
+        // motion ends at 4.9 s, and the arm is at rest at this position. The function must return the earlier time,
+        // because the resumed run must not skip the reversal.
         assert!(stood(4_900, 5_100).resume_point(&path).unwrap().last_ms < 4_920);
         // If the arm is elsewhere on the path, away from the path, or without torque, its position does not prove the progress.
         let elsewhere = stood(3_400, 12_000);
@@ -374,8 +377,8 @@ mod tests {
         let at = |status: &Status| broken.resumption(&path, status, 0.02);
         let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
         // These statuses prove no progress: the controller was restarted or stopped, or a user moved the arm. The
-        // path reaches 0 rad at 15 s, and −0.5 rad at its end. Only at 0.84 rad the arm is at the recorded point
-        // (3.4 s).
+        // path reaches 0 rad at 15 s and −0.5 rad at its end. Only an arm at 0.84 rad is at the recorded point (3.4
+        // s).
         for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
             for (trajectory, point) in
                 [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
@@ -393,8 +396,8 @@ mod tests {
             assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));
         }
         assert_eq!(at(&status(Finish, 20_000, -0.5)), Err(NothingLeft::Finished));
-        // On a closed path, the end is also the start. Therefore an arm at the end of the path does not prove that
-        // the run has finished.
+        // On a closed path, the end is also the start. Therefore an arm at the end does not prove that the run has
+        // finished.
         assert_eq!(at(&status(Null, 0, -0.5)), recorded(false));
     }
 

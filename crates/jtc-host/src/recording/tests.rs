@@ -163,11 +163,12 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     }
 }
 
-/// The length field of a record inside a compressed chunk contains one terabyte.
+/// The length field of a record inside a compressed chunk claims one terabyte. The reader must report the damage and
+/// must not reserve this memory.
 #[test]
 fn a_damaged_length_takes_no_memory() {
     let mut file = b"\x89MCAP0\r\n".to_vec();
-    // This is an LZ4 frame with one uncompressed block, which contains the opcode and the length of a message.
+    // LZ4 frame with one uncompressed block. The block contains the opcode and the length of a message.
     let mut data = b"\x04\x22\x4D\x18\x60\x40\x82\x09\0\0\x80\x05".to_vec();
     data.extend((1_u64 << 40).to_le_bytes());
     data.extend([0; 4]);
@@ -184,7 +185,8 @@ fn a_damaged_length_takes_no_memory() {
     assert!(error.contains("length"), "{error}");
 }
 
-/// The index entry of the record with the limits points beyond the end of the file. The reader ignores this index entry.
+/// The index entry for the metadata points beyond the end of the file. The reader ignores this index entry and still
+/// finds the metadata.
 #[test]
 fn a_damaged_index_takes_nothing_away() {
     let dir = tempfile::tempdir().unwrap();
@@ -194,7 +196,7 @@ fn a_damaged_index_takes_nothing_away() {
     let mut file = std::fs::read(&path).unwrap();
     let name = b"\x07\0\0\0openjtc";
     let at = file.windows(name.len()).rposition(|bytes| bytes == name).unwrap();
-    // In the index entry, the offset and length come before the name.
+    // In an index entry, the offset and the length are stored before the name.
     file[at - 16..at - 8].copy_from_slice(&(u64::MAX - 8).to_le_bytes());
     file[at - 8..at].copy_from_slice(&u64::from(16_u8).to_le_bytes());
     let (found, samples) = read_mcap(&file).unwrap();
@@ -235,9 +237,9 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
     counts
 }
 
-/// The file contains all data that a reader needs to understand the values. The file contains the arm, its gains and limits, and the
-/// identity of the controller. Poses of the links are written at most 50 times a second, at any sample rate, and only if a position is
-/// known.
+/// The file contains all data that a reader needs to understand the values: the arm, its gains and limits, and the
+/// identity of the controller. Poses of the links are written at most 50 times a second, at any sample rate. They are
+/// written only if the position of a joint is known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Curves of a report. For a short recording, the curves contain every sample. A longer recording is divided into pieces of equal length.
-//! The curves of a longer recording contain the minimum and the maximum of each piece.
+//! Curves of a report. For a short recording, a curve contains every sample. A longer recording is divided into
+//! pieces of equal length, and a curve contains the minimum and the maximum of each piece.
 
 use crate::sample::{JointSample, Sample};
 
@@ -50,7 +50,7 @@ fn values(joint: &JointSample) -> [f64; KINDS] {
 struct Bucket {
     begin_s: f64,
     middle_s: f64,
-    /// Minimum of each curve. If all values are unknown, the minimum is above the maximum.
+    /// Minimum of each curve in the piece. If all values are unknown, the minimum is set above the maximum.
     low: [f64; ALL],
     high: [f64; ALL],
     /// `true` if the lowest value occurred before the highest value.
@@ -208,11 +208,11 @@ impl Curves {
     }
 }
 
-/// Number of pieces to which a long sequence of states is reduced. The reduction begins when the sequence has twice
+/// Number of pieces that remain after a long sequence of states is reduced. The sequence is reduced when it has twice
 /// as many pieces.
 const RUNS_MAX: usize = 8_192;
 
-/// Rule for the value of a piece that is joined from two pieces.
+/// Rule that determines the value of a piece which replaces two pieces.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joined {
     /// The joined piece has the value of the longer piece. States use this rule.
@@ -247,7 +247,7 @@ impl Runs {
         }
     }
 
-    /// Joins the pieces in pairs. If neighbouring pieces have equal values after this step, they are also joined.
+    /// Joins the pieces in pairs. Neighbouring pieces whose values are equal afterwards are also joined.
     fn halve(&mut self) {
         // The last piece is not joined with another piece, because the last piece may still become longer.
         let last = self.runs.pop();

@@ -50,11 +50,13 @@ pub struct RunFailure {
     pub causes: Vec<String>,
     /// First joint that failed; `None` if no joint failed.
     pub joint: Option<Joint>,
-    /// Time since the start of the run, ms. During a motion, the time is computed from the point index of the controller.
+    /// Time from the start of the run to the failure, ms. During a motion, the time is computed from the point index
+    /// of the controller.
     pub at_ms: f64,
     /// Time of the first sample that shows the failure, s. The time is on the clock of the samples.
     pub time_s: f64,
-    /// Time since the last sample without an error, ms. The failure occurred during this time.
+    /// Time between the last sample without an error and the first sample with the failure, ms. The failure occurred
+    /// during this time.
     pub within_ms: f64,
     /// Values before and after the failure.
     pub moments: Vec<Moment>,
@@ -262,8 +264,8 @@ pub(super) fn is_bad(sample: &Sample) -> bool {
     sample.errors != 0 || sample.state == ControllerState::Error
 }
 
-/// Returns the reason why a run failed although its samples show no error. `unseen` is `true` if the last sample is from a moving arm.
-/// Returns `None` if the run did not fail.
+/// Returns the reason why a run failed although its samples show no error. `unseen` is `true` if the arm was still
+/// moving at the last sample. Returns `None` if the run did not fail.
 pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
         (true, "") => Some("the run ended in a fault, but the recording does not name the fault".to_owned()),
@@ -301,15 +303,15 @@ impl Around {
     }
 }
 
-/// Finds a joint whose measured position changed too fast between two samples near sample `at`. A change is too fast if it is more than
-/// `STEP_SHARE` times the largest change at the velocity limit of the joint. Returns the joint and a description of the change. The caller
-/// uses this joint if the status does not show which joint failed.
+/// Finds a joint whose measured position changed too fast between two samples near sample `at`: by more than
+/// `STEP_SHARE` times the largest change at the velocity limit. Returns the joint and a description of the change.
+/// The result is used if the status does not show which joint failed.
 fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
     let mut worst: Option<(f64, Joint, String)> = None;
     for i in at.max(1)..samples.len().min(at + 2) {
         let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
-        // After a failure, the times of the samples are arrival times. Samples that arrive together were not measured at the same time.
-        // Therefore the function uses the longest of the last three intervals.
+        // After a failure, the sample times are arrival times, so samples that arrive together seem to have no time
+        // between them. Therefore the function uses the longest of the last three intervals.
         let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
         for (joint, limits) in Joint::ALL.into_iter().zip(&info.joints) {
             let position = |i: usize| samples[i].joints[joint.index()].position;
@@ -333,7 +335,8 @@ fn begin(samples: &[Sample]) -> usize {
     samples.iter().position(Sample::is_operating).unwrap_or(0)
 }
 
-/// Returns the start time of the run, s. The point index of the last sample in motion gives the most precise start time.
+/// Returns the start time of the run, s. It is computed from the point index of the last sample in motion, which
+/// gives the most precise result.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
     match known.iter().rfind(|s| s.state == ControllerState::Operate) {

@@ -192,7 +192,7 @@ fn is_drawn(v: f64) -> bool {
     v.abs() < DRAWN_MAX
 }
 
-/// Returns the smallest span of an axis around `v` for which the labels are different.
+/// Returns the smallest span of an axis around `v` at which neighbouring labels still differ.
 fn margin(v: f64) -> f64 {
     1e-9 * v.abs()
 }
@@ -203,16 +203,15 @@ fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     (low - margin, high + margin)
 }
 
-/// Returns the values and labels of the grid lines between `low` and `high`. [`TICKS`] limits the number of grid
-/// lines. The distance between grid lines is about `share` / 4 of the axis. If an axis has space for more labels, the
-/// caller passes a smaller `share`.
+/// Returns the values and labels of the grid lines between `low` and `high`. [`TICKS`] limits their number. The
+/// distance between grid lines is about `share` / 4 of the axis, so a smaller `share` gives more grid lines.
 fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     let rough = share * (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    // A step is 1, 2 or 5 times a power of ten. The function uses the first step that is large enough. If this step gives too few grid
-    // lines, the function uses a smaller step.
+    // The distance between grid lines is 1, 2 or 5 times a power of ten. The function uses the smallest such distance
+    // that is not below `rough`, or a smaller one if there would be too few grid lines.
     let power = 10f64.powf(rough.log10().floor());
     let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|m| m * power);
     let enough = steps.iter().rposition(|step| *step >= rough).unwrap_or(0);

@@ -134,7 +134,7 @@ proptest! {
     }
 }
 
-/// Returns the value of sample `i`, which is noise with isolated peaks.
+/// Returns the value of sample `i`: noise with isolated peaks.
 fn noise(i: usize) -> f64 {
     let mixed = (i as u64 + 1)
         .wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -185,7 +185,7 @@ fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     }
 }
 
-/// Even if the state changes with every sample, the memory use is bounded and no error is lost.
+/// Even if the state changes with every sample, the pieces of equal state need bounded memory, and no error is lost.
 #[test]
 fn rows_of_states_are_bounded_and_lose_no_error() {
     let (mut states, mut errors) = (Runs::new(Joined::Longer), Runs::new(Joined::Both));

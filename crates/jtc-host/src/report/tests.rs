@@ -177,8 +177,8 @@ fn drives_name_their_own_faults() {
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }
 
-/// The status does not show which joint failed. The report finds the joint with an impossible position step, and shows the samples before
-/// this step.
+/// The status does not show which joint failed. The report finds the joint whose position step is impossible, and
+/// shows the samples before this step.
 #[test]
 fn an_encoder_that_jumps_is_named_by_its_step() {
     let (mut info, mut samples) = run(1000);
@@ -241,8 +241,8 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let summary = Summary::of(&info, &samples);
     for (of_page, of_check) in summary.joints.iter().zip(&planned.verdict.joints) {
         let (speed, torque) = (of_page.peak_velocity_rad_s.unwrap(), of_page.peak_torque_nm.unwrap());
-        // The page uses only the values at the trajectory points, and a lower bearing temperature than the check before a run. Therefore
-        // the values on the page differ slightly from the values of the check.
+        // The page uses only the trajectory points, and a lower bearing temperature than the check. Therefore its
+        // values differ slightly from the values of the check.
         assert!((speed / of_check.velocity_peak_rad_s - 1.0).abs() < 0.05, "{of_page:?} {of_check:?}");
         let peak = of_check.torque_peak_nm.unwrap();
         assert!((0.95..1.5).contains(&(torque / peak)), "{of_page:?} {of_check:?}");

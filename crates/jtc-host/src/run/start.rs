@@ -1,4 +1,4 @@
-//! Start of a run. The arm moves only after every motion of the run has passed its check (J-55).
+//! Start of a run. The arm moves only after all motions of the run have passed the check (J-55).
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::JOINTS;
 use jtc_wire::Joint;
@@ -122,8 +122,8 @@ impl Order<'_> {
         }
     }
 
-    /// Checks all runs after the first run. Also checks that each run ends at the start of the next run, or that an
-    /// approach leads from its end to this start.
+    /// Checks the trajectories of all runs after the first run. Also checks the transition to each next run: a run
+    /// ends where the next run starts, or an approach leads from its end to this start.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {
@@ -131,7 +131,7 @@ impl Order<'_> {
             CheckedTrajectory::check(next, self.arm, &begin, self.options)?;
         }
         let tolerance = self.arm.config_on_device(&self.options.device).start_tolerance_rad;
-        // The end of a later run is checked only if another run follows this run.
+        // The end of the second trajectory is checked only if a third run follows.
         let before = [self.trajectory, next];
         for before in before.into_iter().take(if self.runs > 2 { 2 } else { 1 }) {
             let Some(open) = OpenPath::between(before, next, tolerance) else { continue };
@@ -159,7 +159,7 @@ mod tests {
         joint_move(&[0.0; JOINTS], &[0.0, 1.2, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
     }
 
-    /// Order of `runs` runs. The first run is on `trajectory`, and all other runs are on `later`.
+    /// Simplified order with `runs` runs. The first run is on `trajectory`, and all other runs are on `later`.
     struct Course<'a> {
         trajectory: &'a Trajectory,
         later: &'a Trajectory,
@@ -220,7 +220,8 @@ mod tests {
         }
         let then = Course { later: &outside, ..course };
         assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
-        // The second run needs an approach from the end of the path. With a speed of 0 %, this approach cannot be planned.
+        // The second run needs an approach from the end of the path. At the invalid speed of 0 %, this approach
+        // cannot be planned, so the function must return an error.
         let none = Course { approach_pct: Some(0.0), ..course };
         assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
     }
@@ -234,7 +235,7 @@ mod tests {
         let StartError::Open(open) = &error else { panic!("{error}") };
         assert!(open.joint.number() == 2 && (open.distance - 1.2).abs() < 1e-3, "{error}");
         assert_eq!(error.diagnosis().code, "open-path");
-        // The end of the second run is checked only if there is a third run.
+        // The second run does not end at the start of a third run. This is an error only if there is a third run.
         let there = motion.points.last().unwrap().position;
         let back = joint_move(&there, &[0.0; JOINTS], &Config::avena(), 30.0).unwrap();
         let and_back = |runs| Course { trajectory: &motion, later: &back, runs, approach_pct: None };

@@ -9,7 +9,8 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{labels, sample};
 
-/// Maximum movement during [`WATCHED`] of an arm that is considered at rest, rad. At the slowest jog, the arm moves twice this distance.
+/// Maximum movement (rad) during [`WATCHED`] at which an arm counts as at rest. In this time, the slowest jog moves
+/// the arm twice as far.
 const STILL: f64 = 1.2e-3;
 /// Time for which the arm is observed. A slow jog does not appear in any field of a single status, but it changes the
 /// positions during this time.
@@ -37,7 +38,8 @@ impl<P: Port> Session<P> {
 
 fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
     let moving = |what: String| Err(StateError::Moving { what });
-    // The execution state also shows a motion at its beginning, at a reversal and at its end. At these times, the speed is zero.
+    // At its beginning, at its end and at a reversal, a motion has the speed 0. Only the execution state shows that
+    // the arm is still in motion.
     if now.is_executing() {
         return moving("the arm is on the path of a trajectory".into());
     }
@@ -67,7 +69,8 @@ mod tests {
 
     use super::*;
 
-    /// A slow jog does not appear in any field of one status, but the positions of two statuses differ.
+    /// A slow jog does not appear in any field of one status. The arm counts as moving because the positions of two
+    /// statuses differ.
     #[test]
     fn an_arm_that_is_jogged_slowly_does_not_stand() {
         let at = |q: f32| {

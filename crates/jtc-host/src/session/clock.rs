@@ -11,9 +11,9 @@ const DELAY_S: f64 = 0.1;
 const APART_S: f64 = 1e-6;
 
 /// Clock for statuses. While the arm moves along the path, the clock uses the millisecond count of the controller,
-/// which has no transmission jitter. At all other times, the clock uses the arrival time of the status. At a reduced
-/// speed, the path time runs slower than real time (J-57). Therefore the difference between the clock and the arrival
-/// time is limited to 0.1 s.
+/// which has no transmission jitter. At all other times, it uses the arrival time of the status. At a reduced speed,
+/// the path time is slower than real time (J-57). Therefore the difference between the clock and the arrival time is
+/// limited to 0.1 s.
 pub struct StatusClock {
     start: Duration,
     arrived: Duration,
@@ -59,14 +59,15 @@ mod tests {
 
     #[test]
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
-        // The statuses arrive with different delays. The times of the clock are still exactly the path times.
+        // The statuses arrive with different delays, but the times of the clock must be exactly the path times.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // The arm moves at half of the full speed, and is then at rest.
+        // At half of the full speed, the clock is at most 0.1 s behind the arrival time. After a standstill, it
+        // equals the arrival time.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);
-        // Several statuses are read at once, from an arm at rest or from a controller that is ahead of the host's time. All times must be
-        // different, because a recording merges samples with equal times.
+        // Several statuses are read at once, either from an arm at rest or from a controller that is ahead of the
+        // host's time. Their times must differ, because a recording merges samples with equal times.
         let at_once = times(&[(40, 40), (200, 40), (200, 40), (200, 400), (200, 440), (200, 440)]);
         assert!(at_once.is_sorted_by(|a, b| a < b), "{at_once:?}");
     }

@@ -12,7 +12,8 @@ use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::labels;
 use crate::port::Port;
 
-/// Maximum delay of teaching until the arm is at rest and in position hold, plus a reserve.
+/// Maximum time until teaching begins, with a reserve. The controller waits up to 10 s until it holds all joints at
+/// rest.
 const TEACHING: Duration = Duration::from_secs(11);
 
 /// Parameter that a controller needs.
@@ -51,9 +52,9 @@ impl Parameter {
 }
 
 impl<P: Port> Session<P> {
-    /// Marks the start of a motion request. If a session is used for several motions, the caller must call this function before each
-    /// motion. A shared line rejects requests that are older than another client's Stop. The time of a request is the time of the last call
-    /// of this function. If the function was never called, the time of a request is the start of the session.
+    /// Marks the start of a motion request. A shared line rejects a request that was made before another client's
+    /// Stop. If a session is used for several motions, the caller must call this function before each motion. Without
+    /// a call, the start of the session counts as the time of the request.
     ///
     /// # Errors
     ///
@@ -132,8 +133,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::teach`], except a denial. If an agent denies this request, the agent itself has
-    /// already ended the teaching of the other client.
+    /// Returns the errors of [`Session::teach`], except a denial by an agent. If the agent denies the request, it has
+    /// already ended the teaching of the other client itself.
     pub fn end_teaching(&mut self) -> Result<(), Error> {
         match self.teach(false) {
             Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
@@ -141,8 +142,9 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches teaching on and waits until it begins. If teaching does not begin in time, or if `ended` returns `true`, the function
-    /// switches teaching off again. If teaching began later, the arm would become compliant when the operator no longer expects this.
+    /// Switches teaching on and waits until it begins. If teaching does not begin in time, or if `ended` returns
+    /// `true`, the function switches teaching off again. Otherwise the arm could become compliant later, when the
+    /// operator no longer expects this.
     ///
     /// # Errors
     ///
@@ -152,8 +154,8 @@ impl<P: Port> Session<P> {
         self.read_host_timeout()?;
         self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
-            // The controller has rejected the request, or another client has switched teaching on. Therefore this function does not switch
-            // teaching off.
+            // The controller has rejected the request, so teaching was not switched on by this function. It may
+            // belong to another client, so it is not switched off here.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),
             Ok(()) => {
@@ -281,7 +283,7 @@ impl<P: Port> Session<P> {
     /// Sends an execution command. Returns [`MotionError::LinkLost`] if the command is not confirmed, because the arm may then be moving.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
-        // A Stop or a Pause must not be delayed by another frame.
+        // Before a Stop or a Pause, no other frame is sent, because it would delay the command.
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;
@@ -290,7 +292,7 @@ impl<P: Port> Session<P> {
         let retries = self.statistics.retries;
         let mut record = match self.request(&fixed::exec(command)) {
             Ok(record) => record,
-            // The status shows that the command took effect, so only its response record was lost.
+            // The status shows that the command was executed, so only its response record was lost.
             Err(LinkError::NotConfirmed { .. }) if !stopping && self.last.is_some_and(|s| reached(&s)) => {
                 return Ok(());
             }
@@ -298,7 +300,8 @@ impl<P: Port> Session<P> {
         };
         if stopping && record.data == DataStatus::IncorrectValue {
             // Without an earlier extension request, the controller reports only the general code "incorrect value"
-            // (J-51). The controller rejects a Stop or a Pause only because of its state, so the code is replaced.
+            // (J-51). A Stop or a Pause can be rejected only because of the controller's state, so the code is
+            // replaced by the more specific code.
             record.data = DataStatus::NotAllowed;
         }
         if accepted(&record) {
@@ -313,8 +316,8 @@ impl<P: Port> Session<P> {
         Err(self.refused(record).into())
     }
 
-    /// Adds the known facts about the motion to a link error that occurs while the arm moves or may move.
-    /// Returns a rejection unchanged.
+    /// Adds the known facts about the motion to a link error that occurs while the arm moves or may move. An error
+    /// that is a rejection by the controller is returned unchanged.
     pub(super) fn link_lost(&self, error: LinkError, stop_sent: bool) -> Error {
         if !error.is_loss() {
             return error.into();

@@ -15,8 +15,8 @@ use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError, StateError};
 use crate::port::Port;
 
-/// Maximum age of the last extension request. If this request is older, the session sends a new request. A device reports specific reasons
-/// for rejections only to a host that has sent an extension request within the last 2 s (J-51).
+/// Maximum age of the last extension request. A device reports specific reasons for rejections only for 2 s after an
+/// extension request (J-51), so an older request is repeated.
 pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
 /// Maximum time that a device needs to store an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);
@@ -83,7 +83,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.info() {
-            // The missing answer is not treated as an error. Statuses still arrive, so the next command may succeed.
+            // A missing answer is not treated as an error: statuses still arrive, so the next command may succeed.
             Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
@@ -100,7 +100,7 @@ impl<P: Port> Session<P> {
             return Err(LinkError::NoExtension { request });
         }
         let record = match self.request(frame) {
-            // A device without extensions reports an unknown frame type (J-50).
+            // A device without extensions answers that the frame type is unknown (J-50).
             Err(LinkError::NotConfirmed { last: Some(last), .. })
                 if last.status == FrameStatus::IncorrectFrameType =>
             {
@@ -335,8 +335,8 @@ impl<P: Port> Session<P> {
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
         let halts = self.port.halts();
         match self.extension(&frame) {
-            // The controller executed another program's Stop before this frame (J-04). The session sends the frame
-            // again only to get the reason: the port rejects it with an error that names the other program.
+            // The controller has executed another program's Stop before this frame (J-04). The frame is sent again
+            // only to get the reason: the port rejects it with an error that names the other program.
             Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
             done => Ok(done?),
         }

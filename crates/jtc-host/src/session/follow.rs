@@ -8,8 +8,8 @@ use super::Session;
 use crate::error::{Error, LinkError, MotionError};
 use crate::port::{Port, PortError};
 
-/// Action that a callback requests. All actions except Continue and Cancel are possible only while a motion is
-/// followed.
+/// Action that a callback requests. Continue and Cancel are always possible. All other actions are possible only
+/// while the session follows a motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
     /// Continue unchanged.
@@ -23,7 +23,8 @@ pub enum Flow {
     Speed(u8),
     /// Stop the motion, and follow the motion until the arm is at rest.
     Stop,
-    /// Return from the function at once. The session sends no Stop, so the motion continues, but the session no longer follows the motion.
+    /// Return from the function at once. The session sends no Stop and no longer follows the motion, so the arm
+    /// continues to move.
     Cancel,
 }
 
@@ -36,7 +37,7 @@ pub enum Outcome {
     Stopped(Status),
 }
 
-/// Maximum time until a confirmed command appears in the status.
+/// Maximum time from the confirmation of a command until a status shows its effect.
 const SETTLE: Duration = Duration::from_millis(300);
 
 impl<P: Port> Session<P> {
@@ -67,8 +68,8 @@ impl<P: Port> Session<P> {
     ) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
-        // After an error, the controller deletes the trajectory and its point index, so the session stores the last
-        // point index.
+        // Last point index before an error. It is stored because the controller deletes the trajectory and its point
+        // index after an error.
         let mut point = 0;
         let mut occurred = None;
         loop {
@@ -105,8 +106,8 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
-            // After a Stop was requested, the motion must not continue. A Pause or Resume from the user is ignored.
-            // If another client pauses the motion, the session sends the Stop again.
+            // After a requested Stop, the motion must not continue, so a Pause or Resume from the user is ignored. If
+            // another client pauses the motion instead, the session sends the Stop again.
             let again = stopping && status.trajectory == TrajectoryState::Pause;
             let flow = match flow {
                 _ if again => Flow::Stop,
@@ -119,7 +120,7 @@ impl<P: Port> Session<P> {
                 Flow::Pause if status.is_executing() => unless_ended(self.pause()),
                 Flow::Resume => self.resume(),
                 Flow::Speed(percent) => self.set_speed(f64::from(percent) / 100.0),
-                // The session does not repeat an accepted Stop. The controller decelerates to standstill without
+                // An accepted Stop is not repeated, because the controller then decelerates to standstill without
                 // further commands.
                 Flow::Stop if !stopping || again => {
                     stopping = true;
@@ -130,8 +131,8 @@ impl<P: Port> Session<P> {
             done(flow, &did);
             match (flow, did) {
                 (_, Ok(())) => {}
-                // After a rejected resume or speed, the motion continues unchanged or stays paused. Therefore the session continues to
-                // follow the motion.
+                // If a resume or a new speed is rejected, the motion continues unchanged or stays paused. Therefore
+                // the session continues to follow it.
                 (
                     Flow::Resume,
                     Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }))),
@@ -164,8 +165,9 @@ fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// Ignores two errors of a Pause or Stop that are not failures. The controller may reject the command because the motion is already paused
-/// or has just ended. The port may block a Pause because another program has just sent a Stop.
+/// Ignores two errors of a Pause or Stop that are not failures. First, the controller rejects the command because the
+/// motion is already paused or has just ended. Second, the port blocks a Pause because another program has just sent
+/// a Stop.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
         Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),

@@ -15,12 +15,13 @@ pub const JOG_AGAIN: Duration = Duration::from_millis(50);
 const REST: Duration = Duration::from_secs(3);
 
 impl<P: Port> Session<P> {
-    /// Waits until joints may be jogged. For a short time after the controller begins to carry the load of a joint, it rejects jogging. If
-    /// the controller rejects jogging for another reason, returns an error at once.
+    /// Waits until joints may be jogged. After the drives are enabled, the controller rejects jogging until it holds
+    /// the arm at rest. If the controller rejects jogging for another reason, returns an error at once.
     ///
     /// # Errors
     ///
-    /// Returns [`StateError::HeldStop`] while the cause of a held stop is not cleared. Also returns the errors of [`Session::jog`].
+    /// Returns [`StateError::HeldStop`] while the cause of a held stop is not cleared. Also returns the errors of
+    /// [`Session::jog`].
     pub fn settle_for_jog(&mut self) -> Result<(), Error> {
         self.settle_for_jog_until(|| false)
     }
@@ -81,7 +82,8 @@ impl<P: Port> Session<P> {
     /// Returns [`StateError::Device`] if the controller has switched the torque off. Returns [`StateError::HeldStop`] if the controller is
     /// in a held stop. Also returns communication errors.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
-        // A rejection is ignored, because the controller rejects this frame only if no joint is being jogged.
+        // A rejection is ignored. The controller rejects this frame only if no joint is being jogged, and then the
+        // arm does not need to be stopped.
         match self.jog(&[0.0; JOINTS]) {
             Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
             Err(error) => return Err(error),
@@ -95,7 +97,8 @@ impl<P: Port> Session<P> {
             standstill.see(self.now(), &status);
             let late = self.now() > end;
             if late || standstill.is_reached() {
-                // A controller that is still lowering a load after this time is in a held stop.
+                // If a joint still lowers a load at this time, the controller is in a held stop, which is returned as
+                // an error.
                 self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {

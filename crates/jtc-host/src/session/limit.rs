@@ -1,12 +1,13 @@
-//! Timeout for an answer of the controller. If the host computer is busy, the timeout is extended.
+//! Timeout for an answer of the controller. Time in which the host computer was too busy to run this program does not
+//! count.
 
 use std::time::Duration;
 
 /// Maximum duration of a single wait.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Remaining time for an answer. If a wait takes longer than planned, only the planned time is subtracted. A computer that wakes this
-/// program late may also have delayed the answer, or the simulator that sends the answer.
+/// Remaining time for an answer. If a wait takes longer than planned, only the planned time is subtracted. A computer
+/// that is so busy that it wakes this program late may also have delayed the answer itself.
 #[derive(Debug)]
 pub(super) struct Limit {
     left: Duration,
@@ -33,7 +34,8 @@ impl Limit {
 mod tests {
     use super::*;
 
-    /// Returns the total time of all waits until the limit ends. Each wait lasts `share` times its planned length.
+    /// Returns the total time of all waits until the limit is used up. Each wait lasts `share` times as long as
+    /// planned.
     fn waited(limit_ms: u64, share: f64) -> Duration {
         let mut limit = Limit::new(Duration::from_millis(limit_ms));
         let mut all = Duration::ZERO;

@@ -95,8 +95,8 @@ impl<P: Port> Session<P> {
             let page = self.log_page(block, offset as u16)?;
             (log.state, log.points_hash) = (page.status.state, page.points_hash);
             if page.block != block || first.is_none() || usize::from(page.offset) != offset {
-                // If the requested block no longer exists, for example because the log was cleared, the device sends its oldest block. The
-                // download then starts again at this block.
+                // If the requested block no longer exists, for example because the log was cleared, the device sends
+                // its oldest block instead. The download then starts again from this block.
                 bytes.clear();
                 first = Some(page.block);
             }

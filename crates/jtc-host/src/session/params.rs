@@ -11,7 +11,8 @@ use crate::error::{Error, LinkError, ParametersError, StateError};
 use crate::frame;
 use crate::port::Port;
 
-/// Duration of the trial of new gains while torque is on (J-71), plus the time until the controller has reported the result.
+/// Time for which new gains are on trial while the torque is on (J-71), plus the time until the controller has
+/// reported the result.
 const TRIAL: Duration = Duration::from_millis(2_500);
 
 /// Transfer of one parameter that the controller has confirmed.
@@ -28,17 +29,17 @@ pub struct PushReport {
 }
 
 impl<P: Port> Session<P> {
-    /// Checks `set`, and then sends the parameters in `set`. Calls `done` after each parameter.
+    /// Checks `set`, and then sends its parameters. Calls `done` after each parameter.
     ///
-    /// New gains that are set while the controller holds the arm are on trial for two seconds. If the arm is not stable with the new gains,
-    /// the controller restores the old gains and goes into a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71).
-    /// [`Session::await_trial`] waits for the result.
+    /// If new gains are set while the controller holds the arm, they are on trial for two seconds. If the arm is not
+    /// stable in this time, the controller restores the old gains and goes into a held stop of the kind
+    /// [`jtc_wire::StopKind::Gains`] (J-71). [`Session::await_trial`] waits for the result.
     ///
     /// # Errors
     ///
-    /// Returns [`ParametersError::Value`], before a frame is sent, for values that do not fit into their frame or that are not physical.
-    /// Returns [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller rejects a parameter and keeps its old
-    /// parameter. Also returns the other [`LinkError`]s of the communication.
+    /// Returns [`ParametersError::Value`], before a frame is sent, for values that do not fit into their frame or are
+    /// physically impossible. Returns [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller
+    /// rejects a parameter and keeps its old value. Also returns the other [`LinkError`]s of the communication.
     pub fn push(
         &mut self,
         set: &ParameterSet,
@@ -75,7 +76,8 @@ impl<P: Port> Session<P> {
         if let Some(model) = &set.model {
             frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
         }
-        // A controller that has all parameters switches the torque on. Therefore a Stop of another program ends the transfer.
+        // A controller that has received all parameters switches the torque on. If another program sends a Stop, it
+        // must not do this, so the transfer ends.
         let stops = self.port.halts().stops;
         let mut all = Vec::new();
         for (parameter, frame, times) in frames {
@@ -108,8 +110,8 @@ impl<P: Port> Session<P> {
         let under_torque = state.is_in(&[ControllerState::HoldPos, ControllerState::Teaching]);
         let Some(reactions) = self.reactions().filter(|_| under_torque) else { return Ok(false) };
         begun();
-        // Age of the last held stop before the trial, if there is one. A held stop that the trial causes is more
-        // recent, so its age is smaller.
+        // Age of the last held stop before the trial, if there is one. If the trial causes a new held stop, the
+        // reported age becomes smaller.
         let before = age(reactions).unwrap_or(u32::MAX);
         let end = self.port.now() + TRIAL;
         while self.port.now() < end {
@@ -130,7 +132,7 @@ fn explained(error: LinkError, set: &ParameterSet) -> Error {
     let LinkError::Refused { request, code: DataStatus::IncorrectValue, .. } = error else {
         return error.into();
     };
-    // Only a value in the rejected frame can be the reason for the rejection.
+    // The controller rejected one frame, so only a value in this frame can be the reason.
     let part = match request {
         FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
         FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },

@@ -19,15 +19,15 @@ impl<P: Port> Session<P> {
         Ok(self.device_config()?.payload)
     }
 
-    /// Sets the payload. The controller changes its torque to a new payload within half a second. Execute, teaching and jogging wait until
-    /// this change is complete.
+    /// Sets the payload. The controller changes its torque to the new payload within half a second. Until then,
+    /// Execute and teaching wait, and the controller rejects jogging.
     ///
     /// # Errors
     ///
     /// Returns [`ExtensionError::NoBody`], before a frame is sent, if the payload is not a physical body. Returns
     /// [`ExtensionError::TooHeavy`] if a joint could not hold the payload in the present pose of the arm. Returns
-    /// [`ExtensionError::PayloadInMotion`] if a commanded motion is in progress. Also returns the errors of [`Session::set_settings`].
-    /// After an error the controller keeps its earlier payload.
+    /// [`ExtensionError::PayloadInMotion`] if a commanded motion is in progress. Also returns the errors of
+    /// [`Session::set_settings`]. After an error the controller keeps its earlier payload.
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
         let values: Vec<_> = settings::payload_values(payload).collect();

@@ -1,8 +1,8 @@
-//! Host supervision (J-59). While the arm follows a path or is in teaching because of a command of this session, the session repeats
-//! GetInfo. The controller then knows that its host is alive.
+//! Host supervision (J-59). The session repeats GetInfo while the arm follows a path, or is in teaching, because of a
+//! command of this session. The requests show the controller that its host is alive.
 //!
-//! A session that only observes the arm sends no frames. A GetInfo also shows the controller that its host supports all data status codes
-//! (J-51).
+//! A session that only observes the arm sends no frames. A GetInfo also shows the controller that its host supports
+//! all data status codes (J-51).
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ const SHORTEST: Duration = Duration::from_millis(20);
 pub(super) struct Presence {
     /// Time at which this session commanded the current motion or teaching.
     commanded: Option<Duration>,
-    /// `true` while the session waits until teaching begins.
+    /// `true` while the session waits for the beginning of teaching.
     waits: bool,
     /// `true` if the last status shows that the arm moves or can be guided by hand.
     moves: bool,
@@ -146,8 +146,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.settings() {
-            // If the timeout cannot be read, the default period is used. If the line is lost, the next command returns the error of the
-            // line.
+            // If the timeout cannot be read, the default period of GetInfo is used. If the line is lost, the next
+            // command returns the error.
             Err(
                 LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::NoExtension { .. },
             ) => Ok(()),

@@ -54,9 +54,8 @@ impl<P: Port> Session<P> {
     /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm.
     /// The arm has no torque during the transfer.
     ///
-    /// A controller that has received friction, gains and model leaves Init and holds the arm. To prevent this, the
-    /// function first withdraws the parameters that it has already sent, and then sends the last of the three
-    /// parameters.
+    /// A controller that has friction, gains and model leaves Init and holds the arm. To prevent this, the function
+    /// makes the controller drop the parameters that it has already received, before it sends the last of the three.
     ///
     /// # Errors
     ///
@@ -96,7 +95,7 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // The device is then in the same state as after its start. A later request of the host activates the complete stored arm.
+        // The device now has no active arm, as after its start. It uses the stored arm when a host requests this.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }
@@ -109,7 +108,8 @@ impl<P: Port> Session<P> {
             self.disable()?;
         } else if state == ControllerState::Error {
             match self.disable() {
-                // In the state Error, older firmware rejects this command, but accepts each parameter separately.
+                // Older firmware rejects this command in the state Error. The rejection is ignored, because this
+                // firmware accepts each parameter separately in this state.
                 Err(LinkError::Refused { .. }) => {}
                 done => done?,
             }

@@ -30,8 +30,8 @@ const BOOT: Duration = Duration::from_secs(1);
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
-/// Maximum number of times that a held stop is cleared. Between these attempts, a compliant joint comes to rest, or an operator frees the
-/// joint.
+/// Maximum number of times that a held stop is cleared. In the time between two attempts, a compliant joint can come
+/// to rest, or an operator can free the joint.
 const HELD_CLEARS: u8 = 6;
 /// Maximum number of times that errors are cleared.
 const CLEARS_MAX: u8 = 6;
@@ -118,13 +118,14 @@ struct Recovery<'a, P, Ended, Report> {
     clears: u8,
     /// Number of times that a held stop was cleared.
     held_clears: u8,
-    /// `true` if nodes were reset because they did not start up.
+    /// `true` if nodes were reset because they were too slow to start up.
     reset_slow: bool,
     /// Time of the first message that asks the operator to release the emergency stop.
     asked: Option<Duration>,
     /// Number of steps left before the recovery fails.
     acts_left: u8,
-    /// Number of Stops of other programs before the start. A later Stop ends the recovery.
+    /// Number of Stops of other programs before the start of the recovery. If the number increases, the recovery
+    /// ends.
     stops: u64,
 }
 
@@ -241,7 +242,8 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
 
     fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
         let nodes = faulty(status);
-        // Errors are latched. Only an attempt to clear the errors shows whether the safety input is high again.
+        // Errors are latched, so the status cannot show that the safety input is high again. Only an attempt to clear
+        // the errors shows it.
         let safety_input = status.errors & error::EMERGENCY_INPUT != 0;
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
@@ -275,7 +277,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn clear(&mut self, nodes: u8) -> Result<(), Error> {
-        // If the fault persists, the next status shows the fault to the caller.
+        // If the fault persists, the caller sees it in the next status.
         self.session.clear_if_possible(true, nodes)?;
         self.session.pause_for(EFFECT, &self.ended)
     }

@@ -20,7 +20,8 @@ pub struct Run {
     /// Result of the execution. If the run failed, the error is one of [`Session::execute`] or [`Session::follow`]. A failed run also has
     /// samples, with which the failure can be analysed.
     pub outcome: Result<Outcome, Error>,
-    /// Samples, oldest first. The commanded values of a sample are the trajectory's values at the point that the controller reports.
+    /// Samples, oldest first. The commanded values of a sample come from the trajectory, at the point that the
+    /// controller reports.
     pub samples: Vec<Sample>,
 }
 

@@ -1,5 +1,5 @@
-//! Upload of a trajectory to the controller. Several frames are in flight, each segment is confirmed, and lost segments
-//! are sent again.
+//! Upload of a trajectory to the controller. Several segments are sent before the first one is confirmed. Each
+//! segment is confirmed, and lost segments are sent again.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -20,7 +20,8 @@ use crate::trajectory::UploadOptions;
 const SEGMENT_TRIES: u32 = 16;
 /// Maximum number of restarts of the complete upload.
 const RESTARTS: u32 = 3;
-/// Maximum number of segments in flight. The controller can queue one response record more than this number.
+/// Maximum number of segments that are sent but not yet confirmed. The controller can queue one response record more
+/// than this number.
 const WINDOW_MAX: usize = 7;
 
 /// Progress of an upload.
@@ -64,8 +65,8 @@ pub struct UploadReport {
 }
 
 impl UploadReport {
-    /// Returns the share of the line capacity that the upload used, %. Returns `None` for a pseudo-terminal that is faster than its bit
-    /// rate.
+    /// Returns the share of the line capacity that the upload used, %. Returns `None` if the line is faster than its
+    /// bit rate, as a pseudo-terminal is.
     pub fn line_share_percent(&self) -> Option<f64> {
         self.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
     }
@@ -85,7 +86,8 @@ struct Upload {
     /// Frame that is being written: index of the frame, and number of its bytes that are already written.
     writing: Option<(usize, usize)>,
     line_done: Duration,
-    /// `true` while segments are sent one at a time, because the state of the controller is unknown.
+    /// `true` while segments are sent one at a time, because it is unknown which segments the controller has
+    /// received.
     probing: bool,
     tries: u32,
     retries: u32,
@@ -115,8 +117,8 @@ impl Upload {
             .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
             .collect::<Result<Vec<Vec<u8>>, _>>()?;
         let longest = frames.first().map_or(0, Vec::len);
-        // Unless `WINDOW_MAX` limits the window, it contains at least 60 ms of data on the line. 60 ms is longer than the latency of USB
-        // adapters.
+        // At least 60 ms of data must be in transmission, because USB adapters have a latency. `WINDOW_MAX` can
+        // reduce this time.
         let time = line_time(longest, baud).as_secs_f64();
         let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
         Ok(Self {
@@ -133,8 +135,8 @@ impl Upload {
             restarts: 0,
             halts: 0,
             window: window.clamp(3, WINDOW_MAX),
-            // Each write is limited to the bytes that the line transmits in 10 ms. Therefore the session receives statuses between two
-            // writes.
+            // A write contains at most the bytes that the line transmits in 10 ms, so that the session can receive
+            // statuses between two writes.
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
             start: now,
             bytes_done: 0,
@@ -345,8 +347,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match record.data {
-            // The controller rejects the only segment in flight because its number is out of order. Therefore the segment had arrived
-            // earlier, and only its confirmation was lost.
+            // Only one segment is in flight, and the controller rejects it because its number is out of order.
+            // Therefore the segment had already arrived, and only its confirmation was lost.
             DataStatus::IncorrectSegmentOrder if up.probing && up.confirmed > 0 => {
                 up.confirm();
                 Ok(())
@@ -357,8 +359,8 @@ impl<P: Port> Session<P> {
                     return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
                 }
                 if self.port.halts().all != up.halts {
-                    // The controller dropped the upload because of another program's Stop. The rejected segment was sent before the port
-                    // began to block segments.
+                    // The controller dropped the upload because of another program's Stop. This segment was sent just
+                    // before the port began to block segments.
                     return Err(LinkError::Port(PortError::Halted { by: None }).into());
                 }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
@@ -372,8 +374,9 @@ impl<P: Port> Session<P> {
         if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
-        // All segments are sent, and the status shows that the trajectory is complete. Therefore only confirmations were lost. The status
-        // cannot be old, because the trajectory state has been Null since segment 0 was confirmed.
+        // All segments are sent, and the status shows that the trajectory is complete, so only confirmations were
+        // lost. The status is not an old one: since the confirmation of segment 0, the trajectory state was Null
+        // until now.
         if up.next == up.frames.len()
             && up.confirmed > 0
             && self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop)
@@ -386,8 +389,8 @@ impl<P: Port> Session<P> {
         self.start_over(up)
     }
 
-    /// Waits for the response records of the frames in flight. Then returns to the first segment that is not
-    /// confirmed.
+    /// Waits for the response records of the frames in flight. Then the upload continues with the first segment that
+    /// is not confirmed.
     fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
         if up.tries >= SEGMENT_TRIES {
             return Err(self.upload_failed(up).into());
@@ -397,8 +400,8 @@ impl<P: Port> Session<P> {
             self.statistics.bytes_sent += (up.frames[index].len() - at) as u64;
         }
         let quiet = up.line_done.max(self.port.now()) + line_time(2 * STATUS_LEN, self.port.baud());
-        // The controller sends a response record directly after it receives the frame. A late response record may
-        // take one more status period.
+        // The controller sends a response record directly after it has received the frame. The wait includes one more
+        // status period for a response record that is late.
         let end = quiet + Duration::from_millis(60);
         loop {
             let now = self.port.now();

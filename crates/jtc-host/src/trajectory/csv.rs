@@ -48,7 +48,7 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
             return Err(FileError::at(Place::line(line), format!("{n} columns without a header; {help}")));
         }
     }
-    // The float format always contains a decimal point, and the int16 format never contains one.
+    // Only the float format contains decimal points, and it contains them in every file.
     let whole = rows(text)
         .all(|(_, cells)| cells.iter().all(|c| c.bytes().all(|b| b.is_ascii_digit() || b"+-".contains(&b))));
     if whole { int16(text) } else { float(text) }

@@ -80,7 +80,8 @@ pub struct Fitted {
 const STEP_MS: u16 = 10;
 /// Maximum deviation of a time from the grid, s.
 const REGULAR: f64 = 50e-6;
-/// Longest duration that is resampled, s. A longer trajectory needs more points than the controller can store, at any useful step.
+/// Longest duration that is resampled, s. With a longer duration, the trajectory would have more points than the
+/// controller can store, at any useful step.
 const DURATION_MAX: f64 = 86_400.0;
 
 /// Reason why no trajectory can be fitted to the samples.
@@ -295,7 +296,8 @@ mod tests {
         };
         let over = points.windows(2).map(between).fold(0.0, f64::max) - 1.0;
         assert!((0.08..0.12).contains(&over), "{over}");
-        // The velocity at both ends is 0. The acceleration at an end is not 0 if the position already changes at this end, as in `bent`.
+        // The velocity at both ends is 0. The acceleration at an end is not 0 if the position begins to change there,
+        // as in `bent`.
         assert_eq!((points[0].velocity, points[9].velocity), ([0.0; 6], [0.0; 6]));
         let bent = Samples {
             times: vec![0.0, 0.5, 1.0],

@@ -4,12 +4,13 @@ use jtc_wire::Joint;
 
 use super::Point;
 
-/// Largest overshoot of a joint beyond the interval between two waypoints.
+/// Largest overshoot of a joint: the distance by which the curve leaves the interval between the positions of two
+/// waypoints.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Overshoot {
     /// Joint.
     pub joint: Joint,
-    /// Distance between the curve and the interval, rad.
+    /// Distance between the farthest position of the curve and the interval, rad.
     pub beyond_rad: f64,
     /// Position at the overshoot, rad.
     pub position_rad: f64,

@@ -15,11 +15,11 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Spacing to which the points of a dense path are reduced, ms. If two consecutive points are this far apart or
-/// farther, the path is not dense, and all its points are kept.
+/// Spacing of the points to which a dense path is reduced, ms. A path is dense if all its points are closer together.
+/// The points of other paths are not reduced.
 const GRID_MS: u32 = 10;
 
-/// Spacing of measured positions, s. With a smaller spacing, encoder noise would look like motion.
+/// Spacing of measured positions, s. At a smaller spacing, encoder noise would look like a motion.
 const MEASURED_S: f64 = 0.04;
 /// Maximum movement of an arm that is considered at rest, rad.
 const STILL: f64 = 0.002;
@@ -55,7 +55,8 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// Returns the trajectory that is stored in the recording of a run. The stored trajectory is complete, even if the run was interrupted.
+/// Returns the commanded trajectory that is stored in the recording of a run. It is complete, even if the run was
+/// interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.resume_point(whole) {
@@ -122,7 +123,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
         let problem = "the recording contains no motion by hand and no execution in which the arm moves";
         return Err(FileError::at(Place::default(), problem));
     };
-    // One position at rest is kept at each end of the motion.
+    // At each end of the motion, one position at rest is kept.
     let kept = first.saturating_sub(1)..(last + 2).min(path.times.len());
     let (times, position) = (path.times[kept.clone()].to_vec(), path.position[kept].to_vec());
     let start = times.first().copied().unwrap_or(0.0);
@@ -143,8 +144,8 @@ fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     samples[begin..end].iter().map(|s| (s.time_s, s)).collect()
 }
 
-/// Returns the last execution, including its pauses. The times are path times. The path times are used because the host times have jitter,
-/// and have no meaning in a simulation with virtual time. The last sample is the pose in which the arm came to rest.
+/// Returns the last execution, including its pauses. The times are path times, because the host times have jitter and
+/// have no meaning in a simulation with virtual time. The last sample is the pose in which the arm came to rest.
 fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let on_path = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
     let end = samples.iter().rposition(on_path).map_or(0, |i| i + 1);
@@ -173,7 +174,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// Reduces a dense path to a point every 10 ms and both ends. Otherwise a path with a point at each millisecond
+    /// Reduces a dense path to one point every 10 ms, and keeps both ends. With a point at each millisecond, a path
     /// could have more points than the controller can store. A path with a gap of 10 ms or more is returned
     /// unchanged.
     fn thinned(self) -> Self {
@@ -214,8 +215,8 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
                 velocity: sample.joints.map(|joint| joint.set_velocity),
                 acceleration: sample.joints.map(|joint| joint.set_acceleration),
             },
-            // The recording contains commanded values only while the arm moves on the path. The end of the path is at rest, close to the
-            // previous sample.
+            // At the end of the path, the recording contains no commanded values. The arm is then at rest, close to
+            // the position of the previous sample, so this position is used.
             (Some(TrajectoryState::Finish), Some(place)) => {
                 Point { position: place.position, ..Point::default() }
             }
@@ -263,7 +264,7 @@ mod tests {
         let s = f64::from(point) / 2_000.0;
         let q = 0.3 * s * s * (3.0 - 2.0 * s);
         let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
-        // The host times have no meaning in virtual time, so the sample contains no time.
+        // The times of the host have no meaning in virtual time, so the sample contains none.
         Sample { trajectory: trajectory.into(), point, joints: [joint; JOINTS], ..Sample::default() }
     }
 
@@ -279,8 +280,8 @@ mod tests {
         let loaded = executed(&samples).unwrap();
         assert_eq!(loaded.form, Form::Recording);
         assert!((loaded.trajectory.duration_s() - 2.0).abs() < 1e-9);
-        // Some samples are missing in the recording, among them the last 40 ms of the path. The extracted path
-        // deviates from the real path by less than 2 mrad.
+        // Some samples are missing in the recording, among them those of the last 40 ms of the path. The extracted
+        // path may deviate from the real path by at most 2 mrad.
         for (i, point) in loaded.trajectory.points.iter().enumerate() {
             let s = i as f64 * f64::from(loaded.trajectory.step_ms) / 2_000.0;
             let q = 0.3 * s * s * (3.0 - 2.0 * s);
@@ -297,8 +298,8 @@ mod tests {
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
     }
 
-    /// `jtc sim` records each millisecond. One minute of these samples has more points than the controller can store. The replay restores
-    /// the commanded values, including velocities and accelerations.
+    /// `jtc sim` records each millisecond, so one minute has more points than the controller can store. The replay
+    /// must reduce the points and keep the commanded values, including velocities and accelerations.
     #[test]
     fn a_long_path_known_at_each_millisecond_can_be_run_again() {
         let at = |ms: u32| {
@@ -322,7 +323,8 @@ mod tests {
         }
     }
 
-    /// The reader finds a motion by hand between standstills of any length, and after earlier executions.
+    /// The reader finds a motion by hand even if there are standstills of any length before and after it, and earlier
+    /// executions.
     #[test]
     fn a_motion_by_hand_is_found_as_it_was_measured() {
         let at = |ms: u32| {

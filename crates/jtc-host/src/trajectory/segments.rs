@@ -1,13 +1,13 @@
 //! Division of a trajectory into segments for the upload.
 //!
-//! The upload uses short frames (113 points, 4,082 bytes). In a frame of more than 4,095 bytes, CRC-16 does not detect all double bit
-//! errors, because x has the order 32,767 modulo the CRC polynomial.
+//! Normally a segment has 113 points, so its frame has 4,082 bytes. CRC-16 does not detect all double bit errors in a
+//! frame of more than 4,095 bytes: x has the order 32,767 modulo the CRC polynomial.
 
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 /// Maximum number of points of a segment for which CRC-16 detects every double bit error in the frame.
 const SEGMENT_POINTS: usize = 113;
-/// Number of points per segment if 113 points per segment would need more than 100 segments.
+/// Number of points per segment for long trajectories, which would need more than 100 segments of 113 points.
 const SEGMENT_POINTS_LONG: usize = 120;
 
 /// Options for the upload.

@@ -79,8 +79,8 @@ pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<
 }
 
 pub(super) fn read_yaml(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    // A trajectory of 12,000 points has about 300,000 YAML nodes, so the reader must accept more nodes than by
-    // default.
+    // The reader must accept more YAML nodes than by default, because a trajectory of 12,000 points has about 300,000
+    // nodes.
     let options = serde_saphyr::options! {
         budget: serde_saphyr::budget! { max_nodes: 2_000_000, max_events: 4_000_000 },
         with_snippet: false,
@@ -118,8 +118,8 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // A single point keeps the step of the file, even if it is above 1 s. With several points, times with such a long step would be
-    // considered irregular.
+    // With a single point, the step of the file is kept, even if it is above 1 s. With several points, so long a step
+    // makes the times irregular, and the points are resampled.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;
     }
@@ -226,7 +226,8 @@ fn joint_order(
     if let Some(exact) = exact {
         order.copy_from_slice(&exact);
     } else {
-        // Different files for one arm may use different prefixes in the joint names. The number at the end of a name is the joint number.
+        // Files for the same arm may use different prefixes in the joint names. Therefore only the number at the end
+        // of a name is used as the joint number.
         let mut ends: Vec<(u32, usize)> =
             found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
         ends.sort_unstable();

@@ -132,7 +132,8 @@ fn a_unit_in_a_header_counts_in_letters_of_any_case() {
     assert!(both.contains("\"Q1_DEG\": this column occurs twice"), "{both}");
 }
 
-/// The reader recognises each column that only waypoint files have.
+/// If a trajectory file contains a column that only waypoint files have, the error names the column and the command
+/// for waypoint files.
 #[test]
 fn columns_of_waypoints_are_known_as_such() {
     for name in "pose leg x y z qx qy qz qw roll pitch yaw x_m roll_deg".split(' ') {

@@ -61,8 +61,7 @@ pub(super) fn names_unit(name: &str) -> bool {
     name.contains("_deg") || name.contains("_rad")
 }
 
-/// Returns the column with this name, in upper or lower case. Also returns the factor that converts the unit of the
-/// column to s, m or rad.
+/// Returns the column with this name, in upper or lower case, and the factor that converts its unit to s, m or rad.
 pub(super) fn column(name: &str) -> Option<(Column, f64)> {
     let name = name.trim_matches('"').to_ascii_lowercase();
     match name.as_str() {

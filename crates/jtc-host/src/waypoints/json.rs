@@ -1,5 +1,5 @@
-//! Waypoints as a JSON list of objects. The keys of an object are the column names of the CSV table. The list is either the whole file or
-//! the value of the key `waypoints`.
+//! Waypoints as a JSON list of objects, whose keys are the column names of the CSV table. The list is either the
+//! whole file or the value of the key `waypoints`.
 
 use std::fmt;
 
@@ -29,7 +29,7 @@ struct Entry {
     flange: [Option<f64>; NAMES.len()],
     /// `true` if a key contains a unit of angle.
     unit_named: bool,
-    /// Two keys for the same value, if the file contains both keys.
+    /// If the file contains two keys for the same value, the names of both keys.
     twice: Option<(String, String)>,
 }
 

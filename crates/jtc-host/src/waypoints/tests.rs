@@ -36,8 +36,8 @@ fn the_forms_say_the_same() {
     }
 }
 
-/// The flange pose of a joint position is written to a file with a quaternion or with angles. The reader converts the pose back to this
-/// joint position.
+/// The flange pose of a joint position is written to a file, once with a quaternion and once with angles. The reader
+/// must find this joint position again.
 #[test]
 fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     let arm = arm();
@@ -157,7 +157,8 @@ fn header_keys(names: &str) -> String {
         .join(", ")
 }
 
-/// If a file contains a value twice, the reader rejects the file and does not choose one of the values.
+/// If a file contains a value twice under different names, the reader rejects the file, because it cannot know which
+/// value is meant.
 #[test]
 fn two_names_for_one_number_are_refused() {
     let joints = "\"q2\":0,\"q3\":0,\"q4\":0,\"q5\":0,\"q6\":0";

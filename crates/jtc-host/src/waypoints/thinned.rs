@@ -14,7 +14,8 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
             *kept = true;
         }
     }
-    // The function uses a list and not recursion, because a path may have many positions.
+    // The function uses a list instead of recursion, because recursion over a path with many positions could overflow
+    // the stack.
     let mut parts = vec![(0, last)];
     while let Some((from, to)) = parts.pop() {
         let between = (from + 1..to).map(|i| (i, distance(&positions[i], &positions[from], &positions[to])));

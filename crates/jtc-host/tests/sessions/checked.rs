@@ -42,7 +42,7 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     let mut wild = motion(0.5);
     wild.points[3].velocity[2] = f64::NAN;
     assert!(matches!(check(&wild), Err(CheckError::Refused(_))));
-    // According to the arm model, the motion needs more torque than the limit.
+    // The torque limit is so low that the motion needs more torque according to the arm model.
     let mut arm = Arm::avena();
     arm.joints[1].torque_max = 1.0;
     let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
@@ -115,8 +115,8 @@ fn only_what_was_uploaded_is_executed() {
     };
     refused(&mut s, &first);
     s.upload(&first, |_| Flow::Continue).unwrap();
-    // The points are equal, but they belong to another check. The other check may have used another arm, so the
-    // session refuses to execute them.
+    // This trajectory has the same points as the uploaded trajectory, but it passed another check, possibly for
+    // another arm. The session refuses to execute it.
     refused(&mut s, &second);
     s.upload(&second, |_| Flow::Continue).unwrap();
     refused(&mut s, &first);
@@ -144,13 +144,14 @@ fn a_run_has_an_outcome_and_its_figures() {
     let error = summary.joints[0].max_error_mrad.unwrap();
     assert!(error > 0.0 && error < 20.0, "{error} mrad");
     assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
-    // The second execution would start where the first execution ended. The controller rejects the second execution (J-34), and `run`
-    // returns this error.
+    // The arm is at the end of the first execution, and not at the first point. Therefore the controller rejects the
+    // second execution (J-34), and `run` returns this error.
     let run = s.run(&checked, |_| Flow::Continue);
     assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
 }
 
-/// J-60: a payload that is set while a motion is paused may be too heavy for the remainder of the motion.
+/// J-60: the payload is changed while a motion is paused. If it is too heavy for the remainder of the motion, the
+/// motion cannot be resumed.
 #[test]
 fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
     let mut session = ready();

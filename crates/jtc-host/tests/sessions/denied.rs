@@ -11,7 +11,8 @@ use jtc_host::{
 };
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
-/// Denial that arrives with the next bytes that are read. The denial may belong to the last frame or to an earlier frame.
+/// Denial that is delivered together with the next bytes that the session reads. It may belong to the last frame or
+/// to an earlier frame.
 #[derive(Clone, Default)]
 struct Denials(Rc<RefCell<Option<&'static str>>>);
 
@@ -42,8 +43,8 @@ impl<P: Port> Port for SharedLine<P> {
     }
 }
 
-/// Returns a session on a shared line. The agent denies each frame with the reason `own`. If `own` is `None`, the
-/// device rejects the frame.
+/// Returns a session on a shared line on which every frame is rejected: by the agent with the reason `own`, or by the
+/// device if `own` is `None`.
 fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     let arriving = Denials::default();
     let denials = arriving.clone();
@@ -59,7 +60,8 @@ fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     (Session::new(SharedLine { port: device, arriving: arriving.clone(), denied: None }), arriving)
 }
 
-/// A late denial is not used as the answer to the next frame.
+/// A denial that arrives late belongs to an earlier frame. It must not be used as the reason for the rejection of the
+/// next frame.
 #[test]
 fn a_late_denial_is_not_that_of_the_next_frame() {
     let (mut s, arriving) = session(None);

@@ -56,8 +56,8 @@ fn moved(margin_pct: f64, seed: u64) -> Result<f64, String> {
     Ok(most)
 }
 
-/// On a heavier arm, moves with the default margin do not reach a torque limit, but some moves without a margin reach
-/// it.
+/// With the default margin, moves of the heavier arm stay below every torque limit. Without a margin, some moves
+/// reach a torque limit.
 #[test]
 fn a_heavier_arm_follows_plans_with_the_default_margin_below_its_torque_limits() {
     let mut reached = 0;

@@ -73,8 +73,8 @@ fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     Ok(joints.iter().map(|joint| joint.max_error_mrad.unwrap_or_default()).collect())
 }
 
-/// The rotors of the real arm are lighter or heavier than in the proposed parameters. The controller does not know the real inertia, but
-/// can still hold and move the arm.
+/// The rotors of the real arm are lighter or heavier than the proposed rotor inertias in the controller. The
+/// controller must still hold and move the arm.
 #[test]
 fn j41_j71_the_gains_that_are_proposed_move_an_arm_with_other_rotors() {
     let plain = include_str!("plain.urdf");

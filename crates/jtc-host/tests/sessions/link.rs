@@ -163,7 +163,8 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
     let Outcome::Finished(status) = outcome else { panic!("{outcome:?}") };
     assert_eq!(status.point, (t.trajectory().duration_s() * 1e3).round() as u32);
     assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
-    // The controller rejects a second execution from Finish, because the arm is at the end of the path (J-34).
+    // In Finish, the arm is at the end of the path and not at the first point. Therefore the controller rejects a
+    // second execution (J-34).
     let error = s.execute(&t).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Device);
     assert!(error.hint().contains("--approach"), "{error}");
@@ -203,7 +204,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
-    // The reported point is from the last status of the motion, up to 40 ms before the fault.
+    // The reported point comes from the last status before the fault, which may be up to 40 ms old.
     assert!((459..600).contains(point), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
     assert!(error.to_string().contains("joint 3"), "{error}");
@@ -213,7 +214,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
         .unwrap_or_else(|e| panic!("{e}: {steps:?}"));
     assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0), "{steps:?}");
     assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
-    // J-24: the arm does not move without a command.
+    // J-24: after the recovery, the arm must not move without a command.
     assert_ne!(status.trajectory, TrajectoryState::Execute);
 }
 
@@ -237,8 +238,8 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// If a person pushes the arm, the motion ends. The arm yields to the push, and then the controller holds the arm. After the error is
-/// cleared, the client can resume the motion.
+/// If a person pushes the arm, the motion ends without success. The arm yields to the push, and then the controller
+/// holds it. After the error is cleared, the client can resume the motion.
 #[test]
 fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     let mut s = ready(None);
@@ -291,7 +292,8 @@ fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     assert!(error.hint().contains("jtc reset --joints JOINT"), "{}", error.hint());
 }
 
-/// If the client no longer waits for the start of teaching, the arm must not become compliant.
+/// If the client gives up waiting for the start of teaching, teaching is switched off, so that the arm does not
+/// become compliant later.
 #[test]
 fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     let mut s = ready(None);
@@ -326,7 +328,7 @@ fn j06_a_refused_parameter_is_named() {
     set.model.as_mut().unwrap().links[0].mass = 51.0;
     let text = refusal(&mut s, &set);
     assert!(text.contains("mass of a link (kg) 51 is outside 0..50"), "{text}");
-    // The controller still has the earlier parameters of the arm.
+    // After the rejection, the controller still has the earlier parameters.
     assert_eq!(s.fresh_status().unwrap().jtc_init, 0);
     s.push(&good, |_| ()).unwrap();
 }

@@ -1,5 +1,5 @@
-//! Tests of host supervision (J-59). The controller detects if the session that commands the motion is alive. A session that only observes
-//! has no effect on this detection.
+//! Tests of host supervision (J-59). The controller detects if the session that commands the motion is still alive. A
+//! session that only observes does not count as alive.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -69,7 +69,7 @@ fn j59_a_session_that_watches_its_teaching_keeps_it_going() {
     }
 }
 
-/// The controller also answers the other requests of a session that repeats GetInfo during a motion.
+/// While a session repeats GetInfo during a motion, the controller also answers the other requests of this session.
 #[test]
 fn j50_requests_wait_for_the_answer_that_is_on_its_way() {
     let mut s = supervised(100, Some(115_200));
@@ -87,7 +87,8 @@ fn j59_a_motion_whose_session_has_gone_is_paused() {
         begin(&mut s);
         s.pass(Duration::from_millis(500)).unwrap();
         assert_eq!(s.last().unwrap().trajectory, TrajectoryState::Execute);
-        // A second session on this port only observes and sends nothing. Therefore the controller pauses the motion.
+        // A second session now uses the port. It only observes and sends no GetInfo, so the controller receives no
+        // sign of a host and pauses the motion.
         let mut watching: Session<SimPort> = Session::new(s.into_port());
         watching.pass(Duration::from_millis(u64::from(ms) + 1000)).unwrap();
         let status = watching.last().copied().unwrap();

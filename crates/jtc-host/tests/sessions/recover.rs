@@ -91,7 +91,7 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
         (status.state, status.trajectory),
         (ControllerState::HoldPos.into(), TrajectoryState::Stop.into())
     );
-    // In teaching the operator guides the arm, so the recovery does not end teaching.
+    // In teaching the operator guides the arm. A recovery that is cancelled sends no frame and does not end teaching.
     s.teach(true).unwrap();
     s.wait_for("teaching", Duration::from_secs(1), |s| s.state == ControllerState::Teaching).unwrap();
     let sent = s.statistics().frames_sent;
@@ -136,7 +136,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
     assert_eq!(s.statistics().frames_sent, sent);
 
-    // The controller has a parameter of another arm. The recovery then sends all parameters of the file.
+    // The controller now has one parameter of another arm, its default gains. The recovery must send all parameters
+    // of the file.
     s.use_default(jtc_host::session::Parameter::Pid).unwrap();
     let set = Arm::avena().parameter_set();
     let before = s.statistics().frames_sent;
@@ -150,8 +151,8 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // The controller holds the weight of the arm with the present parameters, so the recovery sends no other
-    // parameters. The recovery reports this as a step.
+    // The controller already holds the arm with its present parameters, so the recovery sends no others. The recovery
+    // reports this as a step.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();

@@ -16,14 +16,14 @@ use super::{Sim, motion, ready};
 struct Diary {
     steps: Vec<String>,
     samples: Rc<RefCell<usize>>,
-    /// Number of calls after which `is_cancelled` returns `true`.
+    /// Number of calls of `is_cancelled` after which it returns `true`.
     cancels_at: Option<usize>,
     asked: usize,
-    /// Point of the motion at which the front end requests a stop, ms.
+    /// Path time at which the front end requests a stop, ms.
     stops_at: Option<u32>,
     /// `true` if the front end requests full speed at each status during the motion.
     speeds: bool,
-    /// Number of statuses during the motion, and number of requested actions that were applied.
+    /// Number of statuses during the motion. `applied` is the number of requested actions whose result was reported.
     statuses: usize,
     applied: usize,
 }
@@ -119,7 +119,7 @@ fn j55_a_run_that_does_not_lead_back_has_an_approach_before_each_motion() {
     assert!((session.fresh_status().expect("a status").positions()[0] - 0.3).abs() < 2e-3);
 }
 
-/// After a cancellation no further motion begins. A motion in progress continues to its end.
+/// After a cancellation, no further motion begins, but a motion in progress continues to its end.
 #[test]
 fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     let mut counted = Diary::default();
@@ -145,8 +145,8 @@ fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     }
 }
 
-/// The last status of a motion shows its end. The action that the front end requests for this status is not applied. The front end must
-/// report to its client that the action was not applied.
+/// The action that the front end requests for the last status of a motion is not applied, because the motion has
+/// already ended. The front end must report this to its client.
 #[test]
 fn j57_a_flow_for_the_last_status_of_a_motion_is_not_applied() {
     let mut diary = Diary { speeds: true, ..Diary::default() };

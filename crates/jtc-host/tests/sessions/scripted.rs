@@ -69,8 +69,8 @@ fn j34_resume_only_after_a_pause() {
             "{error}"
         );
         assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
-        // The error suggests to repeat Resume only if the motion may still be decelerating (trajectory state
-        // Execute).
+        // Only in the trajectory state Execute may a motion still be decelerating after a Pause. Only then does the
+        // error suggest to repeat Resume.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
     let (mut s, written) = answers::session(
@@ -82,7 +82,7 @@ fn j34_resume_only_after_a_pause() {
         Duration::MAX,
     );
     s.resume().unwrap();
-    // Before Execute the host may request only the identity and the settings of the device.
+    // Before Execute, the session may send only requests for the identity and the settings of the device.
     let written = written.borrow();
     let (before, last) = written.split_last_chunk::<7>().unwrap();
     assert_eq!(*last, jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
@@ -129,8 +129,9 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!(written.borrow().len(), 0);
 }
 
-/// A frame without a response record may have arrived, and a Stop from another line may then have stopped the arm.
-/// Therefore a frame that moves or releases the arm is sent again only if its response record reports damage.
+/// If the response record of a frame is missing, the frame may have arrived, and another line may have stopped the
+/// arm since then. Therefore a frame that moves or releases the arm is repeated only if a response record reports
+/// that the frame was damaged.
 #[test]
 fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
@@ -139,8 +140,9 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // `records` contains the results in the response records for this frame, in order. Later frames receive no
-    // response record. `done` is `true` if the controller executes the frame.
+    // `of` is the frame under test. `records` contains the results in its response records, one for each
+    // transmission; later transmissions get no response record. `done` is `true` if the controller executes the
+    // frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);

@@ -1,4 +1,4 @@
-//! Checks that a controller accepts the gains (J-71), and that the gains damp each joint.
+//! Checks that a controller accepts the gains (J-71), and that the gains give each joint enough damping.
 
 use host_kit::Severity;
 use jtc_core::{JOINTS, PidGains, inertia_needed, least_felt_inertia};
@@ -9,16 +9,16 @@ use super::ArmFinding;
 use crate::arm::Arm;
 use crate::arm::statics::{POSES, pose};
 
-/// Heaviest payload for the check of the damping, kg.
+/// Heaviest payload with which the damping is checked, kg.
 const PAYLOAD_MAX: f64 = 5.0;
-/// Mean delay of a torque that stays constant for one tick, s. The check adds this mean delay to the delay in the
-/// controller's settings. `TICK` is the duration of one controller tick, s.
+/// Mean delay of a torque command, s, because each torque stays constant for one tick. The check adds this delay to
+/// the delay in the controller's settings. `TICK` is the duration of one tick, s.
 const HALF_A_TICK: f64 = 0.5e-3;
 const TICK: f64 = 1e-3;
 
 impl Arm {
-    /// Finds joints that are too light for their gains, and joints that the gains do not damp. A controller refuses the gains of a joint
-    /// that is too light.
+    /// Finds joints whose inertia is too small for their gains, and joints whose gains give too little damping. A
+    /// controller refuses the gains of a joint whose inertia is too small.
     pub(super) fn find_borne(&self, findings: &mut Vec<ArmFinding>) {
         let Some(pid) = &self.pid else { return };
         let (config, delay) = (self.config(), self.config().delay_ticks);
@@ -26,7 +26,8 @@ impl Arm {
         let (payload, moved) = self.heaviest_moved();
         for (joint, gains) in Joint::ALL.into_iter().zip(pid) {
             let j = joint.index();
-            // If the joint already has a stability finding, no second finding is added, because the stability finding is more precise.
+            // If the joint already has a finding about its stability, no second finding is added, because the first
+            // finding is more precise.
             if findings.iter().any(|found| found.code == "gains" && found.joint == Some(joint)) {
                 continue;
             }
@@ -73,8 +74,8 @@ impl Arm {
             "{}: Kd {kd} N·m·s/rad does not damp the joint{with}, expected at least {needed:.1}",
             self.titled(joint)
         );
-        // A part of Kd only compensates the delay of Kp. The advised Ki is so small that the remaining part of Kd
-        // still damps the joint.
+        // The part `delayed` of Kd only compensates the delay of Kp. The advised Ki is low enough that the remaining
+        // part of Kd damps the joint.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(
@@ -89,8 +90,9 @@ impl Arm {
             .measured(*kd, needed, "N·m·s/rad")
     }
 
-    /// Returns the heaviest payload (kg, up to [`PAYLOAD_MAX`]) that the torque limits can hold in every pose. Also returns the greatest
-    /// inertia of each joint with this payload, kg·m², while the other joints are held in position.
+    /// Returns the heaviest payload (kg, up to [`PAYLOAD_MAX`]) that the torque limits can hold in every pose. Also
+    /// returns the greatest inertia (kg·m²) that each joint moves with this payload, if the other joints are held in
+    /// position.
     fn heaviest_moved(&self) -> (f64, JointVec) {
         let ranges = self.ranges();
         let bare = Dynamics::new(&self.model, self.config().gravity);

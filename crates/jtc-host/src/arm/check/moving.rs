@@ -8,11 +8,11 @@ use super::{ArmFinding, Holding};
 use crate::arm::Arm;
 use crate::arm::statics::{Worst, worst_gravity};
 
-/// Share of the torque limit above which the check warns about the gravity torque, because little torque is left for
+/// If the gravity torque exceeds this share of the torque limit, the check warns that little torque is left for
 /// motions.
 const LITTLE_LEFT: f64 = 0.8;
-/// If the greatest torque limit exceeds the greatest gravity torque by this factor, the unit of the limits is probably
-/// wrong.
+/// Ratio of the greatest torque limit to the greatest gravity torque. Above this ratio, the limits probably have a
+/// wrong unit.
 const FAR_ABOVE: f64 = 15.0;
 
 impl Arm {

@@ -11,8 +11,8 @@ use crate::arm::statics::{Inertia, inertia};
 use crate::arm::{Arm, RotorMargin, Source};
 use crate::error::ParametersError;
 
-/// Ranges of the rotor inertias in which the gains are stable. Each range is given as factors of the values in the
-/// file.
+/// Ranges of the rotor inertias in which the gains are stable. The ranges are factors relative to the rotor inertias
+/// in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RotorMargins {
     /// Allowed factors if all rotor inertias change by the same factor.
@@ -118,8 +118,8 @@ impl Arm {
         Some(found.of(joint, "pid"))
     }
 
-    /// Finds gains that may be unstable because a rotor inertia is only proposed. The gains must be stable for the whole range of inertias
-    /// that the real rotor may have.
+    /// Finds gains that may be unstable because a rotor inertia is only a proposal and was not measured. Such gains
+    /// must be stable for the whole range of inertias that the real rotor may have.
     fn proposed_rotors(&self, margin: impl Fn([bool; JOINTS]) -> Option<RotorMargin>) -> Option<ArmFinding> {
         let name = "rotor_inertia_kg_m2";
         let is_proposed = |joint: &Joint| self.sources.of((Some(*joint), name)) == Source::Proposed;
@@ -163,9 +163,10 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
     ArmFinding::new(Severity::Good, "gains", what)
 }
 
-/// Formats a range such as `0.08..12` with two digits. The lower limit is rounded up and the upper limit is rounded down.
+/// Formats a range such as `0.08..12` with two significant digits. The lower limit is rounded up and the upper limit
+/// is rounded down, so the text never shows a wider range.
 fn range(down: f64, up: f64) -> String {
-    // Tolerance for rounding errors. With this tolerance, a value that already has two digits stays the same.
+    // Tolerance for rounding errors. It prevents that a limit with exactly two digits is rounded to another number.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

@@ -1,4 +1,4 @@
-//! Tests that each fault of an arm causes exactly one finding, which is about this fault.
+//! Tests that each fault of an arm causes exactly one finding, and that this finding describes the fault.
 
 use proptest::prelude::*;
 
@@ -91,8 +91,8 @@ fn an_arm_that_its_drives_cannot_hold_is_named_with_joint_pose_and_share() {
     assert!(f.finding.what.contains("N·m of 100 N·m (132 %) at q = ("), "{}", f.finding.what);
     let tight = found(&of("torque_max_nm = 180.0", "torque_max_nm = 150.0"));
     assert_eq!(tight, [("holding", Severity::Warning, Some(2))]);
-    // With these narrower position ranges, the arm cannot reach the poses with the greatest gravity torque. Therefore
-    // a torque limit of 100 N·m is enough to hold the arm.
+    // With these narrow position ranges, the arm cannot reach the poses with the greatest gravity torque. Therefore a
+    // torque limit of 100 N·m is sufficient, and the check reports no problem.
     let narrow = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
     let mut narrow = Arm { ..narrow };
     (narrow.joints[1].position_min, narrow.joints[1].position_max) = (-0.3, 0.3);
@@ -134,7 +134,8 @@ fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 1.2)), of(&[]));
 }
 
-/// The gains are stable within the allowed factors of the rotor inertias, and unstable slightly outside these factors.
+/// Rotor margins: the gains are stable within the allowed factors of the rotor inertias, and unstable slightly
+/// outside these factors.
 #[test]
 fn j71_the_rotor_margin_is_where_the_check_changes() {
     let arm = Arm::avena();
@@ -191,7 +192,8 @@ fn proposals_are_found_with_their_joints() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// The check does not panic for any number. The check refuses an arm if one of its numbers is not finite.
+    /// The check does not panic, whatever value a number of the arm has. If the number is NaN or infinite, the check
+    /// refuses the arm.
     #[test]
     fn no_number_is_too_odd_for_the_check(place in 0..11usize, joint in 0..JOINTS, value in prop::num::f64::ANY) {
         let mut arm = Arm::avena();
@@ -217,7 +219,8 @@ proptest! {
     }
 }
 
-/// The check refuses gains that a controller would refuse. The error contains the joint and the allowed inertia.
+/// The check refuses gains that a controller would refuse because the inertia of the joint is too small. The error
+/// contains the joint and the required inertia.
 #[test]
 fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let mut arm = Arm::avena();
@@ -225,7 +228,8 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let findings = arm.check().findings;
     let light = findings.iter().find(|f| f.code == "too-light").expect("too light");
     assert_eq!((light.finding.severity, light.joint.map(Joint::number)), (Severity::Problem, Some(1)));
-    // The gains in this test are barely stable, so the stability check finds no problem.
+    // The gains of this arm are barely stable, so the stability check reports no problem. They are refused only
+    // because the inertia of the joint is too small for them.
     assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
     assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));
     // If the rotor inertias are missing in the file, the stability is unknown, but the check still refuses gains that are too high.
@@ -236,8 +240,8 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     assert!(arm.check_gains().is_err());
 }
 
-/// An integral gain that is too high for a heavy load causes a warning. With the gain that the warning recommends, the check no longer
-/// reports this warning.
+/// An integral gain that is too high for the heaviest payload causes a warning. With the integral gain that the
+/// warning recommends, the warning disappears.
 #[test]
 fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     let warned = |ki: f64| {

@@ -12,7 +12,7 @@ use crate::file::FileError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// The name is not valid, so it cannot be used in a waypoint file or in an option.
+    /// The name is not valid: it cannot be used in a waypoint file or in an option.
     #[error(
         "\"{name}\" is not a valid name of a pose: a name begins with a letter, has only letters, digits, _, - and ., at most {NAME_MAX}, and is \
          not a number (nan, inf)"

@@ -13,8 +13,8 @@ use crate::file::{FileError, Place};
 pub(in crate::arm) const VELOCITY_DEFAULT: f64 = 1.5;
 pub(in crate::arm) const ACCELERATION_DEFAULT: f64 = 12.56637;
 pub(in crate::arm) const POSITION_ERROR_DEFAULT: f64 = 0.09;
-/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s the damping torque is 30 % of the torque limit. The
-/// controller recognises a torque up to 30 % of the torque limit as a load.
+/// Default damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s, the damping torque is 30 %
+/// of the torque limit. This is the largest torque that the controller accepts as the weight of a load (J-66).
 pub(in crate::arm) const TEACH_DAMPING_DEFAULT: f64 = 0.5;
 
 #[derive(Serialize, Deserialize)]

@@ -122,7 +122,7 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
     Ok(joints)
 }
 
-/// Returns the first joint that is not attached to the previous joint.
+/// Returns the first joint that does not descend from the previous joint in the list.
 fn first_branch<'a>(robot: &'a Robot, joints: &[&'a Joint]) -> Option<&'a Joint> {
     joints.windows(2).map(|pair| (pair[0], pair[1])).find_map(|(below, joint)| {
         (!way_down(robot, &joint.parent.link).any(|j| j.name == below.name)).then_some(joint)

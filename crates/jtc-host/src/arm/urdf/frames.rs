@@ -1,4 +1,4 @@
-//! Frames and rigid bodies, which are used to merge links.
+//! Frames and rigid bodies, with which several links are merged into one link.
 
 use jtc_dynamics::{Link, Origin};
 
@@ -28,7 +28,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
 impl Frame {
     pub(super) const IDENTITY: Self = Self { rotation: UNIT, position: [0.0; 3] };
 
-    /// Creates the frame Rz(yaw)·Ry(pitch)·Rx(roll), which is the convention of URDF.
+    /// Creates the frame Rz(yaw)·Ry(pitch)·Rx(roll). This is the convention of URDF.
     pub(super) fn of(origin: &Origin) -> Self {
         let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.map(f64::sin_cos);
         Self {
@@ -41,7 +41,8 @@ impl Frame {
         }
     }
 
-    /// Returns the frame as translation `xyz` and rotation `rpy`. If roll and yaw rotate about the same axis, yaw is 0.
+    /// Returns the frame as translation `xyz` and rotation `rpy`. If roll and yaw rotate about the same axis, only
+    /// their sum is determined, and yaw is set to 0.
     pub(super) fn origin(&self) -> Origin {
         let r = &self.rotation;
         let cos_pitch = r[0][0].hypot(r[1][0]);
@@ -58,7 +59,7 @@ impl Frame {
         *self == Self::IDENTITY
     }
 
-    /// Transforms the frame `next`, which is relative to this frame, into the parent of this frame.
+    /// Returns the frame `next` relative to the parent of this frame. `next` must be relative to this frame.
     pub(super) fn then(&self, next: &Self) -> Self {
         let moved = applied(&self.rotation, &next.position);
         Self {

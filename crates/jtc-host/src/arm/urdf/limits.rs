@@ -1,4 +1,4 @@
-//! Joint limits of a robot description, narrowed to the range of the drives.
+//! Joint limits of a robot description. Limits beyond the range of the drives are reduced to this range.
 
 use std::f64::consts::PI;
 
@@ -11,7 +11,8 @@ use super::choice::about;
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
-/// Largest position limit of a multi-turn joint in either direction, rad. A larger position limit is probably in degrees.
+/// Largest credible position limit of a multi-turn joint in either direction, rad. A larger value is probably in
+/// degrees.
 const TWO_TURNS: f64 = 4.0 * PI;
 /// Largest angle that counts as one full turn, rad. Many descriptions round 2π up to this value.
 const TURN: f64 = 6.3;
@@ -34,9 +35,9 @@ fn fastest() -> f64 {
     drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor
 }
 
-/// Rejects position limits that are not a valid range in rad. The reader does not replace invalid limits by the widest range of the drives,
-/// because the arm could then hit its end stops. Returns `true` if the joint can turn more than one full turn in each direction, like some
-/// wrists.
+/// Rejects position limits that are not a valid range in rad. Invalid limits are not replaced by the whole range of
+/// the drives, because the arm could then hit its end stops. Returns `true` if the joint can turn more than one full
+/// turn in each direction, like some wrists.
 fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
     if let Some(limit) = [lower, upper].into_iter().find(|limit| limit.is_nan()) {
@@ -109,7 +110,8 @@ impl Chain<'_> {
                 self.sources.fill_in((Some(number), key));
             }
         }
-        // If a position limit is missing, the limit of the drives is used. The description does not contain the end stops of the joint.
+        // If a position limit is missing, the limit of the drives is used, because the description does not contain
+        // the end stops of the joint.
         let mut assumed = Vec::new();
         for (key, limit, end) in [
             ("position_min_rad", &mut to.position_min, -WORKING_AREA),
@@ -141,8 +143,8 @@ impl Chain<'_> {
         if is_limit(limit.velocity) && limit.velocity <= BELIEVABLE_SPEED {
             to.velocity_max = limit.velocity;
         } else if is_limit(limit.velocity) {
-            // The velocity limit may be in rad/s or in °/s. The reader assumes °/s, because this speed is lower, and limits the speed to
-            // the speed of the drives. The reader marks the value as a default.
+            // The value is too high for rad/s, so the reader assumes °/s, which is the lower speed. The reader also
+            // limits the value to the highest speed of the drives, and marks it as a default.
             let in_degrees = limit.velocity.to_radians();
             to.velocity_max = in_degrees.min(fastest());
             self.sources.fill_in((Some(number), "velocity_max_rad_s"));

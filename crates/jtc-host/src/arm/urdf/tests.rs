@@ -150,8 +150,8 @@ proptest! {
     ) {
         let gravity = [0.7, -1.3, -9.6];
         let arm = Arm::from_urdf(&robot(&parts, "")).unwrap();
-        // The arm dynamics round an angle within 2 µrad of a multiple of π/2 to this multiple. The test skips arms
-        // with such angles.
+        // Angles within 2 µrad of a multiple of π/2 are rounded to this multiple in the arm dynamics. Therefore the
+        // test skips arms with such angles.
         let off = |angle: f64| (angle - FRAC_PI_2 * (angle / FRAC_PI_2).round()).abs();
         let angles = arm.model.joints.iter().flat_map(|origin| origin.rpy);
         prop_assume!(angles.map(off).all(|off| !(1e-9..3e-6).contains(&off)));
@@ -168,8 +168,8 @@ proptest! {
     }
 }
 
-/// A plate between two joints and a tool on two fixed joints become parts of links. The masses equal the masses of links that already
-/// contain the plate and the tool.
+/// A plate between two joints and a tool behind two fixed joints are merged into the links that carry them. The
+/// resulting masses must equal the masses of links that already contain the plate and the tool.
 #[test]
 fn fixed_joints_are_merged_into_the_link_that_carries_them() {
     let flange =
@@ -202,8 +202,8 @@ fn j40_fingers_and_what_follows_them_are_left_out() {
     let finger = joint("left", "prismatic", ("b6", "l"), LIMIT) + &body("l", 0.1, &[0.0; 3]);
     let mimic = joint("right", "prismatic", ("b6", "r"), &format!("<mimic joint=\"left\"/>{LIMIT}"))
         + &body("r", 0.1, &[0.0; 3]);
-    // The joint `right` follows a joint of the arm, so the user does not need to select the six joints. In the second
-    // description, a finger moves independently. Therefore the user must select the six joints.
+    // In the first description, the joint `right` follows an arm joint, so the user does not need to select the six
+    // joints. In the second description, a finger moves independently, so the user must select them.
     let follower = mimic.replace("\"left\"", "\"a1\"");
     let arm = Arm::from_urdf(&robot(&parts(), &follower)).unwrap();
     assert_eq!(
@@ -267,7 +267,8 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
             "{limit}: {assumed:?}"
         );
     }
-    // If the torque limit is missing, the importer computes a limit from this arm and does not copy the limit of another arm.
+    // If the torque limit is missing, the importer computes a limit from the masses of this arm. It does not copy the
+    // limit of another arm.
     let text = robot(&parts(), "").replace("effort=\"50\"", "");
     let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
     assert!(arm.joints.iter().all(|j| j.torque_max < 60.0 && j.torque_max > 0.5), "{:?}", arm.joints);

@@ -49,8 +49,8 @@ fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
     })
 }
 
-/// Returns the end of the tag at the start of `rest`. In an opening tag, a `>` inside an attribute value does not end the
-/// tag. A closing tag has no attributes.
+/// Returns the position of the end of the tag that begins at the start of `rest`. In an opening tag, a `>` inside an
+/// attribute value does not end the tag. A closing tag has no attributes.
 fn end_of_tag(rest: &str) -> Option<usize> {
     if rest.starts_with("</") {
         return rest.find('>');
@@ -66,7 +66,8 @@ fn end_of_tag(rest: &str) -> Option<usize> {
     })
 }
 
-/// Rejects a text whose elements are nested too deeply, because the XML reader is recursive.
+/// Rejects a text whose elements are nested too deeply. The XML reader is recursive, so deep nesting could overflow
+/// its stack.
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {

@@ -43,8 +43,8 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     for before in [asked(&board, Some(false)), asked(&board, None), Preflight::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
-    // A report of another board does not replace the missing report of the drive's board. If the drive's board itself
-    // reports, the report of another board has no effect.
+    // A report of another board does not replace the missing report of the drive's board. It has no effect once the
+    // drive's board itself reports.
     board.hold(true);
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });
@@ -72,7 +72,8 @@ fn what_a_status_leaves_open_has_to_be_answered_for() {
     board.set_status(|status| status.can_current = can_flag::no_answer(2));
     assert!(question().unwrap().contains("no answer from joint 3"));
     reset();
-    // A joint in the state Start has not answered since the controller started.
+    // A joint in the state Start has not answered since the controller started, so the operator must confirm the
+    // flashing.
     board.set_status(|status| status.joints[2].state = NodeState::START);
     assert!(question().unwrap().contains("no answer from joint 3"));
     reset();
@@ -97,7 +98,7 @@ fn the_question_names_what_no_file_and_no_line_shows() {
     super::super::fake::catalogue(folder.path(), &["nucleo-h743zi2"]);
     let listed = Image::read(&folder.path().join("nucleo-h743zi2.bin")).unwrap();
     assert!(!question(&listed).contains("file is complete"));
-    // The received bytes do not form a status frame.
+    // Bytes that do not form a status frame do not count as an answer of a controller.
     let noise = crate::port::test::ScriptedPort::new(None, |_, _| vec![0x55; 3]);
     let answers = look(&mut Session::new(noise)).unwrap();
     assert!(matches!(answers, Answers::Nothing { bytes: 1.. }), "{answers:?}");
@@ -112,7 +113,8 @@ fn a_second_look_sees_what_is_then() {
     let board = Board::running(H745, None);
     let mut session = Session::new(Keeps { port: board.port(), kept: Vec::new() });
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: false, .. }));
-    // Status frames of two minutes, all without torque, are buffered. After these buffered frames, a drive is enabled.
+    // Two minutes of status frames, all without torque, are buffered. Then a drive is enabled. The result must show
+    // the torque, and not the buffered state.
     session.port_mut().keep(Duration::from_secs(120));
     board.set_status(|status| status.joints[0].state = NodeState::ENABLED);
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: true, .. }));
@@ -185,8 +187,8 @@ fn an_image_goes_onto_its_own_board_only() {
     let all = Permissions { assume_board: true, accept_supply: true };
     assert_eq!(ask(H745, &h745, Some(H745), none), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &h745, None, all), Err("other-board"));
-    // The label of the drive is truncated, so it does not identify the board. The running controller or the operator must identify the
-    // board.
+    // The label of the drive is truncated, so it does not identify the board. Either the running controller or the
+    // operator must identify it.
     assert_eq!(ask("nucleo-h743zi2", &cut, None, none), Err("unnamed-board"));
     assert_eq!(ask("nucleo-h743zi2", &cut, None, Permissions { assume_board: true, ..none }), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), none), Ok(()));

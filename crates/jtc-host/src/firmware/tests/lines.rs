@@ -95,7 +95,8 @@ fn a_board_that_another_program_has_open_is_not_flashed() {
         assert!(matches!(&error, FirmwareError::NotAsked { port, .. } if port == at), "{error}");
         assert_eq!(error.kind(), ErrorKind::Refused);
     }
-    // The port of the drive's board must be available, but the port that the user selected may be missing.
+    // A port of the drive's board that cannot be opened is an error. The additional port that the user selected may
+    // be missing.
     let permission = |port: &str| Err(PortError::Permission { path: port.into() });
     assert!(matches!(usb.open(None, permission), Err(FirmwareError::NotAsked { .. })));
     let gone = |port: &str| match port {

@@ -25,7 +25,7 @@ pub enum ParameterSource<'a> {
 }
 
 impl ParameterSource<'_> {
-    /// Checks that an arm contains friction, gains and arm model.
+    /// Checks that an arm that is used as a source contains friction, gains and arm model.
     ///
     /// # Errors
     ///
@@ -49,9 +49,9 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns `true` if parameters must be sent. Every controller receives the parameters of an arm once. A controller is commanded to use
-    /// its defaults only if it lacks some parameters. Friction, gains and model are always sent together, so that the parameters of two
-    /// arms are never mixed.
+    /// Returns `true` if parameters must be sent. The parameters of an arm are sent once to every controller. The
+    /// command to use the defaults is sent only if the controller lacks parameters. Friction, gains and model are
+    /// always sent together, so that parameters of two arms are never mixed.
     pub(super) fn due(&self, status: &Status, given: bool) -> bool {
         match self {
             ParameterSource::None => false,

@@ -24,8 +24,8 @@ pub enum RecoverStep {
     Give(Option<String>),
     /// No parameters are sent, so the controller keeps its parameters.
     Keep,
-    /// The parameters of the user's arm are not sent, because the controller already holds the arm with other
-    /// parameters.
+    /// The parameters of the user's arm are not sent, because the controller already holds the arm's weight with
+    /// other parameters.
     KeepHolding(String),
     /// Nodes start up.
     WaitNodes(Vec<String>),

@@ -1,5 +1,5 @@
 //! Echo program for a CAN bus: `cargo run --example echo -- URL`. The program answers every received frame with a
-//! frame that has the same payload and the next identifier.
+//! frame that has the same payload. The identifier of the answer is higher by 1.
 
 use std::time::Duration;
 

@@ -1,5 +1,6 @@
 //! A simulated SLCAN adapter on a pseudo-terminal, for any host program: `cargo run --example slcan_adapter`. The
-//! adapter answers every frame on its bus with a frame that has the same payload and the next identifier.
+//! adapter answers every frame on its bus with a frame that has the same payload. The identifier of the answer is
+//! higher by 1.
 
 #[cfg(unix)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {

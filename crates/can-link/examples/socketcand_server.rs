@@ -1,9 +1,10 @@
 //! A socketcand server with three buses, for any client program: `cargo run --example socketcand_server --
 //! 127.0.0.1:29536`.
 //!
-//! - `can0`: the server answers every frame with a frame that has the same payload and the next identifier;
+//! - `can0`: the server answers every frame with a frame that has the same payload and an identifier that is higher
+//!   by 1;
 //! - `can1`: has no members except the clients, which exchange frames with each other;
-//! - `busy`: the server continuously sends frames with the identifier 7F0 and a running number.
+//! - `busy`: the server continuously sends numbered frames with the identifier 7F0.
 
 use std::time::Duration;
 

@@ -6,10 +6,11 @@ use crate::{CanError, CanFrame, ControllerState};
 
 /// A member of a CAN bus.
 ///
-/// `receive` returns the frames of all other members in the order of the bus, and never the member's own frames.
+/// `receive` returns the frames of all other members in the order in which they were on the bus. It never returns the
+/// member's own frames.
 pub trait CanBus {
-    /// Sends a frame. Waits while the transmit queue is full. Returns an error if the queue stays full for seconds,
-    /// for example because no other member acknowledges frames.
+    /// Sends a frame. Waits while the transmit queue is full. Returns an error if the queue stays full for several
+    /// seconds, for example because no other member acknowledges frames.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
     /// Returns the next frame of another member, or `None` if none arrived within `timeout`. With a timeout of zero,
@@ -22,7 +23,7 @@ pub trait CanBus {
     }
 
     /// Returns how many times this member's CAN controller has been bus-off, derived from the frames received so far.
-    /// The controller may be active again, but frames that were sent during bus-off are lost. `times_bus_off` does
+    /// If the number has increased, frames were lost, even if the controller is active again. `times_bus_off` does
     /// not query the adapter. The number is 0 if the adapter does not report bus-off.
     fn times_bus_off(&self) -> u64 {
         0

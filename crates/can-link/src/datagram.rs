@@ -26,7 +26,7 @@ struct Sent<'a> {
     error_state_indicator: bool,
 }
 
-/// Keys that are read from a received map; other keys are ignored.
+/// Keys that the decoder reads from a received map. The decoder ignores other keys.
 #[derive(Deserialize)]
 struct Received {
     arbitration_id: u32,
@@ -111,8 +111,7 @@ mod tests {
         let frame = decode(BY_PYTHON_CAN).unwrap();
         let bytes: Vec<u8> = (0..12).collect();
         assert_eq!(frame, CanFrame::fd(Id::standard(0x205).unwrap(), &bytes).unwrap());
-        // The datagrams of openjtc and python-can have the same bytes, except the time of day (8 bytes from byte
-        // 12).
+        // openjtc and python-can must write the same bytes. Only the timestamp (8 bytes from byte 12) differs.
         let again = encode(&frame);
         assert_eq!(again[..12], BY_PYTHON_CAN[..12]);
         assert_eq!(again[20..], BY_PYTHON_CAN[20..]);

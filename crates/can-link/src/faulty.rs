@@ -57,10 +57,10 @@ pub struct FaultStats {
 pub(crate) struct Line {
     faults: FaultConfig,
     random: fastrand::Rng,
-    /// Frames in transit, sorted by the time at which each frame is delivered. Frames with equal delivery times are in the order in
-    /// which they were added.
+    /// Frames in transit and their delivery times, earliest first. Frames with equal delivery times stay in the order
+    /// in which they were added.
     under_way: Vec<(Duration, CanFrame)>,
-    /// Time at which the last frame that is not reordered is delivered. Frames that are not reordered do not overtake each other.
+    /// Delivery time of the last frame that was not selected for reordering. Such frames do not overtake each other.
     last_due: Duration,
     stats: FaultStats,
 }
@@ -76,8 +76,8 @@ impl Line {
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, stats: FaultStats::default() }
     }
 
-    /// Adds a frame. Every frame draws the same number of random values in the same order. Changing one setting therefore does not
-    /// change the faults from the other settings.
+    /// Adds a frame. Draws the same number of random values for every frame, in the same order. A change of one fault
+    /// setting (such as `loss`) therefore does not change the other simulated faults.
     pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let FaultConfig { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
@@ -159,8 +159,8 @@ impl<B: CanBus> Faulty<B> {
         Self::with_clock(bus, schedule, move || start.elapsed())
     }
 
-    /// Creates the bus with delays measured by the caller's clock, which must not run backwards. With virtual time the
-    /// delays are repeatable.
+    /// Creates the bus with delays that are measured by the caller's clock, which must not run backwards. With a
+    /// clock in virtual time, the delays are repeatable.
     pub fn with_clock(
         bus: B,
         schedule: FaultSchedule,
@@ -172,7 +172,7 @@ impl<B: CanBus> Faulty<B> {
         Self { bus, out, received, clock: Box::new(clock) }
     }
 
-    /// Returns the counters of received frames.
+    /// Returns the fault counters of the received frames.
     pub fn received_stats(&self) -> FaultStats {
         self.received.stats
     }
@@ -199,13 +199,14 @@ impl<B: CanBus> CanBus for Faulty<B> {
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let start = (self.clock)();
-        // The loop also counts the time of its own waits, because a virtual clock may not advance during a wait.
+        // The loop also adds up its own waiting time, because a virtual clock does not necessarily advance during a
+        // wait.
         let mut waited = Duration::ZERO;
         loop {
             let now = (self.clock)();
             self.send_due(now)?;
-            // All frames that have already arrived are put into the simulated line, which sorts them by delivery
-            // time, before the first frame is returned.
+            // All frames that have already arrived enter the simulated line before the first frame is returned,
+            // because the line sorts them by delivery time.
             while let Some(frame) = self.bus.receive(Duration::ZERO)? {
                 self.received.put(now, frame);
             }
@@ -245,7 +246,7 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// A test bench whose clock, in ms, only the test advances.
+    /// A test bench with a clock in ms. Only the test advances this clock.
     struct Bench {
         faulty: Faulty<VirtualBus>,
         peer: VirtualBus,
@@ -297,8 +298,8 @@ mod tests {
         let stats = bench.faulty.received_stats();
         assert_eq!(stats.frames, 4000);
         assert_eq!(received.len() as u64, 4000 - stats.lost + stats.doubled);
-        // With 4000 frames, the standard deviation of each share is less than 0.008. The tolerance of 0.05 is at
-        // least six standard deviations.
+        // Each count divided by 4000 must be close to its expected share. The standard deviation of this quotient is
+        // less than 0.008, so the tolerance of 0.05 is at least six standard deviations.
         for (count, share) in [(stats.lost, 0.1), (stats.corrupted, 0.18), (stats.doubled, 0.27)] {
             assert!((count as f64 / 4000.0 - share).abs() < 0.05, "{stats:?}");
         }

@@ -1,4 +1,5 @@
-//! Functions of the fuzz targets. Each function panics if a guarantee is violated.
+//! Functions that the fuzz targets call. Each function panics if the tested code violates a property that it
+//! guarantees.
 
 use std::time::Duration;
 
@@ -40,7 +41,8 @@ fn inner(text: &str) -> &str {
     text.strip_prefix('<').and_then(|text| text.strip_suffix('>')).expect("a message in its brackets")
 }
 
-/// Finds messages with a slow and simple algorithm: each message begins at the last `<` before a `>`.
+/// Finds messages with a slow and simple algorithm, for comparison with the parser. Each message begins at the last
+/// `<` before a `>`.
 fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     let mut found = Vec::new();
     let mut rest = stream;

@@ -9,7 +9,7 @@ use socket2::{Domain, Protocol, Socket, Type};
 use crate::datagram::{MAX_DATAGRAM, decode, encode};
 use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 
-/// Bytes that the operating system may buffer for this member, about 4,000 frames.
+/// Size of the receive buffer that is requested from the operating system, bytes; sufficient for about 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
 
 /// Longest time for which a send waits for space in the transmit queue of the operating system.
@@ -34,7 +34,8 @@ impl MulticastBus {
     /// Joins a group. With `ttl` 0, frames stay on this computer; with `ttl` 1, frames can reach the local network.
     pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, AttachError> {
         let failed = |(step, source)| AttachError::Join { group, port, step, source };
-        // A computer without a network has no default interface, but can still reach itself by IPv4.
+        // A computer without a network has no default interface. The second attempt therefore uses the IPv4 loopback
+        // interface, on which programs on this computer can reach each other.
         let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
             .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))
             .map_err(failed)?;
@@ -53,7 +54,7 @@ impl MulticastBus {
         move |source| CanError::Io { url, step, source }
     }
 
-    /// Sets the timeout of the listener only if it changes, which is rare.
+    /// Sets the timeout of the listener. Makes no system call if the timeout is unchanged, which is the usual case.
     fn set_timeout(&mut self, timeout: Option<Duration>) -> io::Result<()> {
         if timeout == self.timeout {
             return Ok(());
@@ -174,8 +175,8 @@ impl CanBus for MulticastBus {
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let mut buffer = [0; MAX_DATAGRAM];
         let deadline = Instant::now().checked_add(timeout);
-        // The first attempt does not wait, so that the socket settings stay unchanged if a datagram has already
-        // arrived.
+        // The first attempt does not wait. If a datagram has already arrived, the timeout of the socket then stays
+        // unchanged.
         let mut wait = None;
         loop {
             self.set_timeout(wait).map_err(self.failed("setting the timeout"))?;
@@ -252,8 +253,8 @@ mod tests {
         assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);
     }
 
-    // Each test uses its own ports. The ports differ between test runs, so that parallel runs do not use the same
-    // ports.
+    // Each test uses its own ports. The ports also differ between test runs, because several test runs can take place
+    // at the same time.
     fn port(number: u16) -> u16 {
         20_000 + (std::process::id() % 10_000) as u16 * 4 + number
     }

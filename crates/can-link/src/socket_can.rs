@@ -39,8 +39,8 @@ impl SocketCanBus {
             hint: hint(&source, interface),
             source,
         };
-        // A socket for all interfaces (index 0) can be opened only if the kernel supports CAN. This call separates
-        // missing CAN support from a wrong interface name.
+        // A socket for all interfaces (index 0) can be opened only if the kernel supports CAN. This attempt shows
+        // whether CAN support is missing or the interface name is wrong.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
         // The kernel reports an interface that is down as a pending error of the socket.

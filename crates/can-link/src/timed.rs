@@ -47,7 +47,7 @@ pub struct TimedBus {
     members: Vec<Member>,
     random: fastrand::Rng,
     disturbance: f64,
-    /// Frame that is on the bus now.
+    /// Frame that is being transmitted on the bus.
     transfer: Option<Transfer>,
     /// Time at which the intermission ends and the bus is free, ns.
     free_from: u64,
@@ -63,8 +63,8 @@ struct Member {
     /// from the bus.
     lines: Option<Box<(Line, Line)>>,
     counters: Counters,
-    /// Earliest time at which the member may start a frame. An error passive member waits longer, so that other members
-    /// can start first.
+    /// Earliest time at which the member can start a frame. An error passive member waits longer, so that other
+    /// members can start first.
     may_start: u64,
     /// State of the recovery from bus-off; `None` if no recovery is in progress.
     recovery: Option<Recovery>,
@@ -84,7 +84,7 @@ impl Member {
 struct Transfer {
     end: u64,
     arbitration: Arbitration,
-    /// Error that ends the frame. The field does not store a collision.
+    /// Error that ends the frame. Collisions are not stored in this field.
     error: Option<BusError>,
 }
 
@@ -173,7 +173,7 @@ impl TimedBus {
         }
     }
 
-    /// Sets whether a member drops a frame after one failure instead of repeating it.
+    /// Sets whether a member drops a frame after one failure. Otherwise, the member repeats the frame.
     pub fn set_one_shot(&mut self, member: MemberId, one_shot: bool) {
         self.members[member.0].one_shot = one_shot;
     }
@@ -258,8 +258,8 @@ impl TimedBus {
         BusStats { now_ns: self.now, ..self.stats }
     }
 
-    /// Returns the time of the bus's next action if the caller does nothing until then, ns. The action may cause no
-    /// event.
+    /// Returns the time of the next action of the bus, ns, if the caller makes no other call before this time. Not
+    /// every action causes an event.
     pub fn next_ns(&self) -> Option<u64> {
         if !self.events.is_empty() {
             return Some(self.now);
@@ -277,8 +277,8 @@ impl TimedBus {
     }
 
     /// Advances to the next event, or to `at_ns` if no event occurs before. The caller must repeat the call until it
-    /// returns `None`. After the call returns an event, the current time is the time of this event. Frames that the
-    /// caller queues then take part in arbitration from this time on.
+    /// returns `None`. After each returned event, the current time is the time of this event. Frames that the caller
+    /// then queues take part in arbitration from this time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -302,7 +302,7 @@ impl TimedBus {
         (u64::from(bits) * 1_000_000_000).div_ceil(u64::from(self.bitrate))
     }
 
-    /// Returns the earliest time at which the bus is free and a member with a queued frame may start.
+    /// Returns the earliest time at which the bus is free and a member with a queued frame is allowed to start.
     fn next_start(&self) -> Option<u64> {
         let ready = |member: &Member| member.on_bus() && !member.queue.is_empty();
         let start = |member: &Member| member.may_start.max(self.free_from);
@@ -337,15 +337,15 @@ impl TimedBus {
                 self.events.push_back(BusEvent::Received { member: MemberId(number), frame });
             }
         }
-        // The bus first returns the events of this time. Members that react to these events then take part in the next
-        // arbitration.
+        // The bus first returns the events of this time. Frames that members send as a reaction to these events then
+        // take part in the next arbitration.
         if self.events.is_empty() && self.transfer.is_none() {
             self.start();
         }
     }
 
-    /// Updates the members' recovery from bus-off when a frame has ended. The acknowledge delimiter or error
-    /// delimiter of the frame was the first of the 11 recessive bits.
+    /// Updates the members' recovery from bus-off when a frame has ended. The sequence of 11 recessive bits begins
+    /// with the acknowledge delimiter or error delimiter of this frame, and ends when the bus is free.
     fn wire_is_recessive(&mut self) {
         let from = self.free_from.saturating_sub(self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -372,8 +372,8 @@ impl TimedBus {
         };
         let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
         let Some(arbitration) = Arbitration::of(&starters) else { return };
-        // A random number is drawn for every frame, so that the fault of one frame does not change the faults of other
-        // frames.
+        // Random numbers are drawn for every frame, so that a fault of one frame does not change the faults of the
+        // other frames.
         let (luck, place) = (self.random.f64(), self.random.f64());
         let (bits, error) = if arbitration.senders.is_empty() {
             (arbitration.bits + ERROR_FRAME, None)

@@ -33,7 +33,7 @@ pub enum CanUrl {
         /// Rate of the serial line, bit/s.
         baud: u32,
     },
-    /// `socketcand:HOST:PORT/can0`; the port may be omitted.
+    /// `socketcand:HOST:PORT/can0`; the port is optional.
     Socketcand {
         /// Name or address of the server; an IPv6 address without brackets.
         host: String,

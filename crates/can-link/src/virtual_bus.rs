@@ -31,7 +31,7 @@ pub struct VirtualHub {
 struct Shared {
     timeout: Duration,
     state: Mutex<State>,
-    /// Condition variable that is notified when an entry was added to or removed from a queue.
+    /// Condition variable that is notified after an entry is added to or removed from a queue.
     changed: Condvar,
 }
 
@@ -60,12 +60,12 @@ struct Member {
     waiting: VecDeque<Received>,
     /// Maximum number of frames in the queue.
     limit: usize,
-    /// `true` if no sender waits for the member. Senders do not wait for a guest. Senders also do not wait for a
-    /// member that has taken no entry since a sender waited for it without success.
+    /// `true` if no sender waits for the member. This applies to every guest. It also applies to a member for which a
+    /// sender has waited without success, until the member takes an entry again.
     stalled: bool,
     /// `true` if no sender ever waits for the member.
     guest: bool,
-    /// `true` while the member receives no frames.
+    /// `true` while the member ignores all frames.
     deaf: bool,
     missed: u64,
 }

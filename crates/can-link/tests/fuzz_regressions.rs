@@ -8,7 +8,7 @@ fn kept_inputs() {
     test_kit::run_kept_inputs(&[("socketcand_stream", socketcand_stream), ("slcan_stream", slcan_stream)]);
 }
 
-/// Words of the protocols (separated by bars in `words`), mixed with noise.
+/// Words of the protocols, mixed with random bytes. `words` contains the words, separated by bars.
 fn words(words: &'static str) -> impl Strategy<Value = Vec<u8>> {
     let word = prop_oneof![
         8 => prop::sample::select(words.split('|').collect::<Vec<_>>()).prop_map(|word| word.as_bytes().to_vec()),

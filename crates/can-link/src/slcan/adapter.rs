@@ -198,7 +198,7 @@ pub enum AdapterError {
     Bus(CanError),
 }
 
-/// Returns 0 for a read without data and for a write without space. Such a read or write is not an error.
+/// Returns 0 for a read without data and for a write without space, which are not errors.
 fn waited(result: io::Result<usize>) -> io::Result<usize> {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     result.or_else(|error| match error.kind() {

@@ -10,7 +10,8 @@ use super::port::Port;
 
 use crate::{AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, OpenError};
 
-/// Longest wait for the answer to the first version request; the adapter may still be starting.
+/// Longest wait for the answer to the first version request. The wait is long, because the adapter is perhaps still
+/// starting.
 const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
 /// Number of version requests before the host assumes that no adapter answers.
 const VERSION_QUESTIONS: u32 = 3;
@@ -18,11 +19,12 @@ const VERSION_QUESTIONS: u32 = 3;
 const ANSWER: Duration = Duration::from_millis(500);
 /// Waiting time after which all bytes that the adapter sent to a previous program have arrived.
 const QUIET: Duration = Duration::from_millis(30);
-/// Longest time for which an adapter may refuse a frame because its queue is full, or delay its answer.
+/// Longest time to repeat a frame that the adapter refuses because of a full queue, and longest wait for the
+/// adapter's answer.
 const SEND_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause before a refused frame is sent again.
 const RETRY: Duration = Duration::from_millis(1);
-/// Duration of one step of a wait. Each step handles both directions.
+/// Duration of one step of a wait. In each step, the host both reads and writes.
 const SLICE: Duration = Duration::from_millis(20);
 /// Largest number of received frames that are stored while the host waits for an answer.
 const RECEIVE_QUEUE: usize = 100_000;
@@ -140,12 +142,14 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // Only the answer to the version request is a text, so this answer cannot belong to an earlier line.
+                // Of all answers, only the answer to the version request is a text. The text is therefore not a late
+                // answer to an earlier command.
                 if self.got_text {
                     return Ok(());
                 }
             }
-            // An adapter is connected, because bytes have arrived, but it does not support the version request.
+            // The adapter does not support the version request. The received bytes prove that an adapter is
+            // connected.
             if somebody {
                 return Ok(());
             }
@@ -212,8 +216,8 @@ impl SlcanBus {
                         self.state = state;
                     } else if let Some(state) = parse_flags(line) {
                         self.got_flags = true;
-                        // This line contains no error counters. The counters that were reported earlier stay valid if
-                        // the error state is unchanged.
+                        // This line contains no error counters. If the error state is unchanged, the counters that
+                        // were reported earlier stay valid.
                         if self.state.errors != state.errors {
                             self.state = state;
                         }
@@ -249,7 +253,7 @@ impl SlcanBus {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
                 // The adapter accepts no bytes, perhaps because it waits until this host reads received frames. The
-                // host therefore reads.
+                // host therefore reads before it writes again.
                 Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }

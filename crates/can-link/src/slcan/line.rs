@@ -20,7 +20,7 @@ pub(crate) enum Piece<'a> {
     Bell,
 }
 
-/// Splits a stream into lines, with bounded memory. The stream may be cut at any position.
+/// Splits a stream into lines, with bounded memory. The stream can arrive in pieces of any length.
 pub(crate) struct Lines {
     line: Vec<u8>,
     /// `true` if the line in `line` was already returned.
@@ -172,7 +172,7 @@ mod tests {
         parse_frame(line).map(|frame| format!("{frame:?}"))
     }
 
-    /// The lines are examples from the LAWICEL manual and from the description of CANable 2.
+    /// The parser must accept the example lines from the LAWICEL manual and from the description of CANable 2.
     #[test]
     fn lines_are_frames() {
         for (line, expected) in [

@@ -56,7 +56,7 @@ fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
     }
 }
 
-/// Returns the controller state after an error frame. An error frame may lack the new state, the new counters, or
+/// Returns the controller state after an error frame. Some error frames lack the new state, the new counters, or
 /// both.
 fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
@@ -86,8 +86,8 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));
             let of_counters = ErrorState::of_counters(tec, rec);
-            // Eight-bit counters cannot represent bus-off. A controller stays bus-off until it reports another
-            // state.
+            // Eight-bit counters cannot show bus-off, which requires a count above 255. Without a reported state, a
+            // controller that was bus-off is therefore still considered bus-off.
             let kept = if before.errors == ErrorState::BusOff { before.errors } else { of_counters };
             ControllerState { errors: errors.unwrap_or(kept), tec: Some(tec), rec: Some(rec) }
         }
@@ -146,7 +146,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Converts frames to the kernel's structures and back.
+        /// Frames that are converted to the kernel's structures and back must be unchanged.
         #[test]
         fn every_frame_survives_the_kernels_form(
             value in any::<u32>(), extended in any::<bool>(), kind in 0..4, data in prop::collection::vec(any::<u8>(), 0..=64)

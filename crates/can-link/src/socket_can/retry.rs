@@ -5,7 +5,7 @@ use std::time::Duration;
 
 /// The kernel's error number for a full transmit queue. The kernel itself does not wait for space in the queue.
 const ENOBUFS: i32 = 105;
-/// Pause between two write attempts: the duration of a frame on a fast bus.
+/// Pause between two write attempts, which is the duration of a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
 /// Time without space in the transmit queue after which the bus is considered to have failed.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -51,7 +51,7 @@ mod tests {
         let mut tries = 0;
         let write = || {
             tries += 1;
-            // When only one result of the list is left, each further call returns this result.
+            // The last result in the list is returned again in each further call.
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };

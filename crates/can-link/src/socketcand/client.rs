@@ -15,7 +15,7 @@ use crate::{
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest time for which a send waits for a server that accepts no data.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time for which a send waits for space before it reads received bytes. The server may accept no data until this client
+/// Time for which a send waits for space before it reads received bytes. Some servers accept no data until the client
 /// reads.
 const SEND_SLICE: Duration = Duration::from_millis(20);
 /// Longest time for which a closing bus waits until the server accepts the last frames.
@@ -32,7 +32,7 @@ pub struct SocketcandBus {
     url: String,
     stream: TcpStream,
     splitter: Splitter,
-    /// Bytes that arrived together with an answer while the bus was opened.
+    /// Bytes that were received together with an answer while the bus was opened, and that are not processed yet.
     glued: Vec<u8>,
     receive_queue: VecDeque<CanFrame>,
     /// Timeout of the socket; with `None`, the socket does not wait.
@@ -131,7 +131,7 @@ impl SocketcandBus {
             return Err(CanError::Closed { url: self.url.clone() });
         }
         if !self.glued.is_empty() {
-            // The stored bytes came from a single read, so they fit into the buffer.
+            // The stored bytes were received by a single read, so they fit into the buffer.
             let count = self.glued.len();
             buffer[..count].copy_from_slice(&self.glued);
             self.glued.clear();

@@ -8,7 +8,8 @@ use super::shared::{Channel, ClientAction, ClientId, Route};
 use super::{ServerStats, SocketcandServer};
 use crate::{CanFrame, ErrorState, ListenError, VirtualHub};
 
-/// Largest number of events that wait for the host program. If more events arrive, the connections wait.
+/// Largest number of events in the queue for the host program. While this queue is full, the threads of the client
+/// connections wait.
 const WAITING: usize = 1024;
 
 /// Action of a client.
@@ -33,9 +34,9 @@ pub struct FromClient {
     pub event: ClientEvent,
 }
 
-/// A [`SocketcandServer`] whose clients' frames go only to the host program. The host program decides when each frame
-/// is on the bus, and then [delivers](Self::deliver) it. Bus order, arbitration and faults are simulated by the host
-/// program.
+/// A [`SocketcandServer`] that passes its clients' frames only to the host program. The host program determines when
+/// each frame is on the bus, and then [delivers](Self::deliver) it. The host program itself simulates bus order,
+/// arbitration and faults.
 pub struct SocketcandGateway {
     // The field `events` is dropped first. Threads that wait for space in the event channel then end.
     events: Receiver<FromClient>,

@@ -1,4 +1,5 @@
-//! Session of a client of the server: one thread reads requests. After raw mode begins, a second thread writes frames.
+//! Session of a client of the server. One thread reads the client's requests. A second thread writes frames to the
+//! client after raw mode begins.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -66,7 +67,7 @@ impl Session<'_> {
         stream.set_nodelay(true)?;
         // Keep-alive detects that a client's computer was switched off.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
-        // The operating system may change the size to its own limits.
+        // The operating system limits the size to its own range.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;

@@ -33,7 +33,7 @@ pub(super) enum Route {
     Host(Box<dyn Fn(ClientId, ClientAction) -> bool + Send + Sync>),
 }
 
-/// A bus of the server. The clients are members of its hub for which no sender waits.
+/// A bus of the server. The clients join its hub as guests: a sender never waits for a guest whose queue is full.
 pub(super) struct Channel {
     pub(super) name: String,
     pub(super) hub: VirtualHub,

@@ -1,10 +1,10 @@
-//! Splits a TCP stream, which may be cut at any position, into messages.
+//! Splits a TCP stream into messages. The stream can arrive in pieces of any length.
 
 /// Longest message that is stored. The longest message of the protocol, a CAN FD frame with blanks between its bytes,
 /// has 240 characters.
 pub(crate) const LONGEST: usize = 512;
 
-/// Splits a stream into messages, with bounded memory. The stream may be cut at any position.
+/// Splits a stream into messages, with bounded memory. The stream can arrive in pieces of any length.
 pub(crate) struct Splitter {
     /// Bytes after the last `<`.
     message: Vec<u8>,
@@ -40,7 +40,8 @@ impl Splitter {
             *bytes = rest;
             match byte {
                 b'<' => {
-                    // A message begins inside another message, so the end of the outer message was lost.
+                    // A `<` inside a message begins a new message. The end of the unfinished message was lost, so
+                    // this message is counted as invalid.
                     self.noise += u64::from(self.inside);
                     self.inside = true;
                     self.message.clear();

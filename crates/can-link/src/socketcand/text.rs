@@ -115,8 +115,8 @@ fn id(word: &str) -> Option<Id> {
     if word.len() <= 3 { Id::standard(value).ok() } else { Id::extended(value).ok() }
 }
 
-/// Parses bytes in hexadecimal: one word with all bytes, or one word per byte. A word with one byte may omit a leading
-/// zero.
+/// Parses bytes in hexadecimal: one word with all bytes, or one word per byte. A single byte without a leading zero
+/// is also accepted.
 fn bytes<'a, const MOST: usize>(words: impl Iterator<Item = &'a str>) -> Option<Vec<u8>> {
     let mut found = Vec::new();
     for word in words {
@@ -198,7 +198,8 @@ mod tests {
         CanFrame::classic(Id::extended(id).unwrap(), data).unwrap()
     }
 
-    /// Requests as python-can 4.6.1 writes them: without leading zeros, and with two blanks for a message without data.
+    /// The parser must accept requests as python-can 4.6.1 writes them: without leading zeros, and with two blanks
+    /// for a message without data.
     #[test]
     fn requests_of_python_can_are_understood() {
         for (text, request) in [
@@ -294,8 +295,8 @@ mod tests {
         }
     }
 
-    /// Error frames as socketcand writes them and python-can 4.6.1 reads them: three digits for the class, followed by
-    /// the time.
+    /// Error frames must have the format that socketcand writes and python-can 4.6.1 reads: three digits for the
+    /// class, followed by the time.
     #[test]
     fn bus_off_and_the_way_back_are_error_frames() {
         let time = Duration::from_micros(12_000_345);

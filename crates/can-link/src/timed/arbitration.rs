@@ -22,7 +22,7 @@ pub(super) struct Arbitration {
     pub(super) frame: CanFrame,
     /// Number of bits from the start of the frame to the end of the CRC, or to the error if the frame is destroyed.
     pub(super) bits: u32,
-    /// All members that sent the winning identifier, if their frames differ after the identifier.
+    /// All members that sent the winning identifier, if their frames differ after the identifier; otherwise empty.
     pub(super) collision: Vec<MemberId>,
     /// Members in a collision that failed to send.
     pub(super) failed: Vec<MemberId>,

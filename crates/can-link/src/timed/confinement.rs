@@ -14,7 +14,7 @@ impl Counters {
         ControllerState::of_counters(self.tec, self.rec)
     }
 
-    /// Returns `true` if the member is error passive, so that its error flags no longer destroy frames.
+    /// Returns `true` if the member is error passive. The error flags of such a member do not destroy frames.
     pub(crate) fn passive(self) -> bool {
         self.state().errors >= ErrorState::Passive
     }
@@ -55,7 +55,7 @@ impl Counters {
 /// member therefore recovers after at least 128 frames.
 pub(crate) struct Recovery {
     pub left: u32,
-    /// Time since which the bus has been recessive, ns; `None` while a frame is on the bus.
+    /// Time since which the bus has been continuously recessive, ns; `None` while a frame is on the bus.
     pub recessive_from: Option<u64>,
 }
 

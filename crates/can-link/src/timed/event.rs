@@ -2,8 +2,8 @@
 
 use crate::{CanFrame, ControllerState};
 
-/// Identifier of a member of a [`TimedBus`](crate::TimedBus). The identifier is only valid for that bus; another bus
-/// may panic. Numbers increase and are never reused.
+/// Identifier of a member of a [`TimedBus`](crate::TimedBus). The identifier is valid only for this bus, and another
+/// bus can panic if it is used there. Numbers increase and are never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 
@@ -33,14 +33,14 @@ pub enum BusEvent {
         /// The transmitted frame.
         frame: CanFrame,
     },
-    /// A member's frame is dropped, because the member sends each frame only once or is bus-off.
+    /// A member's frame is dropped, because the member does not repeat frames or is bus-off.
     Failed {
         /// Member that sent the frame.
         member: MemberId,
         /// The dropped frame.
         frame: CanFrame,
     },
-    /// A transmission has failed. The senders repeat the frame, unless they send each frame only once.
+    /// A transmission has failed. The senders repeat the frame, except senders that do not repeat frames.
     Error {
         /// Reason for the failure.
         error: BusError,

@@ -12,17 +12,17 @@ const TAIL: u32 = 1 + 1 + 1 + 7;
 pub(crate) const TO_ACKNOWLEDGE: u32 = 2;
 /// Number of bits of the intermission between two frames.
 pub(crate) const INTERMISSION: u32 = 3;
-/// Longest error frame: an error flag, the error flags of the other members, and the delimiter.
+/// Longest error frame in bits: an error flag (6), the error flags of the other members (6), and the delimiter (8).
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
 /// Bits that an error passive member waits after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
-/// Number of consecutive recessive bits in one sequence of the recovery from bus-off, and the number of sequences
-/// that a bus-off controller needs.
+/// Number of consecutive recessive bits in one sequence of the recovery from bus-off. The next constant is the number
+/// of such sequences that a bus-off controller needs.
 pub(crate) const RECESSIVE_RUN: u32 = 11;
 pub(crate) const RECOVERIES: u32 = 128;
 
-/// Largest number of bits from the start of a frame to the end of its CRC, including stuff bits (29-bit identifier, 8
-/// bytes: 118 and 29).
+/// Largest number of bits from the start of a frame to the end of its CRC, for a 29-bit identifier and 8 bytes: 118
+/// bits and 29 stuff bits.
 const MOST: usize = 147;
 
 /// The bits from start of frame to CRC, with stuff bits.
@@ -102,8 +102,10 @@ fn crc15(crc: u16, bit: bool) -> u16 {
 }
 
 /// Returns the arbitration key of a frame. The frame with the lowest key wins. Frames with equal keys do not lose
-/// arbitration against each other. The key begins with the base identifier. The next bit is the remote bit of an
-/// 11-bit frame. In a 29-bit frame, the recessive substitute bit has the same position.
+/// arbitration against each other.
+///
+/// The key begins with the base identifier. The next bit is the remote bit of an 11-bit frame, or the recessive
+/// substitute bit of a 29-bit frame.
 pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     let (value, remote) = (frame.id().value(), u32::from(frame.is_remote()));
     if frame.is_extended() {
@@ -113,8 +115,8 @@ pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     }
 }
 
-/// Returns the exact length of a classic frame on the bus in bits, including stuff bits and the three bits of
-/// intermission, or `None` for CAN FD.
+/// Returns the exact length of a classic frame on the bus in bits, or `None` for CAN FD. The length includes stuff
+/// bits and the three bits of intermission.
 ///
 /// A bus is fully loaded if the frame lengths of one second add up to the bit rate.
 pub fn classic_frame_bits(frame: &CanFrame) -> Option<u32> {
@@ -157,7 +159,7 @@ mod tests {
                 run = if pair[0] == pair[1] { run + 1 } else { 0 };
                 prop_assert!(run < 5, "never six alike");
             }
-            // The stuff bit of the last group of equal bits may be located after the CRC.
+            // The stuff bit of the last group of equal bits can follow the CRC.
             let mut logical = destuff(wire.bits());
             let crc = logical.split_off(logical.len() - 15);
             // Leading zeros do not change a CRC that starts at 0.
@@ -229,8 +231,8 @@ mod tests {
         found
     }
 
-    /// Bounds for 8 bytes from the literature, including intermission: 111 and 131 bits before stuffing, at most 135
-    /// and 160 bits with stuffing.
+    /// Known lengths of frames with 8 bytes, including intermission. Without stuff bits: 111 bits (11-bit identifier)
+    /// and 131 bits (29-bit identifier). With stuff bits: at most 135 and 160 bits.
     #[test]
     fn lengths_lie_between_the_known_bounds() {
         let bits = |frame| classic_frame_bits(&frame).unwrap();

@@ -32,8 +32,8 @@ impl Running {
             let mut latest = None;
             while adapter.turn(&mut port, &mut bus).is_ok() {
                 if asked.load(Ordering::Relaxed) {
-                    // The thread ends when the host has closed the channel, or after 2 s. Bytes that the host wrote
-                    // before the stop request may still be in the terminal.
+                    // The thread ends when the host has closed the channel, or after 2 s. Until then it also
+                    // processes bytes that the host wrote before the stop request and that are still in the terminal.
                     let latest = *latest.get_or_insert_with(|| Instant::now() + Duration::from_secs(2));
                     if !adapter.is_open() || Instant::now() >= latest {
                         break;
@@ -177,7 +177,7 @@ fn play(mut stream: TcpStream, mut answer: impl FnMut(&str) -> String) -> Vec<St
     lines
 }
 
-/// Some firmware answers only the version request.
+/// Some firmware answers only the version request. The host must still send frames to such an adapter.
 #[test]
 fn an_adapter_that_never_answers_is_written_to_all_the_same() {
     let (device, adapter) = served(|stream| {
@@ -274,7 +274,7 @@ fn what_cannot_be_set_is_an_error_that_lists_what_can() {
     assert!(error.contains("data bit rate") && error.contains("5000000"), "{error}");
     let error = open("slcan:/dev/nothing/here@1000000").err().unwrap().to_string();
     assert!(error.contains("plugged in") && error.contains("/dev/nothing/here"), "{error}");
-    // This adapter does not support CAN FD.
+    // This adapter does not support CAN FD, so opening the bus with a data bit rate must fail.
     let (device, _adapter) = served(|stream| {
         play(stream, |line| match line.as_bytes() {
             [b'Y', ..] => "\u{7}".to_owned(),

@@ -1,4 +1,4 @@
-//! Tests of the socketcand protocol over TCP, with a client that knows only the protocol.
+//! Tests of the socketcand protocol over TCP, with a simple client that shares no code with the server.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -187,7 +187,8 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
-    // On this bus, a sender that waits for a member waits forever.
+    // On this bus, a sender waits forever for a member whose queue is full. A client that does not read must not
+    // block the sender in this way.
     let hub = VirtualHub::with_timeout(Duration::MAX);
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
@@ -268,8 +269,8 @@ fn an_unknown_bus_is_refused_with_what_there_is() {
     assert!(error.contains("opening the bus") && error.contains("there is can0"), "{error}");
 }
 
-/// The server must deliver frames that a client sent before it disconnected. This must work even if the client did
-/// not read its received frames.
+/// The server must deliver frames that a client sent before it disconnected, even if the client has not read its
+/// received frames.
 #[test]
 fn the_last_frames_of_a_client_are_delivered() {
     let (server, hub) = socketcand_bench();
@@ -292,7 +293,7 @@ fn ten_thousand_visitors_leave_nothing_behind() {
     let texts: [&[u8]; 5] = [b"", b"< open can0 >", b"< open can0 >< rawmode >", b"<", &[0xFF; 3000]];
     for number in 0..10_000 {
         let mut stream = TcpStream::connect(server.local_addr()).unwrap();
-        // The server may already have closed the connection.
+        // An error is ignored, because the server has perhaps already closed the connection.
         let _ = stream.write_all(texts[number % texts.len()]);
         if number % 16 == 15 {
             // The test never opens more connections than the server accepts.

@@ -51,7 +51,7 @@ fn a_host_can_run_the_bus_itself() {
     });
 }
 
-/// Each client is a member of a bus in virtual time, on which the test answers like a board.
+/// Each client is a member of a bus in virtual time. The test answers the clients' frames like a board.
 #[test]
 fn clients_are_members_of_a_bus_in_virtual_time() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();

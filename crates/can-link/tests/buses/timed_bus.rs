@@ -70,8 +70,8 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// Compares the bus with a simple model: of the first frames of all queues, the frame with the lowest identifier is
-    /// sent next, without a gap.
+    /// The frames must be sent in the order of a simple model: of the first frames of all queues, the frame with the
+    /// lowest identifier is sent next, without a gap.
     #[test]
     fn frames_come_in_the_order_of_a_simple_model(ids in prop::collection::vec(prop::collection::vec(0..0x800_u32, 0..12), 2..6)) {
         let mut bus = TimedBus::new(250_000, 0);
@@ -136,8 +136,8 @@ proptest! {
     }
 }
 
-/// D-05: if two nodes send the same identifier with different data at the same time, the bus reports a collision. Both
-/// colliding nodes repeat their frames, as CAN controllers do. The collisions end when one node is error passive and no
+/// D-05: if two nodes send the same identifier with different data at the same time, the bus must report a collision.
+/// Both nodes repeat their frames, so they collide again. The collisions end when one node is error passive and no
 /// longer destroys the frame of the other node.
 #[test]
 fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
@@ -151,8 +151,8 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     assert_eq!([a, b].map(|member| bus.state(member).tec), [Some(8), Some(8)]);
     assert_eq!(bus.state(listener).rec, Some(1));
     let events = run(&mut bus, 20 * MS);
-    // 16 failures make both nodes passive at the same time. In the 17th collision the node with the dominant bit
-    // succeeds.
+    // After 16 failures, both nodes are error passive, so their error flags no longer destroy frames. In the 17th
+    // collision, the node with the dominant bit succeeds.
     assert_eq!(bus.stats().collisions, 17);
     assert_eq!(received(&events, listener), [one, other]);
     assert_eq!(received(&events, b), [one], "the member that dropped out receives it");

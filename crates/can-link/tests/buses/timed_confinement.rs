@@ -20,8 +20,8 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
         .collect();
     let (active, passive) = (times[1] - times[0], times[101] - times[100]);
     assert_eq!(passive - active, 8000);
-    // While the only other member does not acknowledge frames, the errors continue. They end when a member joins that
-    // acknowledges.
+    // The member `mute` does not acknowledge frames, so the frame fails again and again. When `listener` joins, which
+    // acknowledges, both members must receive the frame.
     let mute = bus.join();
     bus.set_acknowledges(mute, false);
     assert!(received(&run(&mut bus, 101 * MS), mute).is_empty());
@@ -45,7 +45,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     assert_eq!((failed, bus.state(a).errors), (2, ErrorState::BusOff));
     assert_eq!(bus.state(b).rec, Some(32));
     bus.set_disturbance(0.0);
-    // A member in bus-off does not receive and does not acknowledge.
+    // A member in bus-off must neither receive nor acknowledge frames.
     bus.queue(b, frame(0x200, &[])).unwrap();
     assert!(
         run(&mut bus, 51 * MS)
@@ -57,7 +57,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     let is_back = |event: &TimedEvent| matches!(event.what, BusEvent::State { member, .. } if member == a);
     let back = events.iter().position(is_back).unwrap();
     // Only member `b` sends, and no member acknowledges its frame. Each attempt ends with 11 recessive bits, so
-    // member `a` recovers after 128 attempts.
+    // member `a` must recover after 128 attempts.
     assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
     assert_eq!(received(&events, a), [frame(0x200, &[])]);
     bus.queue(a, frame(0x100, &[1])).unwrap();
@@ -154,7 +154,7 @@ fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
     assert!(stats.lost > 10 && stats.doubled > 5);
     assert_eq!(received(&events, b).len() as u64, 200 - stats.lost + stats.doubled);
     assert_eq!((errors(&events), bus.state(b).rec), (vec![], Some(0)));
-    // Each frame must arrive 1 ms after it was on the bus.
+    // Each frame must arrive 1 ms after the end of its transmission on the bus.
     let sent: Vec<_> =
         events.iter().filter(|e| matches!(e.what, BusEvent::Sent { .. })).map(|e| e.at_ns).collect();
     let times = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);

@@ -1,13 +1,18 @@
 //! Measures the planning time, and the quality of jerk-limited motions, on fixed random waypoints.
 //!
 //!     cargo run --profile dist -p jtc-plan --example measure -- speed
-//!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED]]
+//!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED [FILE]]]
 //!
 //! `speed` prints the processor time in ms, which is the shortest time of several runs. `quality` prints a line for
-//! each kind of path. The line contains the sum of the durations and its ratio to the sum without a jerk limit, and the
-//! largest such ratio of a motion. The line then contains the number of motions that became slower when all limits were
-//! doubled. The number of motions that could not be planned and the processor time follow. If a file name follows the
-//! seed, the durations of each motion are written to this file.
+//! each kind of path, with these values:
+//!
+//! - sum of the durations of all motions, and ratio of this sum to the sum without a jerk limit;
+//! - largest ratio of a single motion to the same motion without a jerk limit;
+//! - number of motions that became slower when all limits were doubled;
+//! - number of motions that could not be planned;
+//! - processor time.
+//!
+//! The durations of all motions are written to FILE.
 use std::fmt::Write as _;
 
 use jtc_core::{Config, Parameters};
@@ -87,7 +92,7 @@ fn speed() {
 
 struct Set {
     name: &'static str,
-    /// Waypoints and blend.
+    /// Waypoints (rad) and blend (rad) of each path.
     paths: Vec<(Vec<JointVec>, f64)>,
 }
 

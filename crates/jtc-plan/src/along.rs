@@ -1,4 +1,4 @@
-//! Computation of time laws for paths.
+//! Computation of time laws for paths. A time law is the path parameter as a function of time.
 use jtc_wire::Joint;
 
 use crate::cells::{Cell, cells};
@@ -32,8 +32,8 @@ pub(crate) fn unexplained(
     along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
-/// Planning method that was chosen for each section of a path. If a path is planned again, the planner reuses these
-/// methods, so that small changes of the path change the time law only slightly.
+/// Planning method that was chosen for each section of a path. If a slightly changed path is planned, the planner
+/// reuses these methods, so that the time law also changes only slightly.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<Choice>>);
 
@@ -76,8 +76,8 @@ pub(crate) fn along_at(
     verify::finished(motion, limits, arm)
 }
 
-/// Returns the number (from 1) of the first waypoint at `s`. Several consecutive waypoints may have the same position.
-/// Without a waypoint at `s`, returns the last passed waypoint.
+/// Returns the number (from 1) of the first waypoint at `s`, because several consecutive waypoints can have the same
+/// position. Without a waypoint at `s`, returns the last passed waypoint.
 fn first_waypoint(path: &dyn Path, s: f64) -> usize {
     let passed = |s: f64| if s < 0.0 { 0 } else { path.waypoint(s).unwrap_or(1) };
     passed(s).min(passed(s.next_down()) + 1)
@@ -107,7 +107,7 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let sections = ends.windows(2).map(|pair| {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
-        // Counts the waypoints at a parameter of the path. Several waypoints may have the same parameter.
+        // Counts the waypoints at one parameter of the path, which can be more than one.
         let at = |place: f64| {
             waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
         };
@@ -163,8 +163,8 @@ fn of_section(
     }
 }
 
-/// Returns the motion of a time law without a jerk limit, or of a time law averaged over a time window with the
-/// chosen shares of the limits.
+/// Returns the motion of a time law without the interior-point method. The time law has no jerk limit, or is averaged
+/// over a time window with the chosen shares of the limits.
 fn without_interior(
     mut plan: Plan,
     shares: Option<jerk::Shares>,
@@ -220,9 +220,9 @@ pub(crate) struct Plan<'a> {
     pub cells: &'a [Cell],
     /// Highest squared path speed in each cell.
     pub caps: Vec<f64>,
-    /// Squared path speed in each cell up to which friction is evaluated.
+    /// Estimate of the highest squared path speed in each cell. Friction is evaluated up to this speed.
     pub reached: Vec<f64>,
-    /// Factor by which the path speed in each cell is reduced.
+    /// Factor by which the path speed in each cell is multiplied to reduce it.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
@@ -246,7 +246,7 @@ const TORQUE_ROUNDS: usize = 4;
 /// Minimum reduction of the duration by a round, as a share of the duration. If a round reduces the duration by less,
 /// it is the last round.
 const WORTH: f64 = 0.004;
-/// Largest factor between a cell's speeds in two consecutive rounds.
+/// Largest ratio of a cell's speeds in two consecutive rounds.
 const FASTER: f64 = 1.1;
 
 /// Maximum number of repairs. A repair slows down the cells of the path in which a limit is violated between samples.
@@ -263,8 +263,8 @@ impl Plan<'_> {
         if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
-    /// Returns a squared speed for each cell, slightly above the highest squared speed of `law` in this cell, but at
-    /// most the cap of the cell.
+    /// Returns a squared speed for each cell. It is slightly above the highest squared speed of `law` in this cell,
+    /// but not above the cap of the cell.
     fn reached_by(&self, law: &Law) -> Vec<f64> {
         let speed = |s: f64| law.at(law.time_of(s)).1;
         let mut before = 0.0;

@@ -36,7 +36,8 @@ pub struct BlendedPath {
 struct Given {
     /// Index of the last corner that is at or before the waypoint.
     corner: usize,
-    /// Parameter of this corner, if the waypoint is a corner.
+    /// Path parameter of the waypoint. For a waypoint that is no corner, this is a point on the straight line between
+    /// two corners.
     parameter: f64,
 }
 
@@ -49,7 +50,7 @@ struct Corner {
     /// Half of the parameter range of the rounding; 0 if the corner is not rounded.
     half: f64,
     stop: bool,
-    /// `true` if the path stops at this corner only because it turns back.
+    /// `true` if the path turns back at this corner, and stops for no other reason.
     leads_back: bool,
 }
 

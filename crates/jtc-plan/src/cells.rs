@@ -1,5 +1,5 @@
-//! Division of a path section into cells (short intervals), and the limits of the path parameter in each cell that
-//! follow from the joint limits.
+//! Division of a path section into cells (short intervals), and limits of the path speed and acceleration in each
+//! cell. These limits follow from the joint limits.
 use jtc_wire::Joint;
 
 use crate::compose::Section;
@@ -7,7 +7,7 @@ use crate::path::PathPoint;
 use crate::profile::Bounds;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Number of cells into which each smooth part of a path is divided.
+/// Number of cells into which each part of a path between two breaks is divided.
 struct Division {
     straight: usize,
     curved: usize,
@@ -19,17 +19,19 @@ const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
 /// Division for a time law whose acceleration changes only at the ends of the cells.
 const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
-/// Maximum share of the torque available for motion that the term proportional to the squared path speed may use.
+/// Largest share of the torque available for motion that the term with ṡ² (the squared path speed) is allowed to use.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
-/// Minimum share of the torque limit that must be available for motion when friction increases with the speed. If less
-/// torque is available for motion, the speed is reduced.
+/// Share of the torque limit that must remain available for motion after friction. The path speed is reduced until
+/// this share remains.
 const MOTION_SHARE: f64 = 0.05;
-/// If the torque left at standstill (usable torque minus holding torque and breakaway friction) is small, only this
-/// share of it must remain available for motion, instead of [`MOTION_SHARE`] of the limit.
+/// Share of the torque left at standstill that must remain available for motion, if this is less than
+/// [`MOTION_SHARE`] of the limit. The torque left at standstill is the usable torque minus holding torque and
+/// breakaway friction.
 const STANDING_SHARE: f64 = 0.5;
-/// Share of the torque limit that is sufficient for a slow motion, and that must always remain available for motion.
+/// Smallest share of the torque limit that must always remain available for motion. It is sufficient for a slow
+/// motion.
 const CREEP_SHARE: f64 = 0.002;
 
 /// Parts of the torque at a point, N·m. With q̈ = q′·s̈ + q″·ṡ² the torque is hold + mass·s̈ + speed·ṡ², plus friction.
@@ -63,7 +65,8 @@ pub(crate) struct End {
 /// Short interval of a path section, on which the path is a single smooth curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
-    /// Range of the parameter, from the start of the section.
+    /// Path parameter at the start of the cell, counted from the start of the section. The next field is the
+    /// parameter at the end of the cell.
     pub from: f64,
     pub to: f64,
     pub ends: [End; 2],
@@ -146,7 +149,8 @@ pub(crate) struct Room {
     limit: JointVec,
 }
 
-/// Returns the torque of the joint with index `j` (N·m) that a plan may use if the holding torque is `hold`.
+/// Returns the torque of the joint with index `j` (N·m) that a plan is allowed to use if the holding torque is
+/// `hold`.
 pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold: f64) -> f64 {
     TORQUE_SHARE * arm.usable_torque(limits, j, hold)
 }
@@ -166,8 +170,8 @@ impl Room {
         room
     }
 
-    /// Returns the joint whose available torque exceeds `needed` by the smallest amount. Also returns the available
-    /// torque as a share of the joint's torque limit.
+    /// Returns the available torque and the index of the joint for which the difference between available torque and
+    /// `needed` is smallest. The torques are shares of the joint's torque limit.
     fn least(&self, limits: &Limits, needed: &JointVec) -> (f64, usize) {
         let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
         let over = |j: &usize| share(*j) - needed[*j];
@@ -235,9 +239,10 @@ impl Cell {
         Ok(cap)
     }
 
-    /// Returns limits of the speed and the acceleration of the path parameter. The squared speed is at most `cap`. The
-    /// two limits are independent: any combination of speed and acceleration within these two limits keeps the joints
-    /// within their limits. The curvature of the path may use the share `share` of the acceleration and jerk limits.
+    /// Returns limits of the speed and the acceleration of the path parameter. The squared speed is at most `cap`.
+    /// Each combination of speed and acceleration within these limits keeps the joints within their limits.
+    ///
+    /// `share` is the share of the acceleration and jerk limits that the curvature of the path is allowed to use.
     /// Friction is considered up to the squared speed `reached`.
     pub(crate) fn bounds(
         &self,

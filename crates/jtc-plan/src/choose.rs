@@ -1,15 +1,16 @@
 //! Choice of the corners that are rounded, and of the waypoints that are corners.
 //!
-//! A path that stops at a corner is always within the blend. A straight line close to dense waypoints is also within
-//! the blend. The planner uses the fastest option.
+//! A path that stops at a corner is always within the blend. A straight line that passes close to dense waypoints is
+//! also within the blend. The planner compares these options and uses the fastest.
 use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
-/// Maximum distances of dropped waypoints from the straight line, as shares of the blend.
+/// Maximum distances of removed waypoints from the straight line, as shares of the blend. One path is created for
+/// each value.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// If removing waypoints divides the number of corners by this factor or more, and there is a jerk limit, only the
-/// paths with removed waypoints are planned.
+/// Ratio of the numbers of corners before and after the removal of waypoints. If this ratio or a higher ratio is
+/// reached and there is a jerk limit, the path with all waypoints is not planned.
 const DENSE: usize = 8;
 /// Number of rounds in which rounded corners are replaced by stops.
 const ROUNDS: usize = 5;
@@ -23,8 +24,8 @@ pub(crate) struct Chosen {
 }
 
 /// Plans several motions through the waypoints of `path` and returns the fastest motion. The options are the path
-/// itself, paths without some of the waypoints, paths with stops at some corners, and a path with a stop at each
-/// waypoint. Waypoints for which `keep` returns `true` are not dropped.
+/// itself, paths without some of the waypoints, paths with stops at some corners, and a path with stops at all
+/// waypoints. Waypoints for which `keep` returns `true` are not dropped.
 pub(crate) fn fastest(
     path: BlendedPath,
     blend: f64,

@@ -44,7 +44,8 @@ impl Section<'_> {
         std::iter::once(self.from).chain(ends()).zip(ends().chain([self.to]))
     }
 
-    /// Returns the motion along the section. The first time in the list of waypoint times is the start of the section.
+    /// Returns the motion along the section. In the list of waypoint times, the first entry is the start of the
+    /// section.
     pub(crate) fn motion(&self, law: &Law, limits: &Limits) -> Motion {
         let mut pieces = Vec::new();
         let shortest = if limits.has_jerk() { SHORTEST } else { SHORTEST_WITHOUT_JERK };

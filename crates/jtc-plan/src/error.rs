@@ -29,8 +29,8 @@ pub enum PlanError {
     /// A position outside the limits.
     #[error("waypoint {waypoint}, {}", self.what())]
     Position {
-        /// Number (from 1) of the waypoint outside the limits, or of the last waypoint before the position outside the
-        /// limits.
+        /// Number (from 1) of the waypoint outside the limits. If the position is between two waypoints, this is the
+        /// number of the waypoint before it.
         waypoint: usize,
         /// Joint of the position.
         joint: Joint,
@@ -103,8 +103,8 @@ pub enum PlanError {
         limit: LimitKind,
         /// Specified time from waypoint `from` to this waypoint, s.
         given: f64,
-        /// Shortest possible time, s. If only the adjacent legs make the specified time impossible, this field is 5 % longer than the
-        /// specified time.
+        /// Shortest possible time, s. The value is at least 5 % longer than the specified time, because sometimes
+        /// only the speed in the adjacent legs makes the specified time impossible.
         shortest: f64,
     },
     /// The torque of a joint is not sufficient at any speed.
@@ -120,8 +120,8 @@ pub enum PlanError {
         limit: f64,
         /// Torque limit of the joint, N·m; the field `limit` is a share of this torque limit.
         whole: f64,
-        /// `true` if the torque is too small even to hold the arm at rest, at the start, at a stop or at the end of the
-        /// motion.
+        /// `true` if the torque is too small even to hold the arm at rest. This position is the start, a stop or the
+        /// end of the motion.
         holding: bool,
     },
     /// A path whose positions or derivatives are NaN or infinite, or whose length is 0.

@@ -18,17 +18,17 @@ use spline::knot;
 use crate::along::Plan;
 use crate::law::Law;
 
-/// Share of the total time that the barriers may add, one value for each round.
+/// Share of the total time that the barriers can add, one value for each round.
 const GAPS: [f64; 3] = [0.2, 0.04, 0.008];
 /// Maximum number of steps in each round.
 const STEPS: usize = 12;
-/// Minimum predicted gain of a Newton step, as a share of the allowed barrier cost. Newton's method ends if the gain is
-/// smaller.
+/// Smallest predicted gain of a Newton step, as a share of the time that the barriers can add in the round. Newton's
+/// method ends if the gain is smaller.
 const WORTH: f64 = 0.25;
 /// Smallest fraction of a Newton step that the line search tries.
 const SHORTEST: f64 = 1e-3;
-/// Factors that reduce squared speeds outside the limits (in the first search and in later searches), and maximum
-/// number of reductions.
+/// Factor that reduces squared speeds outside the limits in the first search. The next two constants are the factor
+/// in later searches, and the maximum number of reductions.
 const LOWER: f64 = 0.85;
 const LOWER_AGAIN: f64 = 0.97;
 const LOWER_MAX: usize = 100;
@@ -39,7 +39,8 @@ struct Problem<'a> {
     places: Vec<Place>,
     /// Knots of the spline, between the first and the last cell.
     knots: Vec<f64>,
-    /// Ratio of the first coefficient to its neighbour, and of the last coefficient to its neighbour.
+    /// Ratio of the first coefficient to its neighbour, and of the last coefficient to its neighbour. These ratios
+    /// are fixed.
     ties: (f64, f64),
     /// Number of limits.
     limits: f64,
@@ -107,7 +108,7 @@ impl<'a> Problem<'a> {
         None
     }
 
-    /// Shortens the duration. In each round, the barriers may add one of the shares in `gaps` to the duration.
+    /// Shortens the duration. `gaps` contains, for each round, the share of the duration that the barriers can add.
     fn improve(&self, c: &mut Vec<f64>, gaps: &[f64]) {
         for gap in gaps {
             let time = self.value(c, 0.0);
@@ -138,8 +139,8 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Solves a symmetric positive definite system of equations with the right-hand side `-right`. The matrix has two bands
-/// next to the diagonal.
+/// Solves a symmetric positive definite system of equations with the right-hand side `-right`. `bands` contains the
+/// diagonal of the matrix and the two bands next to it.
 fn solved(bands: &mut [[f64; 3]], right: &[f64]) -> Option<Vec<f64>> {
     let n = bands.len();
     let mut x: Vec<f64> = right.iter().map(|r| -r).collect();

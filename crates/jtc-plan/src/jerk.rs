@@ -12,13 +12,14 @@ use crate::motion::Motion;
 use crate::profile::{self, Bounds};
 use crate::{JOINTS, Limits};
 
-/// Factor of the acceleration from one attempt to the next. With a lower acceleration, the ramps are shorter.
+/// Factor of the acceleration from one attempt to the next. A lower acceleration results in shorter acceleration
+/// ramps.
 const LOWER: f64 = 0.7;
 /// Maximum number of accelerations that are tried.
 const ATTEMPTS: usize = 24;
-/// Shares of acceleration and jerk that the curvature may use, in the order of the attempts. If the speed is constant
-/// in curves, the curvature may use nearly the whole limit. If the speed must change in curves, the curvature may use
-/// less.
+/// Shares of the acceleration and jerk limits that the curvature may use, in the order of the attempts. The first
+/// share is for motions with constant speed in curves. The second share leaves a margin for changes of the speed in
+/// curves.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
 /// Largest time factor (new duration divided by old duration) for which no cell is slowed down further. If all cells
 /// need at most this factor, the whole motion is slowed down instead.
@@ -33,7 +34,7 @@ const JERK_SHARE: f64 = 0.995;
 pub(crate) struct Shares {
     /// Share of the acceleration along the path.
     acceleration: f64,
-    /// Share of acceleration and jerk that the curvature may use.
+    /// Share of the acceleration and jerk limits that the curvature may use.
     curvature: f64,
 }
 
@@ -79,7 +80,7 @@ pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
     best.filter(|best| best.duration() < seed.duration()).map(|best| best.motion)
 }
 
-/// Returns the shares that give the shortest motion, ignoring torque.
+/// Returns the shares that give the motion with the shortest duration, ignoring torque.
 fn best_shares(plan: &Plan) -> Option<Shares> {
     let duration = |shares| Attempt::new(plan, &bounds(plan, shares), false).duration();
     let mut best: Option<(Shares, f64)> = None;

@@ -54,7 +54,8 @@ pub struct Kinematics {
     limits: [(f64, f64); JOINTS],
     /// Geometry of the arm, if it has a closed form.
     exact: Option<Geometry>,
-    /// Closed-form geometry that is close to the geometry of the arm.
+    /// Closed-form geometry that is close to the geometry of the arm. Its solutions are starting values for the
+    /// iteration.
     near: Option<Geometry>,
 }
 
@@ -95,19 +96,20 @@ impl Kinematics {
     /// solutions, returns the solution nearest to `near`. The nearest solution has the smallest sum of squared joint
     /// motions.
     ///
-    /// A singular target has infinitely many solutions. For such a target, the function returns a solution near `near`.
+    /// A singular target has infinitely many solutions. For such a target, the function returns a solution near
+    /// `near`.
     ///
     /// # Errors
     ///
-    /// Returns [`PoseError`] if the target is not a valid pose, is out of reach in this orientation or in every
-    /// orientation, or can only be reached outside the limits.
+    /// Returns [`PoseError`] if `target` is not a valid pose or is out of reach. A target can be out of reach in this
+    /// orientation, in every orientation, or because of the position limits.
     pub fn solve(&self, target: &Pose, near: &JointVec) -> Result<JointVec, PoseError> {
         let goal = orientation::checked(target)?;
         if let Some(&bad) = near.iter().find(|q| !q.is_finite()) {
             return Err(PoseError::NotFinite { what: "a nearby joint position", value: bad });
         }
         let mut found = self.solutions(&goal, near);
-        // In a singular pose, a solution by iteration may be nearer to `near` than the solutions in closed form. Full
+        // In a singular pose, a solution by iteration can be nearer to `near` than the solutions in closed form. Full
         // turns of a joint are handled below.
         found.extend(search::converge(&self.chain, &goal, near, SEARCH));
         let distance = |q: &JointVec| q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();

@@ -22,7 +22,7 @@ impl Phase {
     }
 }
 
-/// Time law of a section of a path, from rest to rest. The path parameter begins at 0 and never decreases.
+/// Time law of a section of a path. The path parameter begins at 0 and never decreases.
 #[derive(Clone, Debug)]
 pub(crate) struct Law {
     pub phases: Vec<Phase>,
@@ -71,8 +71,8 @@ impl Law {
         (s.clamp(0.0, self.end), v.max(0.0), a)
     }
 
-    /// Like [`Law::at`], but evaluates the law just after `t` (1) or just before `t` (−1), because the acceleration may
-    /// jump at `t`.
+    /// Like [`Law::at`], but if the acceleration jumps at `t`, evaluates the law just after the jump (`after` = 1) or
+    /// just before the jump (−1).
     pub(crate) fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
         const NEAR: f64 = 1e-10;
         let (s, speed, _) = self.at(t);
@@ -126,7 +126,7 @@ impl Law {
             let now = |t: f64| if t >= self.duration() { (self.end, 0.0, 0.0) } else { self.at(t) };
             let (head, tail) = (now(start), now(start - window));
             let (speed, acceleration) = ((head.0 - tail.0) / window, (head.1 - tail.1) / window);
-            // The acceleration is evaluated in the middle of the phase, because it may jump at the ends.
+            // The acceleration can jump at the ends of the phase, so it is evaluated in the middle.
             let middle = start + 0.5 * length;
             let inside = |t: f64| if t <= 0.0 { 0.0 } else { now(t).2 };
             let jerk = (inside(middle) - inside(middle - window)) / window;

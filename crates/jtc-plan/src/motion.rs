@@ -39,7 +39,7 @@ impl Piece {
         let h = length;
         let coefficients = std::array::from_fn(|j| {
             let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
-            // Residual at the end of the piece. The unit of time is the duration of the piece.
+            // Remaining differences at the end of the piece, in units of time of the piece's duration.
             let dp = b.position[j] - (p + h * (v + h * c));
             let dv = (b.velocity[j] - (v + 2.0 * h * c)) * h;
             let da = (b.acceleration[j] - 2.0 * c) * h * h;
@@ -106,8 +106,9 @@ impl Motion {
         self.pieces.last().map_or(0.0, |p| p.start + p.length)
     }
 
-    /// Returns the state at `t` seconds after the start. Before the start and after the end the arm rests exactly at the first and the last
-    /// waypoint. Without a jerk limit, the acceleration may jump at `t`. At a jump, the function returns the acceleration after the jump.
+    /// Returns the state at `t` seconds after the start. Before the start and after the end, the arm rests exactly at
+    /// the first or the last waypoint. Without a jerk limit, the acceleration can jump. At a jump, the function
+    /// returns the acceleration after the jump.
     pub fn at(&self, t: f64) -> State {
         match self.piece(t) {
             None => self.end,
@@ -127,9 +128,9 @@ impl Motion {
         self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
     }
 
-    /// Returns the binding limits in chronological order. If no limit is reached in an interval, the binding limit is
-    /// the limit to which the motion is closest. The binding limit may also be the limit because of which the whole
-    /// motion was slowed down.
+    /// Returns the binding limits in chronological order. In an interval in which no limit is reached, the binding
+    /// limit is the nearest limit. If the whole motion was slowed down because of a torque limit, this torque limit
+    /// is the binding limit of such an interval.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
     }
@@ -177,7 +178,7 @@ impl Motion {
         let joint = self.binding.get(after.saturating_sub(1)).map_or(Joint::ALL[0], |b| b.joint);
         binding.extend(self.binding[..after].iter().map(|b| Binding { to: b.to.min(time), ..*b }));
         binding.push(Binding { from: time, to: time + length, joint, limit: LimitKind::GivenTime });
-        // A binding interval that continues after the standstill is split into two intervals.
+        // A binding interval around the standstill is split into two intervals.
         let both = self.binding[..after].last().filter(|b| b.to > time).map(|b| Binding { from: time, ..*b });
         let later = both.into_iter().chain(self.binding[after..].iter().copied());
         binding.extend(later.map(|b| Binding { from: b.from + length, to: b.to + length, ..b }));

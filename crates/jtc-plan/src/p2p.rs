@@ -9,10 +9,10 @@ use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, reasons, tr
 /// Duration of a motion between two equal positions, s. A trajectory needs two points, so its duration must be above 0.
 const STANDING: f64 = 0.01;
 
-/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk limits. All joints start and stop
-/// together (Ruckig, by Berscheid and Kröger 2021). The motion is a straight line in joint space if a straight line
-/// does not take longer. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed is
-/// limited to the range of the friction table.
+/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk limits. All joints start and
+/// stop together (Ruckig, by Berscheid and Kröger 2021). The motion is a straight line in joint space if a straight
+/// line does not take longer. With an `arm`, the motion is slowed down until the torque is sufficient, and the joint
+/// speeds stay within the friction table.
 ///
 /// If `from` and `to` are equal, the arm stays at rest for 10 ms.
 ///
@@ -91,7 +91,7 @@ fn constant_jerk(trajectory: &Trajectory<JOINTS>, start: f64, length: f64) -> Pi
     let zeros = || DataArrayOrVec::Stack([0.0; JOINTS]);
     let (mut p, mut v, mut a, mut jerk) = (zeros(), zeros(), zeros(), zeros());
     trajectory.at_time(start, &mut Some(&mut p), &mut Some(&mut v), &mut Some(&mut a), &mut None, &mut None);
-    // The jerk is evaluated in the middle of the part. At the start of the part, the value may still be the jerk of the
+    // The jerk is evaluated in the middle of the part, because the value at its start can still be the jerk of the
     // previous part.
     let middle = start + 0.5 * length;
     trajectory.at_time(middle, &mut None, &mut None, &mut None, &mut Some(&mut jerk), &mut None);

@@ -22,8 +22,8 @@ pub trait Path {
     /// Returns the last value of the parameter, which is greater than 0.
     fn end(&self) -> f64;
 
-    /// Returns position and derivatives at `s`, with `s` between 0 and the end. At a break, the path may return the
-    /// derivatives of either side.
+    /// Returns position and derivatives at `s`, with `s` between 0 and the end. At a break, the derivatives of either
+    /// side are permitted.
     fn at(&self, s: f64) -> PathPoint;
 
     /// Returns the number (from 1) of the last waypoint at or before `s`. Errors contain this number.
@@ -44,7 +44,7 @@ pub trait Path {
         Vec::new()
     }
 
-    /// Returns the parameter nearest to each waypoint, in ascending order, including both ends.
+    /// Returns the parameter at which the path is nearest to each waypoint, in ascending order, including both ends.
     fn waypoints(&self) -> Vec<f64> {
         vec![0.0, self.end()]
     }

@@ -1,9 +1,9 @@
-//! Plateaus at the maxima of the speed. Between acceleration and deceleration, the parameter's acceleration is 0 for
-//! one averaging window. Therefore an averaging window never contains both changes of the acceleration.
+//! Plateaus at the maxima of the speed. On a plateau, the acceleration is 0 for at least the length of the averaging
+//! window. A window therefore never contains both the end of the acceleration and the start of the deceleration.
 use crate::profile::simplified;
 
-/// Lowers every speed maximum of a law's `vertices` (parameter, squared speed). A lowered maximum lasts for `window` seconds, or is as low
-/// as the lowest adjacent speed.
+/// Replaces each maximum of the squared speed by a plateau that lasts for `window` seconds. A plateau may be shorter
+/// only if it is as low as the lowest adjacent speed. `vertices` contains pairs of parameter and squared speed.
 pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)> {
     let mut walk = Walk { done: Vec::with_capacity(vertices.len()), ahead: vertices, next: 0 };
     while walk.next < vertices.len() {
@@ -17,7 +17,7 @@ pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)>
     simplified(walk.done)
 }
 
-/// Vertices to the left and right of the current position.
+/// Processed vertices, and the vertices that follow.
 struct Walk<'a> {
     done: Vec<(f64, f64)>,
     ahead: &'a [(f64, f64)],
@@ -37,7 +37,8 @@ impl Top {
         if self.level > 0.0 { (self.to - self.from) / self.level.sqrt() } else { f64::INFINITY }
     }
 
-    /// Returns the plateau lowered to `level`. The sides of the plateau end at `left` and `right`.
+    /// Returns the plateau lowered to `level`. `left` and `right` are the vertices at which the sides of the plateau
+    /// end.
     fn at(&self, level: f64, left: (f64, f64), right: (f64, f64)) -> Self {
         let side = |x: f64, foot: (f64, f64)| {
             let height = self.level - foot.1;
@@ -48,7 +49,7 @@ impl Top {
 }
 
 impl Walk<'_> {
-    /// Lowers the speed maximum that ends at the last processed vertex, if there is one.
+    /// Lowers the speed maximum at the last processed vertex to a plateau.
     fn lower(&mut self, window: f64) {
         let Some((x, level)) = self.done.pop() else { return };
         let mut top = Top { from: x, to: x, level };
@@ -87,7 +88,7 @@ impl Walk<'_> {
     }
 }
 
-/// Returns the highest plateau between the levels of `top` and `lowest` that lasts for the window.
+/// Returns the highest plateau that lasts for `window` seconds. Its level is between `lowest` and the level of `top`.
 fn enough(top: &Top, lowest: f64, left: (f64, f64), right: (f64, f64), window: f64) -> Top {
     let (mut low, mut high) = (lowest, top.level);
     for _ in 0..60 {

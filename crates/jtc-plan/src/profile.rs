@@ -1,8 +1,8 @@
-//! Fastest time law with limited speed and acceleration of the path parameter, but without a jerk limit. Each limit is
-//! constant in each cell of the path.
+//! Fastest time law with limited speed and acceleration of the path parameter, but without a jerk limit. Each limit
+//! is constant in each cell of the path.
 //!
-//! The law may later be averaged over a time window. The averaged law keeps the limits of a cell only if the law also
-//! keeps these limits for half a window before and after the cell. Cells are therefore extended at both ends.
+//! The law may later be averaged over a time window. To keep the limits of a cell after averaging, the law must keep
+//! them also for half a window before and after the cell. Cells are therefore extended at both ends.
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

@@ -5,7 +5,7 @@ use crate::{ArmDynamics, JOINTS, Limits};
 /// Number of rows per point: acceleration and torque of each joint in both directions.
 const ROWS: usize = 4 * JOINTS;
 
-/// Largest share of a limit that may be neglected.
+/// Largest share of a limit that is neglected.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Limits at one point of the path. Each row means by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
@@ -48,9 +48,9 @@ pub(crate) fn fastest(
 
 /// Returns the largest squared speeds at the ends of the steps, from rest to rest.
 fn along_the_steps(steps: &[Step]) -> Vec<f64> {
-    // The backward pass computes the largest squared speed at each point from which the remainder of the path is
-    // possible. A smaller squared speed is also possible, because the arm can be at rest at each point and the limits
-    // are linear in ṡ² and s̈.
+    // The backward pass computes, for each point, the largest squared speed from which the remainder of the path is
+    // possible. Smaller squared speeds are also possible, because rest is possible at each point and the limits are
+    // linear in ṡ² and s̈.
     let mut highest = vec![0.0; steps.len() + 1];
     for (i, step) in steps.iter().enumerate().rev() {
         highest[i] = step.highest(highest[i + 1]);
@@ -105,12 +105,12 @@ impl Step {
                 }
                 let size = by_acceleration.abs();
                 // A row with a negligible coefficient of s̈ limits only ṡ². The coefficient is negligible if its term
-                // is much smaller than the limit. The coefficient u is also negligible if it shifts the point only by a
-                // small part of the step: x·ṡ² + u·s̈ is x·ṡ² at a distance of u/2x.
+                // is much smaller than the limit. It is also negligible if its effect is equal to a shift of the
+                // point by a very small part of the step.
                 let negligible = size * highest <= NEGLIGIBLE * length * limit
                     || size <= NEGLIGIBLE * length * by_speed.abs();
-                // A row may permit a higher ṡ² at the first point only to an arm that comes to rest within the step. Such a row is also
-                // used as a limit of ṡ² alone.
+                // Such a row permits a higher ṡ² at the first point only if the arm comes to rest within the step.
+                // The row is therefore also used as a limit of ṡ² alone.
                 let rests =
                     added == 0.0 && by_acceleration > 0.0 && by_acceleration <= 2.0 * length * by_speed;
                 if (negligible || rests) && by_speed > 0.0 {
@@ -135,8 +135,9 @@ impl Step {
         self.lower.iter().copied().reduce(|a, b| if b.at(square) > a.at(square) { b } else { a })
     }
 
-    /// Returns the largest possible s̈ at this ṡ². If, because of rounding, the largest s̈ is smaller than the smallest s̈, the bound with
-    /// the smaller rounding error is used. The bound that depends less on ṡ² has the smaller rounding error.
+    /// Returns the largest possible s̈ at this ṡ². Rounding errors can make the largest s̈ smaller than the smallest
+    /// s̈. In this case the function uses the bound that depends less on ṡ², because it has the smaller rounding
+    /// error.
     fn fastest(&self, square: f64) -> f64 {
         let Some(most) = self.most(square) else { return f64::INFINITY };
         let crossed =

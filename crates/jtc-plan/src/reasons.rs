@@ -10,10 +10,11 @@ const BINDS: f64 = 0.985;
 /// Time between samples, s, and maximum number of samples.
 const STEP: f64 = 0.002;
 const SAMPLES_MAX: f64 = 4000.0;
-/// A limit that is reached within this time before or after an instant may be the binding limit of this instant, s. Acceleration ramps can
-/// last as long as this time. For example, a motion is slow before a corner because of a limit that is reached in the corner.
+/// Longest time between an instant and the place at which its binding limit is reached, s. Acceleration ramps can
+/// last as long as this time. For example, a motion is slow before a corner because of a limit that is reached in the
+/// corner.
 const NEAR: f64 = 0.05;
-/// Share of the usable torque below which the torque is not reported as the binding limit. Such a torque may be
+/// Share of the usable torque below which the torque is not reported as the binding limit. A lower torque can be
 /// mainly holding torque, which does not depend on the speed.
 const TORQUE: f64 = 0.9;
 /// Minimum duration of an interval, s. Shorter intervals are merged into the previous interval.
@@ -93,7 +94,7 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
     (most, used_up)
 }
 
-/// Returns, for each sample, the highest use of a limit among all samples at a distance of at most `reach` samples.
+/// Returns, for each sample, the highest use of a limit among all samples that are at most `reach` samples away.
 fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
     // Indices of samples, in descending order of their use. The use of the first index is the highest within `reach`
     // samples.

@@ -33,9 +33,8 @@ pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f6
     kept
 }
 
-/// Returns `true` if all positions between the indices `from` and `to` are close to the straight line between the
-/// positions at these indices, and are in order along this line. `most` is the largest permitted distance from the
-/// line.
+/// Returns `true` if the positions between the indices `from` and `to` are at most `most` away from the straight line
+/// between the positions at these two indices. The positions must also be in order along this line.
 fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
     let (a, b) = (&positions[from], &positions[to]);
     let mut before = 0.0;

@@ -16,8 +16,8 @@ const CORRECTIONS: usize = 60;
 /// Target duration of a part that is slowed down, as a share of the requested duration. A uniform slowdown then adds
 /// the missing time.
 const AIM: f64 = 0.98;
-/// Factor for the shortest time in an error, if only the adjacent legs prevent the specified time. With this factor,
-/// the reported time is always possible.
+/// Minimum ratio of the reported shortest time to the specified time, if only the adjacent legs prevent the specified
+/// time. The planner can always keep a time that is longer by this factor.
 const SURE: f64 = 1.05;
 /// Factor that reduces the speed of parts without a specified time after each failed attempt. `ROOM_MIN` is the
 /// lowest speed factor of these parts.
@@ -90,7 +90,7 @@ pub fn through(
         return Ok(reasons::explained(chosen.motion, limits, arm));
     }
     match on_time(&path, &given, limits, arm) {
-        // Another path within the blends of the waypoints may be fast enough.
+        // Another path within the blends of the waypoints can be fast enough.
         Err(PlanError::TooEarly { .. }) if blend > 0.0 => {
             let chosen = choose::fastest(path, blend, &keep, limits, arm)?;
             on_time(&chosen.path, &given, limits, arm)
@@ -209,8 +209,8 @@ fn moving_on_time(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let mut choices = Choices::default();
-    // Speed factor for parts without a specified time. The factor is reduced if the limits leave no margin for the
-    // changes of rate.
+    // Speed factor for the parts without a specified time. The factor is reduced if the limits leave no margin for
+    // the transitions between the speeds of adjacent parts.
     let mut room = 1.0f64;
     for attempt in 0..CORRECTIONS {
         let share_of = |waypoint: usize| {
@@ -222,7 +222,7 @@ fn moving_on_time(
             let is_late = s.share >= 1.0 && s.takes(&motion) > s.wanted + ON_TIME;
             s.late = if is_late { s.late + 1 } else { 0 };
         }
-        // A part that takes too long may still become faster if the adjacent parts become faster. In the first
+        // A part that takes too long can still become faster if the adjacent parts become faster. In the first
         // attempt all parts have their highest speed, so none of them can become faster.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
@@ -251,7 +251,7 @@ fn moving_on_time(
         }
     }
     // All attempts have failed: next to a part at full speed, the limits leave no margin for a change of speed. The
-    // error reports the part with the smallest time margin.
+    // error reports the part with the highest ratio of planned duration to specified duration.
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {

@@ -4,12 +4,12 @@ use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Maximum holding torque of a joint without friction, as a share of the torque limit. At a share of 98 %, joints were
-/// observed to fall.
+/// Maximum holding torque of a joint without friction, as a share of the torque limit. Joints with a holding torque
+/// of 98 % of the limit were observed to fall.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Share of the torque above the holding torque that a motion may always use, with any margin. The second constant is
-/// the minimum of this torque, as a share of the limit.
+/// Share of the torque above the holding torque that a motion may always use, even with a large torque margin. The
+/// next constant is the minimum of this torque, as a share of the torque limit.
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;
 
@@ -140,10 +140,12 @@ impl<'a> ArmDynamics<'a> {
         torque
     }
 
-    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`. The usable torque is the
-    /// limit minus the margin. The result is at least the sum of holding torque, breakaway friction and a quarter of the remaining torque.
-    /// If 2 % of the limit is larger than a quarter of the remaining torque, 2 % of the limit is used. Therefore the arm can always move to
-    /// and from a pose that it can hold.
+    /// Returns the torque (N·m) of the joint with index `j` that a motion may use if the holding torque is `hold`.
+    /// The usable torque is the limit minus the margin.
+    ///
+    /// The result is never below the sum of holding torque, breakaway friction and a reserve. The reserve is a
+    /// quarter of the remaining torque, or 2 % of the limit if this is more. Therefore the arm can always move to and
+    /// from a pose that it can hold.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {

@@ -14,7 +14,7 @@ struct Trapezoid {
 }
 
 impl Trapezoid {
-    /// Returns the fastest trapezoid.
+    /// Returns the fastest trapezoid for the distance `way` within the limits `velocity` and `acceleration`.
     fn new(way: f64, velocity: f64, acceleration: f64) -> Self {
         let distance = way.abs();
         if distance == 0.0 {

@@ -9,7 +9,8 @@ use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 const ROUNDING: f64 = 1e-9;
 /// Time between torque samples, s.
 const TORQUE_STEP: f64 = 0.004;
-/// Share of the torque limit that the torque may reach at the samples. Between samples, the torque may be higher.
+/// Share of the torque limit that the torque may reach at the samples. The rest is a margin, because the torque can
+/// be higher between samples.
 const TORQUE_SHARE: f64 = 0.9985;
 /// Time factor (new duration divided by old duration) of a slowdown above which its cause is reported as the binding
 /// limit.
@@ -81,9 +82,9 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
-/// Returns the time factor that a piece needs so that the torque is sufficient at a few samples. Only the part of the
-/// torque that depends on the speed can be reduced. Returns 1 if the torque is sufficient, or if it is too small at
-/// every speed.
+/// Returns the time factor that a piece needs so that the torque is sufficient at a few samples. A slower motion
+/// reduces only the part of the torque that depends on the speed. Returns 1 if the torque is sufficient, or if it is
+/// too small at every speed.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
     let mut most = 1.0f64;
     // With a jerk limit, the acceleration does not jump between pieces. The start of a piece was already checked as the
@@ -180,7 +181,8 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     };
     let mut factor = 1.0;
     let mut slowed = None;
-    // Points of the motion that have exceeded the torque limit so far. Most points never exceed the limit.
+    // Points of the motion that have exceeded a torque limit so far. Only these points are used to compute the time
+    // factor, because most points never exceed a limit.
     let mut some: Vec<&Load> = Vec::new();
     loop {
         let before = some.len();
@@ -266,10 +268,10 @@ pub(crate) fn holds(
     Ok(())
 }
 
-/// Returns the times at which the torque of a piece is sampled, in seconds after its start. The list contains both
-/// ends, because the acceleration may jump at the ends, and times between the ends that are at most `step` apart. The
-/// list also contains the times at which the smoothed sign function of a joint's friction reaches ±1. A piece with
-/// higher accelerations inside than at its ends has more sample times.
+/// Returns the times at which the torque of a piece is sampled, in seconds after its start. The times are at most
+/// `step` apart. They include both ends, at which the acceleration can jump, and the times at which the smoothed sign
+/// function of a joint's friction reaches ±1. A piece with higher accelerations inside than at its ends has more
+/// sample times.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
     let count = (piece.length / step).ceil().max(least) as usize;
@@ -287,7 +289,8 @@ fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<
     moments
 }
 
-/// Returns `true` if, inside the piece, a joint's acceleration may be higher or lower than at both ends.
+/// Returns `true` if a joint's acceleration inside the piece can be outside the range of the accelerations at both
+/// ends.
 fn bulges(piece: &Piece, limits: &Limits) -> bool {
     let h = piece.length;
     piece.coefficients.iter().zip(&limits.acceleration).any(|([_, _, c2, c3, c4, c5], limit)| {

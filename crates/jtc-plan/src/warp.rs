@@ -1,13 +1,13 @@
-//! Change of the timing of a motion without a change of its path. Each part of the motion has its own rate, and the
-//! transitions between the rates are smooth.
+//! Change of the timing of a motion on an unchanged path. Each part of the motion has its own rate (speed factor),
+//! and the transitions between the rates are smooth.
 use crate::Limits;
 use crate::compose::Section;
 use crate::law::{Law, Phase};
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 
-/// Maximum duration of a change from one rate to the next, in s, and as a share of the duration of the shorter
-/// adjacent part.
+/// Maximum duration of a change from one rate to the next, s. The next constant is the maximum as a share of the
+/// duration of the shorter adjacent part.
 const CHANGE: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.4;
 /// Speed below which a motion is considered at rest, rad/s.
@@ -57,7 +57,7 @@ pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion
     warped
 }
 
-/// Stretches each part separately, because all parts begin and end at rest.
+/// Stretches each part separately. The caller ensures that all parts begin and end at rest.
 fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
     // Values for each part: end of the part, start before and after stretching, and time factor.
     let (mut before, mut after) = (0.0, 0.0);
@@ -116,12 +116,12 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates (speed factors) with which each part has its requested duration. The first half of each change
-/// of rate is in the part before the change, and the second half is in the part after it.
+/// Returns the rates (speed factors) with which each part has its requested duration. Half of a change of rate is in
+/// the part before the change, and half is in the part after the change.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
-    // Half a change of rate changes the distance of a part by the difference of the rates times 1/12 of the change's
-    // duration.
+    // Compared with a constant rate, half a change of rate adds (adjacent rate − own rate)·(duration of the
+    // change)/12 to the distance of a part.
     for _ in 0..60 {
         for i in 0..parts.len() {
             let mut way = lengths[i];

@@ -178,7 +178,7 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
     assert!(point_to_point(&[0.0; 6], &stretched, &limits, Some(&arm)).is_ok());
 }
 
-/// J-36: with any limits, the velocities of a motion stay within the range of the friction table.
+/// J-36: with any limits, the velocities of a motion must stay within the range of the friction table.
 #[test]
 fn j36_velocities_stay_inside_the_friction_table() {
     let (config, parameters) = (Config::avena(), Parameters::avena());
@@ -212,7 +212,7 @@ fn a_long_move_is_bound_by_the_speed_of_the_joint_that_goes_farthest() {
     assert_eq!((first.from, first.limit), (0.0, LimitKind::Jerk));
 }
 
-/// If the speed is halved, the duration of a motion is doubled.
+/// If the speed is halved, the duration of a motion must double.
 #[test]
 fn a_share_of_the_speed_stretches_the_motion() {
     let limits = Limits::of(&Config::avena());
@@ -227,7 +227,7 @@ fn a_share_of_the_speed_stretches_the_motion() {
     }
 }
 
-/// A motion with a blend is never slower than a motion with a stop at each waypoint.
+/// A motion with a blend must never be slower than a motion with a stop at each waypoint.
 #[test]
 fn rounded_corners_are_faster_than_stops_without_a_limit_of_jerk() {
     let limits = Limits::of(&Config::avena()).without_jerk();

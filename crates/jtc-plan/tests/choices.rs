@@ -19,8 +19,8 @@ fn moves(case: &Case) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// A stop at a corner is always within the blend. Therefore a motion that may round corners is never slower than a
-    /// motion with stops.
+    /// A stop at a corner is always within the blend. Therefore a motion with permission to round corners must never
+    /// be slower than a motion with stops.
     #[test]
     fn a_blend_is_never_slower_than_stops(seed in any::<u64>(), small in 1e-9..0.05f64) {
         let case = Case::random(seed);
@@ -33,7 +33,7 @@ proptest! {
         }
     }
 
-    /// Each part of a motion has a binding limit.
+    /// Each part of a motion must have a binding limit.
     #[test]
     fn what_binds_is_named_for_all_of_a_motion(seed in any::<u64>()) {
         let case = Case::random(seed);
@@ -45,8 +45,8 @@ proptest! {
         prop_assert!(rising && named >= 0.95 * motion.duration(), "seed {}: {} of {} s", seed, named, motion.duration());
     }
 
-    /// A motion through many close waypoints on a smooth curve takes only a little longer than a motion through a few
-    /// of these waypoints. The motion passes each waypoint within the blend.
+    /// A motion through many close waypoints on a smooth curve must take only a little longer than a motion through a
+    /// few of these waypoints. It must pass each waypoint within the blend.
     #[test]
     fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);
@@ -68,8 +68,9 @@ proptest! {
     }
 }
 
-/// If the limits that are reported as binding are doubled, the motion becomes faster in nearly all cases. There are
-/// exceptions, because a jerk-limited law is the best of several attempts, and other limits lead to other attempts.
+/// If the limits that are reported as binding are doubled, the motion must become faster in nearly all cases.
+/// Exceptions are possible, because a jerk-limited law is the best of several attempts, and other limits lead to
+/// other attempts.
 #[test]
 fn what_is_named_is_what_binds() {
     let (mut faster, mut all) = (0, 0);
@@ -87,7 +88,8 @@ fn what_is_named_is_what_binds() {
     assert!(all >= 150 && 100 * faster >= 97 * all, "{faster} of {all}");
 }
 
-/// Doubles the kinds of limits that are binding, for all joints, because other joints may be as close to their limits.
+/// Doubles the binding kinds of limits for all joints, because other joints can be as close to their limits as the
+/// binding joint.
 fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     let mut relaxed = limits.clone();
     for b in motion.binding() {

@@ -34,7 +34,7 @@ fn about(waypoint: usize) -> Vec<PlanError> {
     ]
 }
 
-/// The first number after the word `waypoint` in a message is the number that the method `waypoint` returns.
+/// The method `waypoint` must return the first number after the word `waypoint` in the message.
 #[test]
 fn the_waypoint_is_the_one_that_the_message_names() {
     for error in about(17) {

@@ -52,7 +52,8 @@ fn three_parallel_axes_have_the_same_wrist() {
     assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
 }
 
-/// The end of a line is a pose that differs from the stretched arm by only half a degree.
+/// The end of the line is a pose that differs from the stretched arm by only half a degree. The error must report an
+/// elbow singularity.
 #[test]
 fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
@@ -67,7 +68,8 @@ fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     }
 }
 
-/// Half-way along the line, the wrist of a KR 5 passes straight over the axis of joint 1.
+/// Half-way along the line, the wrist of a KR 5 passes straight over the axis of joint 1. The error must report a
+/// shoulder singularity.
 #[test]
 fn a_line_over_the_base_ends_at_the_shoulder() {
     let model = robots::kr5();
@@ -83,8 +85,8 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends of the line are within reach, but the positions between the ends are not. The positions between the ends
-/// are in the column around the axis of joint 1 that a PUMA 560 cannot enter.
+/// Both ends of the line are within reach, but some positions between them are not. These positions are in the column
+/// around the axis of joint 1 that a PUMA 560 cannot enter. The error must contain the location.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let model = robots::puma560();
@@ -133,7 +135,7 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     assert!(matches!(arc(&bent, &far), PoseError::NotFinite { .. }));
     let start = FlangePath::new(&kin, &[f64::NAN; 6], &lines, 0.0).unwrap_err();
     assert!(matches!(start, PoseError::Waypoint { waypoint: 1, .. }), "{start}");
-    // With these limits, joint 4 (at 0.4 rad) is outside its range at the start of the line.
+    // Joint 4 starts at 0.4 rad. These limits exclude this position, so the error must contain waypoint 1.
     let mut limits = WIDE;
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();

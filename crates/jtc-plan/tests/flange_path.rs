@@ -47,8 +47,8 @@ fn deviation(path: &FlangePath, s: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
 
-    /// Each position is on the straight line between the ends, at equal distances. Each orientation is rotated in
-    /// proportion to the distance, about one axis.
+    /// The positions must be on the straight line between the ends, at equal distances. The orientation must rotate
+    /// about one axis, in proportion to the distance.
     #[test]
     fn lines_are_straight(q in start(), shift in small(0.3), turn in small(0.6)) {
         for (name, model) in arms() {
@@ -114,7 +114,7 @@ proptest! {
         }
     }
 
-    /// The flange stays on the circle through the three points.
+    /// The flange must stay on the circle through the three points.
     #[test]
     fn arcs_are_round(
         q in start(), radius in 0.03..0.2f64, plane in small(3.0), angles in (0.3..3.0f64, 0.3..2.5f64), turn in small(0.4)
@@ -145,7 +145,8 @@ proptest! {
         }
     }
 
-    /// The flange leaves the legs only within the radius of the corner, and stays inside the triangle of the corner.
+    /// The flange may leave the legs only within the radius of the corner, and must stay inside the triangle of the
+    /// corner.
     #[test]
     fn corners_are_cut_within_their_radius(
         q in start(), shifts in prop::array::uniform2(small(0.2)), blend in 0.0..0.05f64
@@ -176,7 +177,8 @@ proptest! {
         }
     }
 
-    /// If a joint turns back on the path, its position range must include the turning point, but no more.
+    /// If a joint turns back on the path, its position range must include the turning point. A larger range must not
+    /// be necessary.
     #[test]
     fn a_joint_that_turns_back_needs_the_range_up_to_there(q in start(), shift in small(0.3), turn in small(0.5)) {
         let model = robots::avena();
@@ -204,7 +206,8 @@ proptest! {
                 prop_assert!(with(top + 1e-6).is_ok(), "{:?}", with(top + 1e-6));
                 let refused = match with(top - 1e-6) {
                     Ok(other) => {
-                        // Near a singular pose, the joints may follow a different path, which stays inside the limits.
+                        // Near a singular pose, the joints may follow a different solution. This is permitted if the
+                        // joint stays below `top` on the whole path.
                         let at = |k: u32| sign * other.at(other.end() * f64::from(k) / 1000.0).position[joint];
                         prop_assert!((0..=1000).all(|k| at(k) < top));
                         continue;
@@ -221,8 +224,8 @@ proptest! {
         }
     }
 
-    /// The test reduces the position range of one joint. The error is at the point at which the unlimited path leaves
-    /// this range.
+    /// The test reduces the position range of one joint. The error must be at the point at which the path without
+    /// this limit leaves the range.
     #[test]
     fn a_limit_on_the_way_is_found_where_it_is(
         q in start(), shift in small(0.3), turn in small(0.5), joint in 0..JOINTS,
@@ -245,12 +248,12 @@ proptest! {
                 prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
                 prop_assert!((length - free.end()).abs() < 1e-12);
                 prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
-                // Before this point (with a tolerance of 11 mm), the joint stays within its limit.
+                // Until 11 mm before the reported distance, the joint must be within its limit.
                 let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
                 prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
             }
-            // This error is correct if a joint is outside its limits in every solution for the pose at the end of the
-            // line.
+            // This error is also correct: every solution for the pose at the end of the line has a joint outside its
+            // limits.
             PoseError::Waypoint { waypoint: 2, source } => {
                 prop_assert!(matches!(*source, PoseError::OutsideLimits { .. }), "{source}");
             }
@@ -259,8 +262,8 @@ proptest! {
     }
 }
 
-/// During a motion along a path, the flange is on its line at all times. The test also checks times between the points
-/// that the planner checks.
+/// During a motion along a path, the flange must be on its line at all times. The test also checks times between the
+/// points that the planner checks.
 #[test]
 fn motions_along_lines_and_arcs_stay_on_them() {
     let (config, parameters, model) = (Config::avena(), Parameters::avena(), robots::avena());

@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// The kinematics find a solution for extreme poses, with right angles and stretched arms.
+    /// The kinematics must find a solution for extreme poses, with right angles and stretched arms.
     #[test]
     fn poses_at_and_near_singular_ones_are_reached(
         quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
@@ -122,14 +122,14 @@ proptest! {
             let pose = robots::pose(&model, &q);
             let found = kin.solve(&pose, &near).unwrap();
             let nearest = kin.all(&pose).iter().map(|q| length(q, &near)).fold(f64::INFINITY, f64::min);
-            // In `all`, each joint differs by at most one turn from its principal value, and `near` is within one
-            // turn. Therefore `all` contains the nearest solution.
+            // `all` contains each joint at its principal value and up to one turn away, and `near` is within one
+            // turn. Therefore `all` contains the solution nearest to `near`.
             prop_assert!((length(&found, &near) - nearest).abs() < 1e-6);
             prop_assert!(found.iter().all(|a| a.abs() <= width));
         }
     }
 
-    /// For the default arm, the kinematics return only solutions within the position limits.
+    /// For the default arm, the kinematics must return only solutions within the position limits.
     #[test]
     fn the_default_arm_keeps_to_its_limits(share in prop::array::uniform6(0.01..0.99f64)) {
         let limits = robots::avena_limits();
@@ -175,8 +175,9 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1. The height of the wrist above the shoulder is at most the
-/// length of the two links together.
+/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1. The height of the wrist above the
+/// shoulder is at most the length of the two links together. Errors must contain the distance by which a position is
+/// out of reach.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);
@@ -196,7 +197,8 @@ fn out_of_reach_says_how_far() {
     assert!((missing - 0.10005).abs() < 1e-6, "{error}");
 }
 
-/// At the limit of the reach of the UR5, the flange can point outwards or sideways, but not back to the base.
+/// At the limit of the reach of the UR5, the flange can point outwards or sideways, but not back to the base. The
+/// error must report the orientation, not the position.
 #[test]
 fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
     let model = robots::ur5();
@@ -227,7 +229,8 @@ fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
     let all = Kinematics::new(&model, &TURN).all(&pose);
     for joint in 0..JOINTS {
         let mut limits = TURN;
-        // No solution has a position of this joint in this range. The limits of the other joints permit a full turn.
+        // Selects a range of this joint that contains no solution. The limits of the other joints permit a full turn,
+        // so the error must report this joint.
         let (low, high) = (0..60)
             .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
             .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))
@@ -307,8 +310,8 @@ proptest! {
     }
 }
 
-/// The kinematics report the correct kind of singular pose for both geometries. The test finds the singular poses from
-/// their definitions.
+/// The kinematics must report the correct kind of singular pose for both closed-form geometries. The test finds the
+/// singular poses from their definitions.
 #[test]
 fn singular_poses_have_their_names() {
     use SingularKind::{Elbow, Shoulder, Wrist};
@@ -391,8 +394,8 @@ fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
     assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
 }
 
-/// The test compares the velocity and the angular velocity of the flange with central differences of independent
-/// forward kinematics.
+/// The velocity and the angular velocity of the flange must be equal to central differences of independent forward
+/// kinematics.
 #[test]
 fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
     let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];

@@ -41,8 +41,8 @@ proptest! {
         }
     }
 
-    /// The states of a motion are consistent: velocities are the slopes of the positions, and accelerations are the
-    /// slopes of the velocities.
+    /// The states of a motion must be consistent: velocities are the slopes of the positions, and accelerations are
+    /// the slopes of the velocities.
     #[test]
     fn velocity_and_acceleration_are_the_slopes(seed in any::<u64>()) {
         const H: f64 = 1e-5;

@@ -170,8 +170,8 @@ fn times_of_waypoints_on_lines_are_kept() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
 
-    /// A line to joint positions ends at these positions, if the configuration of the arm at both ends of the line is
-    /// the same. If the configurations differ, the error contains a joint with a different position.
+    /// A line to joint positions must end at these positions, if the arm has the same configuration at both ends of
+    /// the line. If the configurations differ, the error must contain a joint with a different position.
     #[test]
     fn joint_positions_at_the_end_of_a_line_are_of_its_configuration(shift in prop::array::uniform3(-0.15..0.15f64)) {
         prop_assume!(norm(shift) > 1e-3);
@@ -197,7 +197,7 @@ proptest! {
     }
 }
 
-/// Waypoint numbers in errors include the via points of arcs.
+/// The waypoint numbers in errors must also count the via points of arcs.
 #[test]
 fn errors_name_the_waypoints_of_the_route() {
     let Mixed { points, .. } = mixed();
@@ -237,7 +237,7 @@ fn errors_name_the_waypoints_of_the_route() {
     assert_eq!(route(&points, (0.0, -1.0)).unwrap_err(), PoseError::Blend { radius: -1.0 }.into());
 }
 
-/// A leg without motion still has its own waypoint. The motion passes this waypoint at the time of the previous
+/// A leg without motion has its own waypoint. The motion must pass this waypoint at the time of the previous
 /// waypoint.
 #[test]
 fn waypoints_at_one_place_are_passed_at_one_time() {

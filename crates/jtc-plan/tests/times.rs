@@ -11,9 +11,9 @@ use judge::Case;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Some waypoints of this test have later times than in the fastest motion. The planned motion keeps these times
-    /// and all limits. A time can be too early only if corners are rounded, because slower adjacent legs slow down the
-    /// motion at the waypoint.
+    /// Some waypoints have later times than in the fastest motion. The planned motion must keep these times and all
+    /// limits. Only with rounded corners may the planner report a time as too early, because slower adjacent legs
+    /// then slow down the motion at the waypoint.
     #[test]
     fn given_times_are_kept(
         seed in any::<u64>(),

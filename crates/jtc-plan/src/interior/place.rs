@@ -2,25 +2,27 @@
 use crate::along::Plan;
 use crate::{JOINTS, JointVec};
 
-/// Weights of three neighbouring coefficients. The weighted sum is one value of the spline.
+/// Weights of three neighbouring spline coefficients. Their weighted sum is one value of the spline.
 pub(super) type Three = [f64; 3];
 
 /// A point at which the limits must be kept, such as the end of a cell.
 pub(super) struct Place {
     /// Index of the first of the three coefficients.
     pub at: usize,
-    /// Weights of the squared speed, its slope and its second derivative.
+    /// Weights of the spline coefficients for the squared speed. The next two fields are the weights for its slope
+    /// and its second derivative (bend).
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
-    /// Joint jerk and acceleration as shares of their limits. `jerk` contains the coefficients of bend, slope and
-    /// squared speed, without the speed factor. `acceleration` contains the coefficients of slope and squared speed.
+    /// Coefficients of the joint jerks, as shares of the jerk limits: for bend (second derivative of the squared
+    /// speed), slope and squared speed. The sum must be multiplied by the speed. The next field contains the
+    /// coefficients of the joint accelerations, as shares of the acceleration limits: for slope and squared speed.
     pub jerk: [JointVec; 3],
     pub acceleration: [JointVec; 2],
     /// Highest squared speed, if speed, acceleration and torque are limited at this point.
     pub cap: f64,
-    /// Weight of this point, and weight of the middle of the cell, in the numerical integration of 1/speed, which
-    /// gives the duration. `middle` also contains the spline weights of the squared speed in the middle.
+    /// Weight of this point in the numerical integration of 1/speed, which gives the duration. The next field
+    /// contains the spline weights and the integration weight of the middle of the cell.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
@@ -29,9 +31,9 @@ pub(super) struct Place {
 pub(super) struct Torque {
     /// First derivative of the path.
     pub first: JointVec,
-    /// Coefficient of the slope in the torque.
+    /// Factor of the slope of the squared speed in the torque.
     pub mass: JointVec,
-    /// Coefficient of the squared speed in the torque.
+    /// Factor of the squared speed in the torque.
     pub speed: JointVec,
     /// Available torque without friction, in the positive and negative direction, N·m.
     pub high: JointVec,
@@ -43,7 +45,7 @@ fn dot(three: &Three, c: &[f64]) -> f64 {
 }
 
 impl Place {
-    /// Returns the jerks as shares of their limits, without the speed factor.
+    /// Returns the joint jerks as shares of their limits, divided by the path speed.
     fn jerks(&self, b: f64, slope: f64, bend: f64) -> JointVec {
         let [by_bend, by_slope, by_b] = &self.jerk;
         std::array::from_fn(|j| by_bend[j] * bend + by_slope[j] * slope + by_b[j] * b)
@@ -55,13 +57,14 @@ impl Place {
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Adapts this point to an arm at rest, at which only the jerk along the path remains.
+    /// Sets the coefficients for a point at which the arm is at rest. At rest, only the jerk in the direction of the
+    /// path remains.
     pub(super) fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Returns the contribution of this point to the duration, and to the sum of the logarithms of the margins to the
-    /// limits. Returns `None` if a limit is exceeded.
+    /// Returns the contribution of this point to the duration, and to the sum of the logarithms of the distances from
+    /// the limits. Returns `None` if a limit is exceeded.
     pub(super) fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
         let c = &c[self.at..self.at + 3];
         let b = dot(&self.b, c);
@@ -101,8 +104,8 @@ impl Place {
         is_inside.then(|| (time, product.ln()))
     }
 
-    /// Adds the contribution of this point to the derivatives of the minimised function. The function that is minimised is the duration
-    /// plus `barrier` times the barriers. The derivatives are with respect to the spline coefficients.
+    /// Adds the contribution of this point to the derivatives of the minimised function (the duration plus `barrier`
+    /// times the barriers) with respect to the spline coefficients.
     pub(super) fn add_to(
         &self,
         gradient: &mut [f64],
@@ -188,8 +191,8 @@ impl Place {
     }
 }
 
-/// Adds a barrier with the derivatives `one` and `two` to the gradient and to the second derivatives (in the order 00, 11,
-/// 22, 01, 02, 12).
+/// Adds a barrier to the gradient and to the second derivatives (in the order 00, 11, 22, 01, 02, 12). `one` and
+/// `two` are the first and second derivative of the barrier.
 fn add(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 3], one: f64, two: f64) {
     for i in 0..3 {
         g[i] += one * d[i];

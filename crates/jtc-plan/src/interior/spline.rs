@@ -2,7 +2,8 @@
 use super::Problem;
 use crate::law::{Law, Phase};
 
-/// Largest relative change of the speed within a pair of phases, and largest number of phase pairs per cell.
+/// Largest relative change of the speed within a pair of phases. The next constant is the largest number of phase
+/// pairs per cell.
 const ALIKE: f64 = 0.2;
 const PARTS_MAX: f64 = 4.0;
 

@@ -1,16 +1,16 @@
 //! Inverse kinematics in closed form, for two geometries that cover most arms.
 //!
 //! * **Spherical wrist**: the last three axes meet in a point (Pieper 1968), and two adjacent axes of the first three
-//!   are parallel or meet. The first three joints move the intersection to its position, and the last three joints set
-//!   the orientation of the flange.
-//! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in the
-//!   arms of Universal Robots (Hawkins 2013). The first joint moves the intersection of axes 5 and 6 to the required
-//!   coordinate along the parallel axes. The fifth and the sixth joint turn the flange, and the three parallel joints
-//!   form a planar arm.
+//!   are parallel or meet. The first three joints move this point to its required position, and the last three joints
+//!   set the orientation of the flange.
+//! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in
+//!   the arms of Universal Robots (Hawkins 2013). The first joint moves the intersection of axes 5 and 6 to its
+//!   required coordinate along the parallel axes. The fifth and the sixth joint set the orientation of the flange,
+//!   and the three parallel joints form a planar arm.
 //!
-//! All values are computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
-//! 1984; decomposition by Elias and Wen, IK-Geo, 2022). Therefore the result does not depend on the choice of joint
-//! frames.
+//! All values are computed in the base frame from the axes at the joint positions 0 (product of exponentials,
+//! Brockett 1984; decomposition by Elias and Wen, IK-Geo, 2022). Therefore the result does not depend on the choice
+//! of joint frames.
 use jtc_dynamics::JointVec;
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,8 +18,8 @@ use super::chain::{Axes, Frame, turn};
 use super::subproblems::{across, turn_onto, turn_to_length, turn_to_value, turned};
 
 /// Largest sine of an angle, and largest distance in m, that are treated as zero when the geometry of an arm is
-/// determined. This tolerance is larger than the rounding errors of a robot description. Solutions for the ideal
-/// geometry are refined with the actual arm.
+/// determined. The value is above the rounding errors of a robot description. Solutions for the ideal geometry are
+/// then refined with the actual geometry of the arm.
 pub(crate) const EXACT: f64 = 1e-5;
 /// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry. For such an arm, the closed form
 /// supplies good starting values for a search.
@@ -72,9 +72,9 @@ impl Geometry {
         None
     }
 
-    /// Returns joint positions at which the flange is at `goal`, except for rounding and the deviations from the ideal geometry. There are
-    /// at most eight solutions. At some of the returned joint positions, the flange may not be at the goal. A joint that the goal does not
-    /// determine stays at `hint`.
+    /// Returns joint positions at which the flange is at `goal`, except for rounding and the deviations from the
+    /// ideal geometry. There are at most eight solutions. The caller must check them, because at some of them the
+    /// flange is not at the goal. A joint that the goal does not determine stays at `hint`.
     pub(super) fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let rotation = goal.rotation * zero.flange.rotation.transpose();
         let motion = Motion { rotation, shift: goal.position - rotation * zero.flange.position };
@@ -184,7 +184,7 @@ impl Shoulder {
     }
 }
 
-/// Adds the two solutions of the last three joints: one with a flipped wrist, and one without a flip.
+/// Adds the two solutions of the last three joints. The two solutions differ by a flip of the wrist.
 fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, found: &mut Vec<JointVec>) {
     let h = &zero.axis;
     let before = turn(&h[0], arm[0]) * turn(&h[1], arm[1]) * turn(&h[2], arm[2]);
@@ -213,7 +213,8 @@ fn three_parallel(
 ) {
     let (h, p) = (&zero.axis, &zero.point);
     let along = &h[1];
-    // Joints 2, 3 and 4 do not move the centre along their parallel axes, so only joint 1 determines this coordinate.
+    // Joints 2, 3 and 4 do not change the coordinate of the centre along their parallel axes. Only joint 1 determines
+    // this coordinate.
     let height = along.dot(&(centre - p[0]));
     for back in turn_to_value(along, &h[0], &(goal.apply(centre) - p[0]), height, -hint[0]) {
         let q1 = -back;

@@ -96,7 +96,8 @@ pub enum PoseError {
     /// An arc without its `via` point.
     #[error("the end of an arc does not follow a point on the arc (`via`)")]
     NoVia,
-    /// A line to joint positions that the arm cannot have in its configuration on this line.
+    /// Joint positions at the end of a line that the arm does not reach, because it keeps its configuration (elbow,
+    /// wrist, shoulder) along the line.
     #[error(
         "the line ends there with {joint} at {value:.4} rad, not at {wanted:.4} rad: the arm keeps its configuration along a line"
     )]

@@ -1,4 +1,4 @@
-//! Paths through joint space on which the flange follows straight lines and arcs.
+//! Paths in joint space on which the flange follows straight lines and arcs.
 use jtc_dynamics::{JOINTS, JointVec, Pose};
 use jtc_wire::Joint;
 use nalgebra::{Vector3, Vector6};
@@ -11,8 +11,8 @@ use super::trace::Trace;
 use super::{Kinematics, PoseError, outside};
 use crate::{Path, PathPoint};
 
-/// Largest rotation of a joint between two samples, rad. With this step, the iteration follows one solution and does
-/// not miss a singular pose.
+/// Largest rotation of a joint between two samples, rad. With steps of this size, the iteration stays with one
+/// solution and detects singular poses.
 const TURN: f64 = 0.02;
 /// Largest and smallest distance between two samples, m.
 const STEP: (f64, f64) = (0.01, 1e-7);
@@ -41,14 +41,14 @@ pub struct FlangePath {
 
 impl FlangePath {
     /// Creates the path from the joint positions `start` (rad) along `legs`. Corners are blended within `blend` m,
-    /// which is limited to half of each leg. If `blend` is 0, the path stops at the corners. The first waypoint is the
-    /// start, so waypoint 2 is the end of leg 1. Legs without motion are skipped.
+    /// which is limited to half of each leg. If `blend` is 0, the path stops at the corners. The first waypoint is
+    /// the start, so waypoint 2 is the end of leg 1. Legs without motion are skipped.
     ///
     /// # Errors
     ///
     /// Returns [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits. Returns
-    /// [`PoseError::Leg`] for an error along a leg, such as a joint at its limit, a singular pose, or the end of the
-    /// arm's reach. Of several errors, the first error along the path is returned. All waypoints are checked before the
+    /// [`PoseError::Leg`] for an error along a leg: a joint at its limit, a singular pose, or the end of the arm's
+    /// reach. Of several errors, the first error along the path is returned. All waypoints are checked before the
     /// legs.
     pub fn new(
         kinematics: &Kinematics,
@@ -72,8 +72,8 @@ impl FlangePath {
         Ok(Self { chain: chain.clone(), trace, samples, breaks })
     }
 
-    /// Returns the parameter at which the arc with leg number `number` (from 1) passes its `via` point. The rounding of
-    /// a corner may remove this point from the path.
+    /// Returns the parameter at which the arc with leg number `number` (from 1) passes its `via` point. Returns
+    /// `None` if the rounding of a corner removes this point from the path.
     pub(crate) fn via(&self, number: usize) -> Option<f64> {
         self.trace.via(number)
     }
@@ -193,7 +193,7 @@ impl<'a> Follower<'a> {
         for corner in corners {
             while self.s < corner {
                 let left = corner - self.s;
-                // The step is limited to half of the remaining length, which avoids a tiny last step.
+                // A step covers at most half of the remaining length, so that the last step is not tiny.
                 let wanted = if step >= left { corner } else { self.s + step.min(0.5 * left) };
                 match self.try_step(wanted)? {
                     Some(()) => {
@@ -215,7 +215,7 @@ impl<'a> Follower<'a> {
         let (q, axes) = newton(chain, &place.frame, self.q);
         let (joint, turn) = largest_turn(&self.q, &q);
         let left = chain.residual(&place.frame, &axes);
-        // With this form of the condition, a NaN is not considered a solution.
+        // This form of the condition is also false for NaN, so NaN is not considered a solution.
         let arrived = left.norm() <= TOLERANCE;
         if arrived && turn <= TURN {
             self.check(s, &q, &axes)?;
@@ -251,8 +251,8 @@ impl<'a> Follower<'a> {
 
     /// Checks the limits at every turning point of a joint between the current point and `s`.
     fn check_between(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
-        // The point is slightly inside the interval. At a corner, the derivatives are therefore evaluated on the side
-        // of this interval.
+        // The point is slightly inside the interval, because the derivatives at a corner would otherwise be those of
+        // the next interval.
         let inset = 1e-3 * (s - self.s);
         let rate = |at: f64, axes: &Axes| derivatives(axes, &self.trace.at(at)).unwrap_or_default().0;
         let (before, after) = (rate(self.s + inset, &self.axes), rate(s - inset, axes));
@@ -268,8 +268,8 @@ impl<'a> Follower<'a> {
         Ok(())
     }
 
-    /// Returns the error for a singular pose at `s`, or for the end of the arm's reach if the remainder of the leg has
-    /// no solution.
+    /// Returns the error for a singular pose at `s`. If the remainder of the leg has no solution, returns the error
+    /// for the end of the arm's reach.
     fn singular(&self, s: f64, axes: &Axes) -> PoseError {
         let (_, along, length) = self.trace.whereabouts(s);
         for k in 0..=LOOK_AHEAD {

@@ -13,8 +13,8 @@ pub const RADIUS: f64 = 0.25;
 
 /// Length below which a leg is considered to have no movement, m.
 pub(crate) const SHORTEST: f64 = 1e-9;
-/// Three points are considered collinear if the distance of the second point from the line through the other two points
-/// is below this value, m.
+/// Maximum distance of the second of three points from the line through the other two points for which the three
+/// points are considered collinear, m.
 const IN_LINE: f64 = 1e-6;
 /// If a rotation differs from half a turn by less than this angle, the direction of the rotation is ambiguous, rad.
 const HALF_TURN: f64 = 1e-6;

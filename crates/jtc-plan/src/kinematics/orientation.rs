@@ -13,8 +13,8 @@ const ROTATION: f64 = 1e-6;
 /// Orientation of a flange pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
-    /// A unit quaternion x, y, z, w with the scalar last, as in ROS. The length of the quaternion may deviate from 1 by
-    /// a thousandth, so values with few digits are sufficient.
+    /// A unit quaternion x, y, z, w with the scalar last, as in ROS. A length between 0.999 and 1.001 is accepted, so
+    /// values with few digits are sufficient.
     Quaternion([f64; 4]),
     /// Roll, pitch and yaw, rad, about the fixed axes x, y and z in this order: Rz(yaw)·Ry(pitch)·Rx(roll), as in a
     /// URDF.

@@ -56,8 +56,9 @@ pub struct Route {
 struct Section {
     way: Way,
     begin: f64,
-    /// Points at which the path changes its form, including the ends, as values of the route parameter and of the section parameter. The
-    /// sum of `begin` and a section parameter is rounded. This rounding must not move a point across a change of form.
+    /// Points at which the path changes its form, including the ends, each as route parameter and section parameter.
+    /// These pairs prevent that rounding of the sum `begin` plus section parameter moves a point across a change of
+    /// form.
     marks: Vec<(f64, f64)>,
 }
 
@@ -103,17 +104,17 @@ impl Section {
 }
 
 impl Route {
-    /// Creates the route through `points`. If the first point is a flange pose, the solution nearest to `near` (rad) is
-    /// used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]). Corners
-    /// between lines and arcs are rounded within `blend_m` m (see [`FlangePath`]). If the blend of a corner is 0, the
-    /// path stops at this corner.
+    /// Creates the route through `points`. If the first point is a flange pose, the solution nearest to `near` (rad)
+    /// is used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]). Corners
+    /// between lines and arcs are rounded within `blend_m` m (see [`FlangePath`]). With a blend of 0, the path stops
+    /// at the corner.
     ///
     /// # Errors
     ///
-    /// Returns [`PlanError::TooFew`] for fewer than two waypoints, and [`PlanError::Blend`] for an invalid `blend`. Returns
-    /// [`PlanError::Flange`] for an impossible waypoint or leg. This error contains the waypoint, or the leg and the distance along the leg
-    /// (see [`PoseError`]). The flange error is [`PoseError::NoMotion`] if all waypoints are at the same position, and [`PoseError::Blend`]
-    /// for an invalid `blend_m`.
+    /// Returns [`PlanError::TooFew`] for fewer than two waypoints, and [`PlanError::Blend`] for an invalid `blend`.
+    /// Returns [`PlanError::Flange`] for an impossible waypoint or leg, with the waypoint, or the leg and the
+    /// distance along the leg (see [`PoseError`]). The flange error is [`PoseError::NoMotion`] if all waypoints are
+    /// at the same position, and [`PoseError::Blend`] for an invalid `blend_m`.
     pub fn new(
         kinematics: &Kinematics,
         points: &[RoutePoint],
@@ -313,7 +314,8 @@ fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<
     Ok(Legs { legs, ends, first })
 }
 
-/// Checks that the arm reaches the requested joint positions and not another configuration.
+/// Checks that the arm reaches the requested joint positions. A difference means that the arm is in another
+/// configuration.
 fn same(reached: &JointVec, wanted: &JointVec) -> Result<(), PoseError> {
     let (joint, away) = furthest_joint(reached, wanted);
     if away > SAME {

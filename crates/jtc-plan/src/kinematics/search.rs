@@ -8,13 +8,13 @@ use super::chain::{Chain, Frame};
 
 /// Maximum residual of a solution, m and rad.
 pub(crate) const TOLERANCE: f64 = 1e-9;
-/// Squared residual below which the residual is only rounding. The residual consists of the translation divided by the
-/// arm's length, and of the rotation in rad.
+/// Squared residual below which the residual consists only of rounding errors. The residual consists of the
+/// translation divided by the arm's length, and of the rotation in rad.
 const ROUNDING: f64 = 1e-29;
 /// Largest step of a joint in an iteration, rad. For larger steps, the linearisation is not accurate enough.
 const STEP: f64 = 0.7;
-/// Maximum joint difference between two solutions that are considered one solution, rad. Two such solutions are near a
-/// singularity, and the flange moves only by nanometres between them.
+/// Maximum joint difference between two solutions that are treated as one, rad. Such solutions occur near a
+/// singularity, where this joint difference moves the flange by only nanometres.
 pub(crate) const SAME: f64 = 1e-4;
 /// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).
 const SOLUTIONS: usize = 16;
@@ -28,8 +28,8 @@ pub(crate) struct Reached {
     pub residual: Vector6<f64>,
 }
 
-/// Moves `q` to the minimum of the weighted residual (weights `weights`) in at most `iterations` steps. Uses
-/// Levenberg-Marquardt with damping proportional to the squared residual (Sugihara 2011). This method converges
+/// Moves `q` to the minimum of the residual with the weights `weights`, in at most `iterations` steps. Uses
+/// Levenberg-Marquardt with damping proportional to the squared residual (Sugihara 2011), which converges
 /// quadratically and is stable in singular poses.
 pub(crate) fn descend(
     chain: &Chain,

@@ -35,9 +35,9 @@ pub struct Singularity {
     pub kind: SingularKind,
     /// Joints that can move while the flange is almost at rest.
     pub joints: Vec<Joint>,
-    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm. The smallest singular value
-    /// is the smallest motion of the flange for joint motions of 1 rad in total (root of the sum of squares). The smallest singular value
-    /// is 0 in a singular pose, and NaN if a joint position is NaN or infinite.
+    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm. It is
+    /// the smallest motion of the flange for joint motions of 1 rad in total (root of the sum of squares). It is 0 in
+    /// a singular pose, and NaN if a joint position is NaN or infinite.
     pub smallest: f64,
 }
 
@@ -75,7 +75,7 @@ const TAKES_PART: f64 = 0.2;
 const NAMED: f64 = 0.1;
 
 /// Returns the smallest singular value of the Jacobian and the unit vector of the corresponding joint motions. If a
-/// joint position is NaN or infinite, returns NaN and 0.
+/// joint position is NaN or infinite, returns NaN and a zero vector.
 pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
     let jacobian = chain.scaled_jacobian(axes);
     // With values that are not finite, the iteration for singular values would not end.
@@ -100,7 +100,7 @@ pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -
 /// 0.
 fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     let (h, p) = (&axes.axis, &axes.point);
-    // The factor of the wrist is divided by its value at a quarter turn of joint 5, so that it is between 0 and 1.
+    // The factor of the wrist is divided by its value at a quarter turn of joint 5, so that its range is from 0 to 1.
     let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
     let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
     let (centre, is_planar) = match geometry {
@@ -110,7 +110,8 @@ fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     if !is_planar {
         return if wrist < NAMED { SingularKind::Wrist } else { SingularKind::Other };
     }
-    // The last axes meet in a point on axis 5, and this point moves with axis 5.
+    // The last axes meet in a point on axis 5. This point moves with axis 5, so its present position is computed from
+    // its position along axis 5.
     let along = chain.zero.axis[4].dot(&(centre - chain.zero.point[4]));
     let centre = axes.point[4] + h[4] * along;
     let end = if matches!(geometry, Geometry::ThreeParallel { .. }) { p[3] } else { centre };

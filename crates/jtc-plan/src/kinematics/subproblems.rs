@@ -1,14 +1,15 @@
 //! Functions that solve one equation of a closed form for a rotation angle (the subproblems of Paden and Kahan).
 //!
-//! If the geometry does not determine the angle, as in singular poses, each function returns its argument `hint`. A target may be slightly
-//! out of reach, because an arm may differ slightly from the ideal geometry. For a target that is slightly out of reach, the functions use
-//! the nearest reachable target. The caller refines the result, and drops a result that does not reach the goal.
+//! If the geometry does not determine the angle, as in singular poses, each function returns its argument `hint`. The
+//! arm can differ slightly from the ideal geometry. Therefore, for a target that is slightly out of reach, the
+//! functions use the nearest reachable target. The caller refines the result, and drops a result that does not reach
+//! the goal.
 use nalgebra::Vector3;
 
 use super::chain::turn;
 
-/// If the length of a direction is below this share of the vectors' lengths, rounding dominates, and the angle is not
-/// determined.
+/// Share of the vector's length below which the component perpendicular to the axis consists mainly of rounding
+/// errors. The angle is then not determined.
 const FREE: f64 = 1e-9;
 /// Largest excess of a target over the largest reachable value, as a share of the vectors' lengths.
 const SLACK: f64 = 1e-3;

@@ -1,10 +1,12 @@
 //! Path of the flange. The path consists of consecutive legs with blended corners.
 //!
-//! A blend begins at the distance r before a corner and ends at the distance r after the corner. Within the blend, the
-//! parameter of the previous leg slows down to a stop while the parameter of the next leg starts. Let τ go from −r to
-//! r, let w rise smoothly from 0 to 1, and let W = ∫w. The point on the path is the point of the previous leg at τ − W
-//! plus the displacement of the next leg by W. Position and orientation of the blended path have continuous second
-//! derivatives. If the legs are straight, the position stays within the triangle of the corner.
+//! A blend begins at the distance r before a corner and ends at the distance r after the corner. Within the blend,
+//! the motion on the previous leg slows down to a stop while the motion on the next leg starts.
+//!
+//! Let τ go from −r to r, let w rise smoothly from 0 to 1, and let W = ∫w. The point on the path is the point of the
+//! previous leg at τ − W plus the displacement of the next leg by W. Position and orientation of the blended path
+//! have continuous second derivatives. If the legs are straight, the position stays within the triangle of the
+//! corner.
 use nalgebra::Vector3;
 
 use super::PoseError;
@@ -23,7 +25,7 @@ pub(crate) struct Trace {
     begins: Vec<f64>,
     /// Blend radius at the end of each leg, m; 0 if the path stops at this end.
     blends: Vec<f64>,
-    /// Number of legs in the request; some of these may have no motion.
+    /// Number of legs in the request, including legs without motion.
     given: usize,
 }
 
@@ -126,7 +128,7 @@ fn blended(before: &Drawn, behind: &Drawn, r: f64, tau: f64) -> Place {
     let sum = 2.0 * r * t * t * t * (1.0 - 0.5 * t);
     let (a, b) = (before.at(before.length + tau - sum), behind.at(sum));
     let corner = &before.to;
-    // Rotation of the flange along the next leg after the corner.
+    // Rotation of the flange on the next leg, from the corner to the present point.
     let since = b.frame.rotation * corner.rotation.transpose();
     let spin: Vector3<f64> = since * a.spin;
     Place {
@@ -193,7 +195,8 @@ mod tests {
             let at_ends = trace.breaks();
             for s in at_ends.into_iter().chain([at * trace.end()]) {
                 let s = s.clamp(1e-5, trace.end() - 1e-5);
-                // At the ends of a blend the third derivative jumps. Finite differences are imprecise on tight arcs.
+                // The third derivative jumps at the ends of a blend, and finite differences are less accurate on
+                // tight arcs. The tolerance therefore increases with velocity and acceleration.
                 let tight = trace.at(s).acceleration.norm() + trace.at(s).velocity.norm();
                 prop_assert!(wrong(&trace, s) < 0.03 + 1e-3 * tight.powi(3), "{} at {s}: {trace:?}", wrong(&trace, s));
             }

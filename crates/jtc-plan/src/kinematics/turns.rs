@@ -21,8 +21,8 @@ pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<
     for (j, angle) in found.iter_mut().enumerate() {
         let turned = *angle + TAU * ((near[j] - *angle) / TAU).round();
         let ends = [limits[j].0, limits[j].1].map(|end| *angle + TAU * ((end - *angle) / TAU).round());
-        // The turn nearest to `near` may be outside the limits. If this turn is outside the limits, the nearest valid turn (if there is
-        // one) is next to one of the limits.
+        // The turn nearest to `near` may be outside the limits. The nearest valid turn, if there is one, is then next
+        // to one of the limits.
         let candidates = [turned, ends[0], ends[0] + TAU, ends[1], ends[1] - TAU];
         let inside = candidates.into_iter().filter_map(|angle| within(angle, limits[j]));
         *angle = inside.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))?;

@@ -125,7 +125,7 @@ impl Case {
         let breakaway = self.breakaway();
         // The samples include the standstill before and after the motion.
         let count = (motion.duration() / H).ceil() as i64 + 4;
-        // In a long motion, only some time intervals are sampled.
+        // In a long motion, only some time intervals are sampled, to save computing time.
         let stride = if count > 400_000 { count / 4_000 } else { 0 };
         let mut used = [0.0f64; 4];
         let mut k = -4;
@@ -157,8 +157,8 @@ impl Case {
                 let rounding = 4e-15 + 4.0 * f64::EPSILON * time * v[j].abs();
                 take(2, "jerk", jerk[j], self.limits.jerk[j], rounding / (H * H * H));
                 if let (Some(torque), Some(usable)) = (torque, usable) {
-                    // This tolerance covers the rounding of positions, divided by the square of the time between
-                    // samples.
+                    // The tolerance covers the rounding errors of the positions. The differences divide these errors
+                    // by the square of the time between samples.
                     take(3, "torque", torque[j], usable[j], 1e-4);
                 }
                 if !(low - 1e-9..=high + 1e-9).contains(&p[1][j]) && wrong.len() < 2000 {
@@ -170,8 +170,8 @@ impl Case {
         used
     }
 
-    /// Returns the largest friction of each joint, up to a speed slightly above the speed at which the smoothed sign
-    /// function of the friction reaches ±1.
+    /// Returns the largest friction of each joint at low speed. The speed range ends slightly above the speed at
+    /// which the smoothed sign function of the friction reaches ±1.
     fn breakaway(&self) -> JointVec {
         std::array::from_fn(|j| {
             let fastest = self.config.friction_sign_width + self.config.joints[j].velocity_max / 128.0;
@@ -180,8 +180,8 @@ impl Case {
         })
     }
 
-    /// Returns the torque that a motion may use. The usable torque is the limit minus the margin, but at least the
-    /// holding torque plus a small part of the remaining torque.
+    /// Returns the torque that a motion is allowed to use: the limit minus the margin, but at least the holding
+    /// torque plus a small part of the remaining torque.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {
@@ -265,8 +265,8 @@ impl Case {
     }
 }
 
-/// Returns the range of waypoints that are closer to each other than the blend. The planner may omit some of these
-/// waypoints.
+/// Returns the range of consecutive waypoints that are closer to each other than the blend. The planner is allowed to
+/// omit some of these waypoints.
 fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
     let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
     let (mut from, mut to) = (at, at);

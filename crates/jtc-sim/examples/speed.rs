@@ -4,7 +4,7 @@ use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::ExecCommand;
 use test_kit::clock::CpuTime;
 
-/// Milliseconds per measurement.
+/// Number of simulated milliseconds per measurement.
 const BATCH: u32 = 200;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -30,15 +30,15 @@ const LIGHTEST: f64 = 0.02;
 const LARGEST_TURN: f64 = 0.1;
 /// Maximum number of sub-steps per step for fast joints.
 const MOST_SUBSTEPS: f64 = 32.0;
-/// Largest phase angle of a vibration at a wall or gear in one sub-step, rad. `LARGEST_DECAY` is the largest decay of the
-/// vibration in one sub-step.
+/// Largest phase angle of a vibration at a wall or gear in one sub-step, rad. The next constant is the largest decay
+/// (decay rate times duration) in one sub-step.
 const LARGEST_PHASE: f64 = 0.5;
 const LARGEST_DECAY: f64 = 1.0;
 /// Maximum number of sub-steps per step for walls and gears. If walls require more sub-steps, the simulation reduces the
 /// damping of the walls.
 const MOST_STIFF_SUBSTEPS: f64 = 64.0;
-/// Decay in one sub-step above which the simulation reduces the damping. The Runge-Kutta method is unstable for a decay of 2.7
-/// or more.
+/// Decay (decay rate times duration) in one sub-step above which the simulation reduces the damping. From a decay of
+/// 2.7, the Runge-Kutta method is unstable.
 const UNSTABLE_DECAY: f64 = 2.0;
 /// Time between two updates of the temperatures, s.
 const WARMING: f64 = 0.05;
@@ -113,7 +113,8 @@ impl Default for SimArm {
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
-    /// Inertias without carried payloads. `dynamics` includes the carried payloads.
+    /// Inertias without the payloads that the arm carries in addition to its own payload. `dynamics` includes these
+    /// payloads.
     bare: LinkInertias,
     carried: Vec<Payload>,
     contacts: Vec<Contact>,
@@ -148,7 +149,7 @@ impl Arm {
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
         let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
         let elastic = parts.gears.iter().any(Gear::is_elastic);
-        // The springs of the gears are already deflected by their loads, so that the links are at rest.
+        // At the start, the springs of the gears are deflected by their loads, so that the links are at rest.
         let load = dynamics.gravity_torque(&q);
         let motor = core::array::from_fn(|j| {
             let gear = &parts.gears[j];
@@ -221,7 +222,8 @@ impl Arm {
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));
         for (j, gear) in self.parts.gears.iter().enumerate() {
             if gear.is_elastic() {
-                // The computation uses the smallest possible inertia on both sides of the gear.
+                // The smallest possible inertia on each side of the gear is used, because it gives the highest
+                // frequency.
                 let mobility = 1.0 / OUTPUT + 1.0 / (link[j] - OUTPUT);
                 square = f64::max(square, gear.stiffness * mobility);
                 decay = f64::max(decay, gear.damping * mobility);
@@ -283,7 +285,7 @@ impl Arm {
         let of = |payload: &Payload| {
             Dynamics::with_payload(&self.parts.model, self.parts.gravity, payload).inertias().numbers()
         };
-        // The inertial parameters are linear in the bodies, so they can be added.
+        // The inertial parameters of several bodies can be added, because the equations of motion are linear in them.
         let (mut sum, none) = (self.bare.numbers(), of(&Payload::NONE));
         for payload in payloads {
             let with = of(payload);
@@ -297,9 +299,9 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Returns the inertia of the rotors for a step of `dt`, kg·m². A light rotor with steep friction or at an end stop may
-    /// have a time constant below `dt`. The inertia of such a rotor is increased, because fourth-order Runge-Kutta is unstable
-    /// if `dt` is at least 2.7 time constants.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m². A light rotor with steep friction or at an end
+    /// stop can have a time constant below `dt`. Its inertia is increased, because fourth-order Runge-Kutta is
+    /// unstable if `dt` is at least 2.7 time constants.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -308,7 +310,7 @@ impl Arm {
         })
     }
 
-    /// Returns the damping of the end stop that a joint may touch within `dt` seconds, N·m·s/rad.
+    /// Returns the damping of the end stop that a joint can touch within `dt` seconds, N·m·s/rad.
     fn stopping(&self, j: usize, dt: f64) -> f64 {
         let (low, high) = self.parts.stops[j];
         let reach = 2.0 * self.qd[j].abs() * dt;
@@ -328,8 +330,9 @@ impl Arm {
         self.refresh_friction();
     }
 
-    /// Integrates with the classical fourth-order Runge-Kutta method. The bristles of the friction model are too stiff for this
-    /// method. [`FrictionTorques::bend`] moves the bristles with the velocities of the stages.
+    /// Integrates with the classical fourth-order Runge-Kutta method. The bristles of the friction model are too
+    /// stiff for this method, so [`FrictionTorques::bend`] computes their deflection from the velocities of the
+    /// stages.
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;

@@ -25,10 +25,11 @@ const CHUNK: usize = 4096;
 /// Number of ticks that storing an arm takes, equal to the erase time of a flash sector.
 const STORE_MS: u32 = 2_000;
 
-/// Number of polls of the parser between two ticks. The polls represent a processor with free time.
+/// Maximum number of polls of the parser between two ticks. The polls represent the free processor time of the real
+/// board.
 const POLLS: usize = 64;
 
-/// A host frame that the controller executed.
+/// Result of the processing of bytes from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
     /// A valid frame, with the type byte of the frame.
@@ -86,7 +87,7 @@ pub struct Board {
     watchdog_ms: u32,
     /// Number of consecutive missed ticks.
     missed: u32,
-    /// Frames that the tick has executed.
+    /// Host frames that the tick has processed, including invalid frames.
     pub worked: Vec<Worked>,
     /// Number of bytes from the host that were lost because the ring buffer was full.
     pub lost_bytes: u64,
@@ -228,14 +229,14 @@ impl Board {
         self.watch.scan(LINE, now_us, bytes);
         self.ring.extend(bytes);
         if self.ring.len() > RING {
-            // The host has sent more bytes than the controller can execute, for too long. The waiting bytes are lost, but
-            // a Stop in these bytes is still executed.
+            // The host has sent more bytes than the controller can execute, so the ring buffer is full. All waiting
+            // bytes are lost, but a Stop in these bytes is still executed.
             self.lost_bytes += self.ring.len() as u64;
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // The parser accepts bytes while a frame is executed, as on the real board. If bytes waited in the ring
-        // buffer during this time, the parser would detect a gap in the frame.
+        // The parser also accepts bytes while a frame is executed, as on the real board. Otherwise these bytes would
+        // wait in the ring buffer, and the parser would later detect a gap in their frame.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
             let waiting = self.ring.as_slices().0;

@@ -52,7 +52,7 @@ pub const fn frame_us(len: usize) -> u32 {
 /// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusFault {
-    /// Share of receptions that fail, 0..1. Failures are drawn separately for each receiver.
+    /// Share of receptions that fail, 0..1. For each frame, each receiver can fail separately.
     pub lost: f64,
     /// Share of frames that are destroyed on the bus and repeated, 0..1.
     pub corrupted: f64,
@@ -208,8 +208,8 @@ impl Bus {
     /// Sends the request of the controller. Returns `true` if a node acknowledged the request.
     fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
         if self.fault.cut || !(self.monitored || nodes.any_on_bus()) {
-            // The controller repeats the request until the next tick replaces it. A missing acknowledgement alone does
-            // not cause bus-off.
+            // The controller repeats a request without acknowledgement until the next tick replaces it. A missing
+            // acknowledgement alone does not cause bus-off.
             self.statistics.unacknowledged += 1;
             self.statistics.busy_us += u64::from(TICK_US);
             self.pending.clear();

@@ -10,7 +10,7 @@ use crate::faults::FaultPlan;
 /// have the over-speed limit of real drives.
 const OVER_SPEED: f64 = 1.2;
 
-/// Distance of the start position from the nearest limit, rad, for a joint that cannot reach 0.
+/// Distance of the start position from the limit nearest to 0, rad, for a joint that cannot reach 0.
 const END_DISTANCE: f64 = 0.2;
 
 /// Deviation of the true arm from its model.

@@ -119,8 +119,9 @@ impl Drive {
         self.bits & config_bit::WORKING_AREA != 0 && self.position.abs() > self.config.working_area
     }
 
-    /// Simulates one millisecond of the drive. Reads the sensors, executes the checks, and processes a request. `motor`
-    /// and `link` are the true positions of the two sides of the gear, converted to the joint side, rad.
+    /// Simulates one millisecond of the drive: reads the sensors, executes the checks, and processes a requested
+    /// state. `motor` and `link` are the true positions of the two sides of the gear, converted to the joint side,
+    /// rad.
     pub fn tick(&mut self, motor: f64, link: f64, temperature: f64) {
         self.read_encoders(motor, link);
         if self.booting > 0 {

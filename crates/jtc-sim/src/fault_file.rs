@@ -23,7 +23,7 @@ const STATES: [(&str, ControllerState); 6] = [
     ("error", ControllerState::Error),
 ];
 
-/// Key that occurs in every file format.
+/// The key `format`, which every version of the file format contains.
 #[derive(Deserialize)]
 struct Head {
     format: Option<f64>,
@@ -81,8 +81,8 @@ const PLACE_MAX: f64 = 10.0;
 const COM_MAX: f64 = 2.0;
 /// Largest mass of a load, kg.
 const MASS_MAX: f64 = 100.0;
-/// Range of the stiffness, and largest damping, of walls. The units are N/m and N·s/m at the flange, and N·m/rad and N·m·s/rad at
-/// a joint.
+/// Range of the stiffness of a wall at the flange, N/m. The next three constants are the largest damping at the
+/// flange (N·s/m), and the range of the stiffness (N·m/rad) and the largest damping (N·m·s/rad) at a joint.
 const STIFFNESS: (f64, f64) = (1.0, 1e6);
 const DAMPING_MAX: f64 = 1e4;
 const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
@@ -102,7 +102,7 @@ impl FaultPlan {
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
     ) -> Result<Self, FaultFileError> {
         let syntax = |e: toml::de::Error| FaultFileError::Syntax(e.to_string());
-        // The format is checked first, because files of other formats may have other keys.
+        // The format is checked first, because other formats can have other keys.
         let Head { format } = toml::from_str(text).map_err(syntax)?;
         if format != Some(FORMAT) {
             return Err(FaultFileError::Format { found: format });

@@ -1,4 +1,4 @@
-//! Tests of fault files: accepted files, and mistakes that the reader reports.
+//! Tests of fault files that the reader accepts, and of mistakes that it reports.
 use proptest::prelude::*;
 
 use super::*;
@@ -45,7 +45,7 @@ fn every_kind_is_read_by_its_own_name() {
         let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n\
                     position_m = [0, 0, 1]\nnormal = [0, 0, 1]\nstiffness_n_m = 1e4\ndamping_ns_m = 10\nside = \"above\"\n\
                     stiffness_nm_rad = 1e4\ndamping_nms_rad = 10\nmass_kg = 2\ncom_m = [0, 0, 0.1]\n";
-        // The test starts with all keys, and removes the key that each error message reports, until the file is
+        // The test starts with all keys. It removes the key that each error message reports, until the file is
         // accepted.
         let mut keys: Vec<&str> = keys.lines().collect();
         let fault = loop {
@@ -137,8 +137,8 @@ fn mistakes_are_named() {
     assert_eq!(FaultPlan::from_toml("format = 2").unwrap(), FaultPlan::default());
 }
 
-/// A file of format 1, in which joints are counted from 0, is rejected, because its faults would affect the wrong
-/// joints.
+/// A file of format 1, in which joints are counted from 0, must be rejected, because its faults would affect the
+/// wrong joints.
 #[test]
 fn files_that_counted_from_0_are_refused_with_what_to_change() {
     let old = "[[fault]]\nkind = \"fault-state\"\njoint = 2\nat_s = 1";

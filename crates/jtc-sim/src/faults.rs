@@ -82,7 +82,7 @@ fault_kinds! {
         /// Factor of the true friction.
         factor: f64,
     };
-    /// The bearing of a joint keeps this temperature.
+    /// The temperature of a joint's bearing stays at a given value.
     Temperature "temperature" {
         /// Joint that the fault affects.
         joint: Joint,

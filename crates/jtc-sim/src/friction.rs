@@ -9,7 +9,8 @@
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Largest natural frequency of a rotor on its friction bristles that steps of 1 ms integrate accurately, rad/s.
+/// Highest natural frequency of a rotor on its friction bristles that the integration with steps of 1 ms represents
+/// accurately, rad/s.
 const STIFFEST: f64 = 800.0;
 /// Smallest friction level that the code uses as a divisor, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
@@ -46,7 +47,7 @@ impl Default for FrictionModel {
     }
 }
 
-/// The friction model is the LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of
+/// The LuGre friction model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of
 /// mean deflection z (rad), with
 ///
 /// - dz/dt = v − σ0·|v|/g(v)·z,
@@ -85,8 +86,8 @@ pub(crate) struct FrictionTorques {
     curves: [SimFriction; JOINTS],
     /// Polynomial coefficients, with one row per power. The coefficients are zero for joints with a friction table.
     k: [JointVec; 4],
-    /// Speed at which the straight line of the curve begins, rad/s. The next field is the slope of this straight line, N·m·s/rad. For
-    /// joints with a friction table, the speed and the slope are zero.
+    /// Speed above which the friction curve continues as a straight line, rad/s. The next field is the slope of this
+    /// line, N·m·s/rad. Both are zero for joints with a friction table.
     reach: JointVec,
     slope: JointVec,
     /// Velocities and torques of the joints that have a friction table.
@@ -238,7 +239,7 @@ impl FrictionTorques {
         core::array::from_fn(|j| {
             let v = v[j];
             let (b, level) = lugre.stribeck(v * inverse, self.k[0][j]);
-            // In this formula, x is a/level. Numerator and denominator are multiplied by level².
+            // `a` is x·level, with x = rate·dt. Numerator and denominator are multiplied by level².
             let a = dt * self.stiffness[j] * v.abs() * b;
             let half = level + 0.5 * a;
             level * (z[j] * level + v * dt * half) / (level * level + a * half)
@@ -247,8 +248,9 @@ impl FrictionTorques {
 }
 
 impl LuGre {
-    /// Returns b = 1 + r² and b·g(v) in N·m, for a Coulomb torque (N·m) and a velocity `r` in multiples of the Stribeck speed. The
-    /// inverse of b decreases from 1 at standstill to 0 far above the Stribeck speed.
+    /// Returns b = 1 + r², and b·g(v) in N·m. `coulomb` is the Coulomb torque (N·m), and `r` is the velocity in
+    /// multiples of the Stribeck speed. The inverse of b decreases from 1 at standstill to 0 far above the Stribeck
+    /// speed.
     #[inline]
     fn stribeck(&self, r: f64, coulomb: f64) -> (f64, f64) {
         let b = 1.0 + r * r;
@@ -300,14 +302,14 @@ impl Points {
         self.velocity[1..19].iter().filter(|&&start| v >= start).count()
     }
 
-    /// Returns the Coulomb torque, N·m. In each direction, the line through the two slowest points is extended to
-    /// standstill. The Coulomb torque is the mean of the two torques at standstill.
+    /// Returns the Coulomb torque, N·m. For each direction, a line through the two slowest points gives the torque at
+    /// standstill. The Coulomb torque is the mean of these two torques.
     fn coulomb(&self) -> f64 {
         let (x, y) = (&self.velocity, &self.torque);
         let start = |near: usize, far: usize, sign: f64| {
             let slope = (y[far] - y[near]) / (x[far] - x[near]);
-            // The Coulomb torque is limited to the torque of the slowest point. If the curve decreases at low speed, the Coulomb
-            // torque is the torque of that point.
+            // The Coulomb torque is at most the torque of the slowest point. This limit has an effect if the curve
+            // decreases at low speed.
             (sign * (y[near] - slope * x[near])).clamp(0.0, (sign * y[near]).max(0.0))
         };
         let above = x.iter().position(|&v| v > 0.0).filter(|&i| i + 1 < x.len());

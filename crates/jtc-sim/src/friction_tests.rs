@@ -51,8 +51,8 @@ fn at_speed_both_models_are_the_measured_curve() {
         let smooth = with(FrictionModel::Smooth { width: 0.01 }, curve.clone());
         let lugre = with(FrictionModel::LuGre(LuGre::default()), curve);
         for v in [-0.9, -0.3, -0.15, 0.15, 0.4, 0.8] {
-            // At constant speed the bristles reach a constant deflection within milliseconds. Both models must then
-            // give nearly the same friction.
+            // At constant speed, the bristles reach a constant deflection within milliseconds. After that, both
+            // models must give nearly the same friction.
             let z = (0..200).fold([0.0; JOINTS], |z, _| lugre.bend(&z, &[v; JOINTS], 1e-3));
             let (a, b) = (smooth.at(&[v; JOINTS], &z)[0], lugre.at(&[v; JOINTS], &z)[0]);
             assert!((a - b).abs() < 0.02 * a.abs(), "{v} rad/s: smooth {a}, LuGre {b} N·m");
@@ -64,14 +64,14 @@ fn at_speed_both_models_are_the_measured_curve() {
 fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
     for curve in [polynomial(), table()] {
         let torques = with(FrictionModel::LuGre(LuGre::default()), curve);
-        // The torque rises to 1.2 times 6 N·m within one second, and is zero after that. The deflection is about 1e-4
-        // rad, and its elastic part returns to zero.
+        // The torque rises to 1.2 times the Coulomb torque (6 N·m) within one second, and is then zero. The rotor
+        // must deflect by about 1e-4 rad, and must spring back when the torque ends.
         let held = rotor(&torques, 1e-3, 2.0, |t, _| if t < 1.0 { t * 1.2 * 6.0 } else { 0.0 });
         let (loaded, released) = (held[999][0], held[1999][0]);
         assert!((0.8e-4..4e-4).contains(&loaded), "{loaded} rad");
         assert!(released < loaded - 0.8e-4 && held[1999][1].abs() < 1e-6, "{released} rad");
-        // The torque rises to three times 6 N·m in three seconds. The rotor must break away at the stiction torque,
-        // 1.4 times 6 N·m.
+        // The torque rises to three times the Coulomb torque (6 N·m) in three seconds. The rotor must break away at
+        // the stiction torque, which is 1.4 times the Coulomb torque.
         let away = rotor(&torques, 1e-3, 3.0, |t, _| t * 6.0);
         let left = away.iter().position(|x| x[0] > 1e-3).unwrap_or(0) as f64 * 1e-3;
         assert!((1.35..1.5).contains(&left), "it left at {left} of 6 N·m");
@@ -112,7 +112,8 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
         for speed in [1e-6, 1e-4, 1e-2, 1.0, 30.0] {
             let mut z = [0.0; JOINTS];
             for k in 0..500 {
-                // The rotor alternately moves forward for 100 steps and back for 100 steps.
+                // The rotor moves forward for 100 steps and back for 100 steps, alternately. The bristles must not
+                // deflect farther than their limit.
                 let v = if k / 100 % 2 == 0 { speed } else { -speed };
                 z = torques.bend(&z, &[v; JOINTS], dt);
                 assert!(z[0].abs() <= longest * (1.0 + 1e-9), "{} rad at {speed} rad/s, {dt} s", z[0]);

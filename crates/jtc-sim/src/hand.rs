@@ -52,8 +52,8 @@ pub(crate) struct Hand {
     led: Option<Led>,
 }
 
-/// State since Teaching began: the pose of the arm at that time, the duration of the motion to the first point (s), and
-/// the elapsed time (s).
+/// State of the hand since Teaching began: pose of the arm at the start of Teaching, duration of the motion to the
+/// first point (s), and elapsed time (s).
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,
@@ -66,8 +66,9 @@ impl Hand {
         Self { path, led: None }
     }
 
-    /// Returns the hand's torque in this millisecond, N·m, for an arm with the positions `q` and velocities `qd`. The
-    /// hand waits until Teaching begins. At the end of the path or of Teaching, the hand releases the arm (`None`).
+    /// Returns the hand's torque in this millisecond, N·m, for an arm with the positions `q` and velocities `qd`.
+    /// Before Teaching begins, the hand does nothing. When the path or Teaching ends, the hand releases the arm, and
+    /// the result is `None`.
     pub(crate) fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
             return if self.led.is_some() { None } else { Some([0.0; JOINTS]) };
@@ -118,7 +119,7 @@ mod tests {
     fn a_hand_waits_for_teaching_pulls_with_bounded_force_and_lets_go() {
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]; 11], 0.01).unwrap());
         assert_eq!(hand.torque(false, &[0.0; 6], &[0.0; 6]), Some([0.0; 6]));
-        // The arm does not move, so the torque of the hand must rise to its limit, but not further.
+        // The arm does not move, so the torque of the hand must rise to its limit and then stay constant.
         let mut strongest = 0.0f64;
         let mut ms = 0;
         while let Some(torque) = hand.torque(true, &[0.0; 6], &[0.0; 6]) {

@@ -125,8 +125,8 @@ impl Listener {
         }
         while self.bytes.len() >= STATUS_LEN {
             let Some(status) = Status::parse(&self.bytes[..STATUS_LEN]) else {
-                // The bytes may be an incomplete status after a reset of the controller. The host skips one byte and
-                // searches for the next status.
+                // After a reset of the controller, the bytes can begin with an incomplete status. The host skips one
+                // byte and searches for the next status.
                 self.bytes.remove(0);
                 continue;
             };

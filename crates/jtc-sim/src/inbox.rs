@@ -17,8 +17,8 @@ pub(crate) struct Inbox {
 }
 
 impl Inbox {
-    /// Creates a buffer. If `one_per_interrupt` is set, the second of two consecutive requests without a pause stays in
-    /// the buffer until another request arrives.
+    /// Creates a buffer. With `one_per_interrupt`, if two requests arrive without a pause, the second request stays
+    /// in the buffer until another request arrives.
     pub(crate) fn new(one_per_interrupt: bool) -> Self {
         Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }
     }

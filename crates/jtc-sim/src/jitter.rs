@@ -21,8 +21,8 @@ impl Jitter {
         Self { most_ms: 0, rng, now: 0, waiting: VecDeque::new() }
     }
 
-    /// Processes a tick. The frames in `received` with index `first` or higher have arrived in this millisecond.
-    /// `delay` replaces the new frames by the frames whose delay has ended.
+    /// Processes a tick. The frames in `received` from index `first` on have arrived in this millisecond. The
+    /// function removes these frames, and adds the frames whose delay has ended.
     pub fn delay(&mut self, received: &mut Vec<Frame>, first: usize) {
         self.now += 1;
         if self.most_ms == 0 && self.waiting.is_empty() {
@@ -42,7 +42,7 @@ impl Jitter {
 mod tests {
     use super::*;
 
-    /// All answers must arrive in order and within the maximum delay, and each possible delay must occur.
+    /// All answers must arrive in order and within the maximum delay. Each possible delay must occur.
     #[test]
     fn answers_are_late_but_none_is_lost_or_overtaken() {
         for most_ms in 0..=3u8 {

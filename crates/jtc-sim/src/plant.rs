@@ -263,7 +263,7 @@ impl Plant {
         &self.truth
     }
 
-    /// Returns the arm model after model errors were applied.
+    /// Returns the model of the true arm, which includes the model errors.
     pub fn true_model(&self) -> &ArmModel {
         &self.model
     }

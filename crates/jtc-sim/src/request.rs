@@ -1,5 +1,5 @@
-//! Requests, in the form in which nodes receive them. A request may contain any state byte, although the controller
-//! sends only four different state bytes.
+//! Requests, in the form in which nodes receive them. Unlike requests of the controller, which use only four state
+//! bytes, such a request can contain any state byte.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
 /// A request that has reached a node.

@@ -1,5 +1,5 @@
-//! Serial line to the host. Both directions of the line have the same baud rate, and the direction to the device can
-//! have faults.
+//! Serial line to the host. Both directions have the same baud rate. Faults are possible only in the direction to the
+//! device.
 use std::collections::VecDeque;
 
 /// Picoseconds per microsecond. With this resolution, the duration of a byte at any usual bit rate is accurate enough

@@ -34,8 +34,8 @@ pub struct World {
     /// Clock with which the board measures silence on its serial line, µs. `heard_us` is the time of the last byte.
     line_us: u64,
     heard_us: u64,
-    /// Upper limit of the silence that the board measures on the serial line, µs. With `None`, there is no limit, and
-    /// the board measures the silence in virtual time.
+    /// Upper limit of the silence that the board measures on the serial line, µs. With `None`, the board measures the
+    /// silence in virtual time, without a limit.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,

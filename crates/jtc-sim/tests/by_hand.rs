@@ -33,8 +33,8 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    // A push of 30 N·m for 200 ms is too small to make the joint yield (J-68), so the controller returns the joint to
-    // its position.
+    // A push of 30 N·m for 200 ms is too small to make the joint yield (J-68). The controller must return the joint
+    // to its position.
     operator.world.push(Joint::ALL[2], 30.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");

@@ -94,7 +94,7 @@ fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     assert!(most > 5.0 && (change - work).abs() < 2e-3 * most, "{change} J, {work} J put in");
 }
 
-/// In turn, each joint has an elastic gear and a blocked motor. The link of this joint must oscillate at
+/// The test blocks the motor of one joint with an elastic gear, for each joint in turn. The link must oscillate at
 /// √(K/J).
 #[test]
 fn a_link_swings_on_its_gear_at_its_natural_frequency() {
@@ -133,7 +133,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     }
 }
 
-/// With a blocked motor, a loaded link must move down by the torque divided by the stiffness.
+/// With a blocked motor, a loaded link must move down by the torque divided by the stiffness of the gear.
 #[test]
 fn a_loaded_link_rests_at_torque_over_stiffness() {
     let gear = Gear { stiffness: 20_000.0, damping: 200.0 };

@@ -35,8 +35,8 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
     let (mut asked, mut last) = (None, [0.0; 6]);
     for ms in 0..15_000 {
         if ms % 500 == 0 && operator.state() == ControllerState::Error {
-            // The test clears the errors repeatedly, because the drive of a joint that falls faster than 1.8 rad/s
-            // reports over-speed again.
+            // The test clears the errors repeatedly, because a drive reports over-speed again while its joint falls
+            // faster than 1.8 rad/s.
             operator.world.host_write(&host::clear_all());
         }
         operator.step();
@@ -55,8 +55,8 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
             let correction =
                 if joint.state == NodeState::ENABLED { joint.torque - joint.torque_model } else { 0.0 };
             let step = (correction - *last).abs();
-            // The torque may change by 12 N·m or more only at a joint that has an error, for example when the joint
-            // begins to yield. Its torque then decreases within 10 ms (J-68).
+            // The correction is the commanded torque minus the model torque. It may change by 12 N·m or more only at
+            // a joint with an error, for example when the joint begins to yield (J-68).
             assert!(step < 12.0 || joint.internal != 0, "{after_ms} + {ms} ms: torque step of {step} N·m");
             *last = correction;
         }

@@ -26,9 +26,9 @@ fn inject(operator: &mut Operator, kind: FaultKind, ms: Option<u64>) {
     operator.world.inject(Fault { kind, trigger: now, duration_ms: ms });
 }
 
-/// Only joint 1 moves, from 0 to 1 rad and back, with a wall at 0.5 rad. The largest torque of the wall is the sum of
-/// two torques: v·√(K·J) from the kinetic energy, and the torque of the drive. The wall never pulls, and its torque
-/// becomes 0 when the wall is removed.
+/// Only joint 1 moves, from 0 to 1 rad and back, with a wall at 0.5 rad. The largest torque of the wall must be the
+/// sum of v·√(K·J), from the kinetic energy, and the torque of the drive. The wall must never pull, and its torque
+/// must become 0 when the wall is removed.
 #[test]
 fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     let start = [0.0, -0.4, 0.9, 0.2, -0.3, 0.5];
@@ -69,8 +69,8 @@ fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     }
 }
 
-/// The arm picks up a load and drops it. The holding torque must change by the weight of the load, and then return to
-/// its earlier value.
+/// The arm picks up a load and drops it. The holding torque must change by the torque of the load's weight, and must
+/// then return to its earlier value.
 #[test]
 fn a_load_that_is_taken_up_is_held_and_dropped() {
     let mut operator = held(config());
@@ -91,7 +91,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     let load = jtc_dynamics::Payload { mass, com, ..jtc_dynamics::Payload::NONE };
     let (loaded, empty) = (of(load), of(jtc_dynamics::Payload::NONE));
     for j in 0..6 {
-        // Stiction carries a part of the weight, so the tolerance is 9 N·m.
+        // The tolerance is 9 N·m, because stiction carries a part of the weight.
         let weight = loaded[j] - empty[j];
         assert!(
             (with[j] - before[j] - weight).abs() < 9.0,
@@ -148,8 +148,8 @@ fn a_brake_that_stays_closed_holds_the_joint() {
     }
 }
 
-/// With gears of 20,000 N·m/rad, the controller enables, holds and moves the default arm. In this test the drives
-/// report the positions of the motors.
+/// With gears of 20,000 N·m/rad, the controller must enable, hold and move the default arm. In this test, the drives
+/// report the positions of the motors instead of the links.
 #[test]
 fn an_arm_with_gears_that_yield_is_held_and_moved() {
     let run = || {
@@ -189,9 +189,9 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// An elastic gear twists, so the joint encoder and the motor encoder measure different positions. For any motion and
-/// contact of the arm, the controller must not report this twist as an encoder jump or as a different speed scale. The
-/// test covers drives that measure the position at the motor and drives that measure it at the link.
+/// An elastic gear twists, so the joint encoder and the motor encoder measure different positions. The controller
+/// must not report this twist as an encoder jump or as a different speed scale, whatever the arm moves or touches.
+/// The test covers drives that measure the position at the motor, and drives that measure it at the link.
 #[test]
 fn j35_gears_that_yield_are_no_false_alarm() {
     for (trial, place) in

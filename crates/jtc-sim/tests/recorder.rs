@@ -26,8 +26,8 @@ fn blocks(world: &World) -> Vec<Block> {
 /// Replays the log, and compares each tick with the values that the controller computed in the session.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    // From the controller of the session, the replay uses only the settings and the trajectory points. All other data
-    // are in the snapshots of the log.
+    // The replay uses only the settings and the trajectory points of the session's controller. All other data are in
+    // the snapshots of the log.
     let then = world.controller();
     let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
     controller.put_points(0, then.points());
@@ -40,7 +40,7 @@ fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
             Outcome::Same => {
                 counts.same += 1;
                 let Some(seen) = seen.get(&tick) else { continue };
-                // `records_lost` is excluded, because the link sets this value.
+                // `records_lost` is not compared, because the host link sets this value.
                 let then = Telemetry { records_lost: 0, ..*seen };
                 assert_eq!(Telemetry { records_lost: 0, ..step.telemetry }, then, "tick {tick}");
             }
@@ -120,17 +120,19 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     assert!(undisturbed == read, "a torque differs");
 }
 
-/// The recorder keeps at least two seconds before an error and the time after the error, even with more traffic than
-/// the controller can execute. The ticks before the first complete snapshot in the log are lost. Their number varies,
-/// so the test reads the log every 10 ms during one snapshot interval.
+/// Even with more traffic than the controller can execute, the recorder must keep at least two seconds before an
+/// error, and the time after it.
+///
+/// The ticks before the first complete snapshot in the log are lost. Their number varies, so the test reads the log
+/// every 10 ms during one snapshot interval.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // In each tick, the host sends many short frames that are executed quickly, and a parameter frame, after
-        // which the recorder needs a new snapshot.
+        // In each tick, the host sends many short frames, which are executed quickly. It also sends a parameter
+        // frame, which makes the recorder store a new snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
         }
@@ -172,7 +174,8 @@ fn j56_the_first_tick_that_differs_is_named() {
     let differs = Replay::new(Log::new(&blocks), controller, hash)
         .find(|step| step.outcome == Outcome::Differs)
         .expect("a tick differs");
-    // A changed point has an effect from the previous point on. The torque on the bus differs at most 8 ticks later.
+    // A changed point already affects the motion from the previous point on. The torque on the bus must differ at
+    // most 8 ticks later.
     let acts = seen[&(10 * (POINT as u32 - 1))];
     let tick = differs.telemetry.tick;
     assert!((acts..=acts + 8).contains(&tick), "{tick}, where it acts from {acts} on");

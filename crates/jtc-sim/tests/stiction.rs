@@ -40,8 +40,8 @@ fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     range.map(|(low, high)| high - low)
 }
 
-/// At rest, no torque oscillates by more than 1.6 N·m. If the integral term continued to grow at rest, the torque of
-/// joints 1 to 3 would oscillate by 7 to 8 N·m in this test.
+/// At rest, no torque may oscillate by more than 1.6 N·m. If the integral term continued to grow at rest, the torque
+/// of joints 1 to 3 would oscillate by 7 to 8 N·m in this test.
 #[test]
 fn j41_no_hunting_in_stiction() {
     for seed in [1, 2, 3] {

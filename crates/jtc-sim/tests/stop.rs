@@ -45,8 +45,8 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
     assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");
-    // In the simulation without other bytes, the command is sent early enough that its last byte arrives in the same
-    // millisecond as in the other simulation.
+    // The simulation without other bytes sends the command so early that its last byte arrives in the same
+    // millisecond as in the simulation with other bytes.
     let frame = host::exec(command);
     let lead = baud.map_or(0, |rate| (70_000 / u64::from(rate)) + 1);
     let (mut quiet, quiet_ms) = play(baud, &vec![(ms - lead, frame.clone())], frame.len() as u64);
@@ -91,8 +91,8 @@ fn j04_a_stop_behind_hundreds_of_frames() {
 
 #[test]
 fn j04_a_stop_behind_four_thousand_frames() {
-    // At 115,200 bit/s, 4000 frames (24,000 bytes) take two seconds. At 15 Mbit/s, the buffer of the board cannot
-    // store 200,000 frames, so bytes are lost.
+    // At 115,200 bit/s, the 4000 frames (24,000 bytes) take two seconds. At 15 Mbit/s, 200,000 frames do not fit into
+    // the buffer of the board, so bytes must be lost.
     for (baud, frames) in [(115_200, 4000), (15_000_000, 4000), (15_000_000, 200_000)] {
         let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
         let end = bytes.len() as u64;
@@ -186,8 +186,8 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
 }
 
-/// An existing proxy sends new waypoints while the arm moves. The proxy repeats only the frames with the waypoints
-/// until the controller accepts these frames.
+/// An existing proxy sends new waypoints while the arm moves. The proxy sends only these frames again and again until
+/// the controller accepts them. The arm must stop, and the controller must then accept the frames.
 #[test]
 fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     for baud in [Some(115_200), None] {
@@ -214,8 +214,9 @@ fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     }
 }
 
-/// A user of an existing proxy requests a motion beyond a limit. The proxy would repeat a rejected segment forever, and
-/// would not forward any other command.
+/// A user of an existing proxy requests a motion beyond a limit. The proxy would repeat a rejected segment forever,
+/// and would not forward any other command. The controller must therefore accept the segments and reject only the
+/// Execute.
 #[test]
 fn j36_an_existing_host_outlives_a_trajectory_that_breaks_a_limit() {
     for baud in [Some(115_200), None] {

@@ -35,8 +35,8 @@ fn j33_a_loaded_arm_stands_within_its_time() {
     }
 }
 
-/// The arm lowers a payload of 3.3 kg that the arm model contains. On the path, the arm passes the position in which it
-/// needs 95 % of the torque limit.
+/// The arm lowers a payload of 3.3 kg that the arm model contains. The controller must stop the arm in time where the
+/// holding torque is 95 % of the torque limit.
 #[test]
 fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     let model = with_payload(3.3);
@@ -55,22 +55,21 @@ fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     }
 }
 
-/// If the torque margin is not sufficient, the controller brakes with the full torque limit. If a joint still moves after the
-/// time for stopping, the joint lowers its load at a decreasing speed.
+/// If the torque margin is not sufficient, the controller brakes with the full torque limit. A joint that still moves
+/// after the time for stopping must continue downwards at a decreasing speed.
 #[test]
 fn j33_the_full_limit_brakes_where_the_time_cannot_be_kept() {
     for (share, speed) in [(0.97, 0.4), (0.99, 0.2), (0.99, 0.4), (1.02, 0.2), (1.02, 0.4)] {
         let outcome = Lowering::at_share(share, speed).run().expect("it is lowered");
         println!("{share} {speed}: {outcome:?}");
-        // The commanded positions follow the motion that the arm can achieve. The speed may increase, to at most 0.6
-        // rad/s, only if the holding torque is 99 % of the limit or more.
+        // The commanded positions must follow the motion that the arm can achieve. The speed may increase by more
+        // than 3 %, up to 0.6 rad/s, only if the holding torque is 99 % of the limit or more.
         let peak = if share < 0.99 { 1.03 * speed } else { 0.6 };
         assert!(outcome.error < 5e-3 && outcome.peak <= peak, "{outcome:?}");
-        // Friction brakes the arm in addition to the torque of the drives. The speed therefore decreases and the
-        // distance is short.
+        // Friction also brakes the arm. The distance until standstill must therefore be short.
         assert!(outcome.way <= if share < 0.99 { 0.7 * speed } else { 1.0 }, "{outcome:?}");
-        // The trajectory state leaves Execute at most one second after the command, and the controller then holds the
-        // arm (HoldPos).
+        // At most one second after the command, the trajectory state must leave Execute, and the controller must hold
+        // the arm (HoldPos).
         assert!(outcome.commanded_ms <= 1_002 && outcome.state == ControllerState::HoldPos, "{outcome:?}");
         assert!(outcome.standing_ms <= if share < 0.99 { 1_100 } else { 6_000 }, "{outcome:?}");
     }

@@ -49,7 +49,8 @@ fn j33_pause_and_resume_stay_on_the_path() {
 fn j34_execute_away_from_the_start_is_refused_and_nothing_moves() {
     let mut operator = held();
     operator.upload(&host::there_and_back(&TO, &FROM, 3.0, 1, 10), 10).unwrap();
-    // Existing hosts do not know data statuses above 6, so the controller answers with IncorrectValue (J-51).
+    // The controller must answer with IncorrectValue, because existing hosts do not know data statuses above 6
+    // (J-51).
     let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
     assert_eq!(response.data, DataStatus::IncorrectValue);
     operator.ask(&jtc_wire::fixed::GET_INFO).unwrap();
@@ -114,7 +115,7 @@ fn j25_taught_by_hand_the_arm_floats() {
     operator.run(1000);
     let t = operator.world.telemetry();
     assert_eq!((t.state, t.errors), (ControllerState::Teaching, 0));
-    // Wrong masses in the model make the arm drift slowly, but it must not fall.
+    // The model has wrong masses, so the arm drifts slowly, but it must not fall.
     let moved = operator.world.truth().q.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(moved < 0.2, "{moved}");
     operator.ask(&host::frame(FrameType::TeachingModeDisable, &[])).unwrap();
@@ -161,7 +162,7 @@ fn others_on_the_bus_see_every_frame_and_take_part() {
         }
     }
     assert_eq!(ids.into_iter().collect::<Vec<_>>(), [0x000, 0x200, 0x201, 0x202, 0x203, 0x204, 0x205, 0x206]);
-    // Another node on the bus sends a reset. The drive reboots, and the controller must detect the reboot.
+    // Another node on the bus sends a reset, so the drive reboots. The controller must detect the reboot.
     let reset = can_link::CanFrame::fd(can_link::Id::standard(0x1A2).unwrap(), &[]).unwrap();
     can_link::CanBus::send(&mut other, &reset).unwrap();
     for _ in 0..20 {
@@ -210,8 +211,8 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     operator.bring_up().unwrap();
     operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
     operator.execute(10_000).unwrap();
-    // Another node sends a broadcast directly after a broadcast of the controller. An older drive then processes all
-    // later requests one request late.
+    // Another node sends a broadcast directly after a broadcast of the controller. From then on, an older drive
+    // answers each request only when the next request arrives.
     let ask = jtc_bus::Request::ChangeFsm { target: [jtc_bus::Target::NoChange; 7] }.emit();
     operator.world.put_bus_frame(ask);
     operator.run(20);
@@ -235,7 +236,8 @@ fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
     }
 }
 
-/// The board skips every second tick, as if each tick needed too much time.
+/// The board skips every second tick, as if each tick needed too much time. The controller must report an internal
+/// error.
 #[test]
 fn j12_ticks_that_go_on_missing_are_an_internal_error() {
     for missing in [9, 10] {

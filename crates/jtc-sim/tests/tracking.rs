@@ -72,8 +72,8 @@ fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
     }
 }
 
-/// Returns the RMS of commanded minus true position, rad. The true position is the position at the time at which the
-/// torque of a tick has an effect.
+/// Returns the RMS of commanded minus true position, rad. The true position is taken at the time at which the torque
+/// of the tick takes effect.
 fn true_error(config: SimConfig) -> [f64; 6] {
     let mut operator = Operator::new(SimConfig { start: FROM, baud: None, ..config });
     operator.bring_up().unwrap();
@@ -95,8 +95,8 @@ fn true_error(config: SimConfig) -> [f64; 6] {
     }
 }
 
-/// The measurements of the simulated drives are two ticks old. With a wrong setting of the delay, the arm deviates
-/// from its path by the distance that it moves during the time error.
+/// The measurements of the simulated drives are two ticks old. With any other setting of the delay, the arm must
+/// follow its path less accurately, by the distance that it moves during the time error.
 #[test]
 fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     let error = |delay_ticks: u8| {
@@ -115,8 +115,7 @@ fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     }
 }
 
-/// If drives deliver less torque, a torque gain must restore the usual tracking accuracy. Without this gain, the
-/// tracking must be worse.
+/// If drives deliver less torque, the tracking must be worse. A torque gain must restore the usual tracking accuracy.
 #[test]
 fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     let error = |delivers: f64, gain: f64| {
@@ -134,7 +133,7 @@ fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     assert!(worst(&without) > 1.5 * worst(&ideal), "{without:?} {ideal:?}");
 }
 
-/// For each setting of the delay, the tracking with late answers must be nearly as accurate as with answers in time.
+/// For each setting of the delay, the tracking with late answers must be nearly as accurate as without late answers.
 #[test]
 fn j63_late_answers_are_as_good_as_those_in_time() {
     let error = |seed: u64, answer_jitter_ms: u8, delay_ticks: u8| {

@@ -1,4 +1,4 @@
-//! A simulated arm that is pushed violently must stay in its range of positions. Only its end stops may yield
+//! A simulated arm that is pushed violently must stay in its range of positions. Its end stops are allowed to yield
 //! slightly.
 use jtc_core::{Friction, Parameters};
 use jtc_sim::{Arm, FrictionModel, SimArm, SimFriction};
@@ -26,8 +26,8 @@ fn in_range(arm: &Arm, what: &str) {
     }
 }
 
-/// Moves the arm violently: pushes all joints at once with up to 400 N·m, and closes and opens brakes during the
-/// motion. The friction is the friction at low temperature, or is multiplied.
+/// Moves the arm violently: pushes several joints at once with up to 400 N·m, and closes and opens brakes during the
+/// motion. The friction is that of cold bearings, or is multiplied by a factor.
 fn throw_about(parts: &SimArm, seed: u64, what: &str) {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut arm = Arm::new(parts.clone(), [1.2; 6], [0.0; 6]);

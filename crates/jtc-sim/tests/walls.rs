@@ -68,7 +68,8 @@ fn flange(arm: &SimArm, q: &[f64; JOINTS]) -> [f64; 3] {
 
 const POSE: [f64; JOINTS] = [0.3, 0.4, -0.7, 0.4, 0.6, -0.2];
 
-/// The torque divided by the depth must be the stiffness, independent of the integration of the motion.
+/// The depth of the joint in the wall must be the torque divided by the stiffness. This value does not depend on the
+/// integration of the motion.
 #[test]
 fn a_pushed_joint_rests_in_its_wall_at_torque_over_stiffness() {
     for (name, parts) in arms() {

@@ -4,8 +4,7 @@ use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 
 use super::{Arm, SimArm};
 
-/// Distance below which the arm may touch a wall, m or rad. The simulation includes such a wall when it chooses the
-/// number of sub-steps.
+/// Distance to a wall below which the simulation includes the wall when it chooses the number of sub-steps, m or rad.
 const NEAR: f64 = 0.01;
 
 /// Side of an angle on which the wall is.
@@ -60,8 +59,8 @@ enum Surface {
         normal: [f64; 3],
         /// Position of the surface along the normal, m.
         offset: f64,
-        /// Dynamics with a gravity of 1 m/s² into the wall. The simulation uses these dynamics to compute the joint
-        /// torques of a force along the normal at the flange.
+        /// Dynamics with a gravity of 1 m/s² into the wall. With these dynamics, the simulation computes the joint
+        /// torques of a force on the flange along the normal.
         pulled: Box<Dynamics>,
     },
     Joint {
@@ -72,14 +71,15 @@ enum Surface {
     },
 }
 
-/// A wall with its state. The arm may touch this wall or be away from it.
+/// A wall with its state.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     wall: Wall,
     surface: Surface,
     stiffness: f64,
     damping: f64,
-    /// Distance between the configured surface and the current surface, measured inwards, m or rad.
+    /// Distance by which the current surface is inside the configured surface, m or rad. It is above 0 while a wall
+    /// that was created inside the arm has not reached its configured position.
     recess: f64,
 }
 
@@ -138,7 +138,7 @@ impl Contact {
         Touch { depth: depth - self.recess, torques }
     }
 
-    /// Adds the joint torques (N·m) that the force of the wall causes to `sum`. `damped` is the share of the damping
+    /// Adds to `sum` the joint torques (N·m) that the force of the wall causes. `damped` is the share of the damping
     /// that is applied.
     pub(super) fn push(
         &self,
@@ -157,9 +157,9 @@ impl Contact {
         }
     }
 
-    /// Returns two contributions of the wall: to the squared highest natural frequency (1/s²) and to the fastest
-    /// decay (1/s). The contributions are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the
-    /// joint accelerations caused by torques.
+    /// Returns the contribution of the wall to the squared highest natural frequency of the arm (1/s²), and to its
+    /// fastest decay rate (1/s). Both are 0 if the arm cannot touch the wall within `dt`. `mobility` returns the
+    /// joint accelerations that joint torques cause.
     pub(super) fn rates(
         &self,
         dynamics: &Dynamics,
@@ -186,7 +186,7 @@ impl Contact {
 }
 
 impl Arm {
-    /// Adds the joint torques (N·m) that the forces of all walls cause at `q` and `qd` to `sum`.
+    /// Adds to `sum` the joint torques (N·m) that the forces of all walls cause at `q` and `qd`.
     pub(super) fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
         for contact in &self.contacts {
             contact.push(&self.dynamics, q, qd, damped, sum);

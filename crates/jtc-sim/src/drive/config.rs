@@ -33,11 +33,12 @@ pub struct DriveConfig {
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
-    /// Torque at the joint divided by the requested torque. The drive reports the requested torque as the actual
-    /// torque. For real drives, this quotient is about 1/1.3.
+    /// Ratio of the torque at the joint to the requested torque, about 1/1.3 for real drives. The drive does not know
+    /// this ratio, and reports the requested torque as the actual torque.
     pub delivers: f64,
     /// `true` if the drive processes only one message per interrupt. After two requests without a pause between them,
-    /// such a drive processes each later message one message late.
+    /// one request stays in the receive buffer. From then on, the drive processes each request only when the next
+    /// request arrives.
     pub one_message_per_interrupt: bool,
     /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise
     /// the drive answers with its previous state.

@@ -10,7 +10,7 @@ const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
 /// Number of encoder differences (each over 1 ms) that the drive averages to compute the speed.
 const SPEED_WINDOW: usize = 10;
 
-/// Both encoders of a drive.
+/// Absolute encoder and motor encoder of a drive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Encoders {
     /// Ring buffer with the motor encoder values of the last ticks, counts.

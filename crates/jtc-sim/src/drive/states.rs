@@ -4,8 +4,7 @@ use jtc_bus::NodeState;
 
 use super::DriveConfig;
 
-/// Codes of transitions, which differ between generations of drives. The constants are the codes of the simulated
-/// generation of drives.
+/// Codes of the transitions in the simulated generation of drives. Other generations use other codes.
 const READY_TO_INIT: NodeState = NodeState::new(14);
 const REACTION_TO_FAULT: NodeState = NodeState::new(15);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
@@ -20,7 +19,7 @@ pub(super) struct States {
     pending: NodeState,
     /// `true` if the motor was aligned since the last reset.
     aligned: bool,
-    /// Number of ticks until the motor control may start.
+    /// Remaining ticks of the pause in which the motor control must not start.
     rest: u32,
 }
 
@@ -87,8 +86,8 @@ impl States {
         self.age = 0;
     }
 
-    /// Continues a transition. The end of the transition clears the pending request. Returns `true` if the errors
-    /// are acknowledged.
+    /// Continues a transition. At the end of a transition, clears the pending request. Returns `true` if the drive
+    /// has acknowledged its errors.
     pub(super) fn proceed(&mut self, config: &DriveConfig) -> bool {
         self.rest = self.rest.saturating_sub(1);
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };

@@ -55,10 +55,11 @@ impl World {
         }
     }
 
-    /// Limits the silence that the board measures between bytes of the host to `us` µs. `us` is the real time for
-    /// which the host was silent. Virtual time may pass faster, and would cause a gap (J-03) in a frame that another
-    /// program sends in pieces. Bytes that wait on the line still cause gaps. With `None`, the default, the board
-    /// measures the silence in virtual time.
+    /// Limits the silence that the board measures between bytes of the host to `us` µs, the real time for which the
+    /// host was silent. With `None`, the default, the board measures the silence in virtual time.
+    ///
+    /// Virtual time can pass faster than real time. A frame that another program sends in pieces would then contain a
+    /// gap (J-03). Bytes that wait on the line still cause gaps.
     pub fn limit_host_silence(&mut self, us: Option<u64>) {
         self.silence_us = us;
     }
@@ -106,7 +107,7 @@ impl World {
         self.plant.truth()
     }
 
-    /// Returns the arm model after model errors were applied.
+    /// Returns the model of the true arm, which includes the model errors.
     pub fn true_model(&self) -> &ArmModel {
         self.plant.true_model()
     }
@@ -158,7 +159,7 @@ impl World {
         self.node_states
     }
 
-    /// Returns the host frames that the last tick executed.
+    /// Returns the host frames that the last tick processed, including invalid frames.
     pub fn worked(&self) -> &[Worked] {
         &self.board.worked
     }

@@ -1,5 +1,5 @@
-//! Inputs and outputs of the controller's board in one millisecond. Programs that run another board or another
-//! controller in parallel use these data.
+//! Inputs and outputs of the controller's board in one millisecond, for programs that run another board or another
+//! controller in parallel.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 

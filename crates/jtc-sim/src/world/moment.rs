@@ -18,7 +18,7 @@ pub struct Moment<'a> {
     pub truth: &'a Truth,
     /// Frame that the controller sent on the joint bus.
     pub sent: Option<&'a Frame>,
-    /// Host frames that the controller executed.
+    /// Host frames that the controller processed, including invalid frames.
     pub worked: &'a [Worked],
     /// Level of the controller's safety output.
     pub safety_output: bool,

@@ -43,7 +43,7 @@ pub(crate) fn of_arm(arm: Option<&HostArm>) -> Result<(Config, Option<Vec<u8>>),
 pub(crate) struct Controller {
     board: Board,
     now_us: u64,
-    /// Level of the safety output pin. The level does not change in a missing tick.
+    /// Level of the safety output pin. The level does not change in a missed tick.
     safety_output: bool,
 }
 

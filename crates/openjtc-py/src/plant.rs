@@ -17,7 +17,7 @@ const BOOT_MS: u32 = 12;
 /// Maximum time until the drives are enabled, ms.
 const BRING_UP_MS: u64 = 2_000;
 
-/// Arm with drives, or arm without drives.
+/// Simulated arm, with or without drives.
 #[pyclass(module = "openjtc._native")]
 pub(crate) struct Plant {
     config: SimConfig,

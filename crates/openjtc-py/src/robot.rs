@@ -172,7 +172,7 @@ impl Link {
     /// Returns the number of Stops that were requested so far. A later Stop discards all requests that were made
     /// before it.
     fn asked(&self) -> u64 {
-        // In a forked process the number does not matter, because each request is refused.
+        // A forked process refuses every request, so the number of Stops does not matter there.
         self.worker.now().unwrap_or_default()
     }
 

@@ -161,7 +161,8 @@ fn status_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// Reads a request of the controller to the nodes from a frame. Returns the kind and the numbers of the request.
+/// Decodes a frame that contains a request of the controller to the nodes. Returns the kind and the numbers of the
+/// request.
 #[pyfunction]
 fn bus_request<'py>(
     py: Python<'py>,

@@ -31,8 +31,8 @@ impl WorkerState {
     /// Teaching, even if another program has enabled it, because the caller expects that the controller holds the arm.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
-        // The Stop is sent before any query. The Stop may reach the controller even if the line delivers no bytes to this
-        // program.
+        // The Stop is sent before any query. It can therefore reach the controller even if this program receives no
+        // bytes.
         let stopped = match self.session.stop() {
             // The controller refuses a Stop if no motion is in progress.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),
@@ -116,8 +116,8 @@ impl WorkerState {
                 rested?;
                 return Err(stopped("jogging ended early"));
             }
-            // If the controller refused the jog because of a held stop, the error of `jog_to_rest`, which reports the
-            // held stop, is returned below.
+            // The controller refused the jog because of a held stop. `jog_to_rest` reports the same held stop, and
+            // its error is returned below.
             Err(_) if matches!(rested, Err(Error::State(StateError::HeldStop { .. }))) => {}
             jogged => jogged?,
         }

@@ -34,15 +34,15 @@ pub(crate) struct Order {
     pub name: String,
     /// `true` to move the arm to the first point if the arm is at another position.
     pub approach: bool,
-    /// Speed, in % of the speed of the trajectory itself, or in % of the limits for a move or an approach. `None` selects the speed
-    /// of the trajectory itself, or the default speed of a move or an approach.
+    /// Speed in % of the speed of the trajectory. For a move or an approach, speed in % of the limits. `None` selects
+    /// the original speed of the trajectory, or the default speed of a move or an approach.
     pub speed: Option<f64>,
     /// Number of times that the trajectory is executed.
     pub repeat: u32,
     /// `true` if the caller confirms that the limits, gravity and rotor inertia in the controller are safe for the
-    /// arm. These values may then differ from the values of the arm.
+    /// arm, although they can differ from the values of the arm.
     pub accept_device_limits: bool,
-    /// Path of a recording. The second field is `true` if an existing recording may be overwritten.
+    /// Path of a recording. The second field is `true` if an existing recording is to be overwritten.
     pub record: Option<(PathBuf, bool)>,
     /// Progress of the run, which other threads can read.
     pub progress: Arc<Mutex<Progress>>,
@@ -237,7 +237,8 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         let (simulated, tape) = (session.port().is_simulated(), Rc::clone(&self.tape));
         Ok(Box::new(move |sample| {
-            // A simulator records one sample each millisecond itself, so this sample is not needed.
+            // A simulator itself records a sample in each millisecond, so only samples of a real controller are
+            // recorded here.
             if !simulated {
                 tape.push(sample);
             }
@@ -263,7 +264,7 @@ impl Observer<AnyPort> for Follower<'_> {
         }
         if let Some(waits) = self.waits.take() {
             let came = result.as_ref().copied().map_err(Failure::of);
-            // An error is ignored, because the waiting thread may have stopped waiting for the result.
+            // An error is ignored, because the waiting thread has perhaps stopped waiting for the result.
             let _ = waits.send(came);
         }
     }
@@ -271,8 +272,8 @@ impl Observer<AnyPort> for Follower<'_> {
     fn ended(&mut self, session: &mut Session<AnyPort>, leg: &Leg) -> Result<(), Failure> {
         observe(session, &self.shared);
         self.tape.pause();
-        // A request that arrived with the last status has no effect. When `waits` is dropped, the waiting thread is
-        // informed that the motion has ended.
+        // A request that arrived with the last status is too late and has no effect. The waiting thread detects the
+        // end of the motion when `waits` is dropped.
         self.waits = None;
         if let Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) = leg.outcome {
             // A Stop prevented the start of the motion.
@@ -286,8 +287,8 @@ impl Observer<AnyPort> for Follower<'_> {
             Ok(Outcome::Stopped(_)) => {
                 self.ran.outcome = "stopped";
                 if !self.asked.is_halted() {
-                    // Another program has stopped the arm. Waiting requests of this program are older than that Stop, so the run also
-                    // discards these requests.
+                    // Another program has stopped the arm. Waiting requests of this program were made before that
+                    // Stop, so they are discarded.
                     self.shared.halt();
                 }
             }
@@ -310,8 +311,8 @@ impl Follower<'_> {
     }
 }
 
-/// Returns `true` if the arm may still move after this error. The arm is then on its path, or it is paused and another program may
-/// resume the motion.
+/// Returns `true` if the arm possibly still moves after this error. The arm is then on its path, or it is paused and
+/// another program can resume the motion.
 fn may_move(session: &Session<AnyPort>, error: &Error) -> bool {
     let goes_on = [TrajectoryState::Execute, TrajectoryState::Pause];
     matches!(error, Error::Motion(MotionError::LinkLost { .. }))

@@ -15,7 +15,8 @@ use crate::number;
 use crate::run::Samples;
 use crate::threads::lock;
 
-/// Interval and maximum number of checks for a result that another thread has received but not stored yet.
+/// Interval between two checks for a result that another thread has received but not stored yet. The next constant is
+/// the maximum number of checks.
 const LOOK: Duration = Duration::from_millis(2);
 const LOOKS: u32 = 50;
 
@@ -41,8 +42,8 @@ impl Motion {
         *lock(&progress) = Progress { phase: "waiting", ..Progress::default() };
         let pending = Pending::begin(&worker.shared);
         let of_run = Arc::clone(&progress);
-        // The guard moves into the job and is dropped with it. A job that never begins therefore does not count as
-        // pending.
+        // The guard `pending` belongs to the job. If the job never begins, the guard is dropped with the job, and the
+        // run no longer counts as pending.
         let came = worker.ask(asked, move |state, asked| {
             let _pending = pending;
             let ran = state.run(&order, asked);
@@ -102,7 +103,7 @@ impl Motion {
         }
     }
 
-    /// Returns the phase, the completed part of the phase, and the total.
+    /// Returns the phase, and the completed and the total amount of the phase.
     fn progress(&self) -> (&'static str, f64, f64) {
         let progress = *lock(&self.progress);
         (progress.phase, progress.done, progress.total)

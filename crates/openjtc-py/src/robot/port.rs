@@ -1,9 +1,9 @@
 //! Line to the controller with a filter. The filter sends no frame that was requested before a Stop, and sends the
 //! Stop itself at once.
 //!
-//! This module writes the frames of all jobs, and every wait for the controller reads through this module. Only the
-//! module `port` therefore decides whether a frame may still move the arm. The module writes a Stop as soon as a
-//! caller requests the Stop, even in the middle of a job.
+//! All jobs write their frames through this module, and every wait for the controller reads through it. The decision
+//! whether a frame is still allowed to move the arm is therefore made only here. The module writes a Stop as soon as
+//! a caller requests the Stop, even in the middle of a job.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,7 +22,8 @@ const LOOK: Duration = Duration::from_millis(10);
 const PIECE: Duration = Duration::from_millis(50);
 /// Maximum time until the response record of a Stop arrives. Only a status that is already being sent can delay the response record.
 const RECORD: Duration = Duration::from_millis(200);
-/// Minimum time and minimum number of statuses after the start of a motion until the statuses show this motion.
+/// Minimum time, and minimum number of received statuses, after the start of a motion. When both are reached, the
+/// statuses show this motion.
 const BEGUN: (Duration, u64) = (Duration::from_millis(300), 3);
 
 /// Line without the filter.
@@ -59,7 +60,8 @@ pub(crate) struct AnyPort {
     done: (u64, u64),
     /// Number of Stops and Pauses of other programs that were already handled.
     foreign: Halts,
-    /// Number of missing bytes of the frame that is being written, and the time of the last written piece.
+    /// Time of the last written frame that moves the arm, and number of statuses that were received before this
+    /// frame.
     rest: (usize, Duration),
     /// Time of the last written Stop.
     stopped: Option<Duration>,
@@ -87,7 +89,7 @@ impl AnyPort {
         matches!(self.line, Line::Simulated(_))
     }
 
-    /// Begins a request that was made after `at` Stops.
+    /// Begins a request. `at` is the number of Stops that had been requested when the request was made.
     pub(crate) fn begin(&mut self, at: u64) {
         self.at = at;
     }
@@ -97,8 +99,8 @@ impl AnyPort {
         self.done = self.shared.stops();
     }
 
-    /// Returns the remaining time in which the record of the last Stop may still arrive. The session must not mistake this record for
-    /// the answer to a later frame.
+    /// Returns the remaining time in which the record of the last Stop can still arrive. The session must not mistake
+    /// this record for the answer to a later frame.
     pub(crate) fn unsettled(&self) -> Option<Duration> {
         let left = (self.stopped? + RECORD).saturating_sub(self.now());
         (!left.is_zero()).then_some(left)
@@ -125,9 +127,9 @@ impl AnyPort {
         }
     }
 
-    /// Handles a frame that the line withheld because of another program's Stop or Pause. Waiting requests are older than that Stop or
-    /// Pause, so they are cancelled. If the line withholds an Execute while a motion remains paused, the waiting requests are not
-    /// cancelled.
+    /// Handles a frame that the line did not send because of another program's Stop or Pause. The waiting requests
+    /// were made before that Stop or Pause, so they are cancelled. They are kept only if the frame is an Execute and
+    /// the motion stays paused.
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();
         let stays_paused = moved && frame == fixed::EXECUTE;
@@ -136,8 +138,8 @@ impl AnyPort {
         }
     }
 
-    /// Writes a Stop frame if a new Stop must stop every motion. For a Stop that concerns only this connection,
-    /// writes the frame only while this connection moves the arm.
+    /// Writes a Stop frame if a new Stop was requested. A Stop that concerns only this connection is written only
+    /// while this connection moves the arm.
     fn act(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         let now = self.shared.stops();
@@ -254,8 +256,8 @@ impl Port for AnyPort {
         each_line!(mut port, self => port.take_denial())
     }
 
-    /// Requests permission to move the arm. The permission is refused if a Stop was requested after the request was
-    /// made, even if the job began after the Stop.
+    /// Requests permission from the line to move the arm. Returns an error if a Stop was requested after the current
+    /// request was made, even if the job began after the Stop.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         self.take_foreign_halts();
         if self.shared.queue.stops() != self.at {

@@ -25,7 +25,7 @@ use crate::run::Samples;
 use crate::trajectory::Trajectory;
 use crate::{array, json};
 
-/// Time for which the doctor observes the controller.
+/// Time for which the diagnosis (`jtc doctor`) observes the controller.
 const LOOK: Duration = Duration::from_millis(1500);
 
 /// Returns the measured joint positions (rad). Returns an error if a joint has no measurement.

@@ -166,7 +166,8 @@ impl Asked {
         Self::after(shared, shared.queue.stops())
     }
 
-    /// Creates the value for a request that was made after `at` Stops.
+    /// Creates the value for a request. `at` is the number of Stops that had been requested when the request was
+    /// made.
     pub(crate) fn after(shared: &Arc<Shared>, at: u64) -> Self {
         Self { shared: Arc::clone(shared), at }
     }

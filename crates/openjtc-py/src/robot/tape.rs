@@ -22,8 +22,8 @@ impl Tape {
         *self.sink.borrow_mut() = sink;
     }
 
-    /// Records a sample. The function shifts the time of the sample, so that the recording begins at time 0. The samples of
-    /// a second motion continue 1 ms after the last sample.
+    /// Records a sample. Shifts the time of the sample, so that the recording begins at time 0, and a second motion
+    /// continues 1 ms after the last sample.
     pub(crate) fn push(&self, sample: &Sample) {
         if !self.on.get() {
             return;

@@ -79,8 +79,9 @@ impl Worker {
         Ok(worker)
     }
 
-    /// Puts a request that was made after `at` Stops into the queue, and returns the channel for the result. If a later Stop is requested
-    /// before this request begins, the request is refused.
+    /// Puts a request into the queue, and returns the channel for the result. `at` is the number of Stops that had
+    /// been requested when the request was made. If a later Stop is requested before this request begins, the request
+    /// is refused.
     pub(super) fn ask<T: Send + 'static>(
         &self,
         at: u64,
@@ -89,7 +90,7 @@ impl Worker {
         let asked = Asked::after(&self.shared, at);
         self.put(at, move |state| {
             state.begin(&asked)?;
-            // A Stop may have been requested while `begin` waited.
+            // A Stop was possibly requested while `begin` waited.
             if asked.is_halted() {
                 return Err(jtc_host::Error::Cancelled.into());
             }
@@ -132,8 +133,8 @@ impl Worker {
         }
     }
 
-    /// Checks that the thread belongs to this process. After a fork, the thread belongs to the parent process, and locks in the child
-    /// process may never be released.
+    /// Checks that the thread belongs to this process. After a fork, the thread belongs to the parent process, and
+    /// locks in the child process are perhaps never released.
     fn is_here(&self) -> Result<(), Failure> {
         if self.is_foreign() {
             return Err(closed()
@@ -319,7 +320,7 @@ fn act<T: Send + 'static>(
             state.shared.queue.done();
             result
         });
-        // An error is ignored, because the caller may have stopped waiting for the result.
+        // An error is ignored, because the caller has perhaps stopped waiting for the result.
         let _ = done.send(result);
     };
     (Box::new(act), came)

@@ -71,7 +71,7 @@ pub(crate) struct WorkerState {
     pub tape: Rc<Tape>,
     /// `true` if time passes between calls, as on a real controller.
     time_passes: bool,
-    /// `true` if this connection has enabled Teaching, or may have enabled it.
+    /// `true` if this connection has enabled Teaching, or has possibly enabled it.
     pub teaching: bool,
 }
 

@@ -8,7 +8,7 @@ use ucom_host::master::io::{Kind, ParValue, short};
 use ucom_host::master::{BoardSeen, Master, state_name};
 use ucom_host::session::{Known, name_of};
 
-/// Converts a board and its answer to PC_INFO.
+/// Converts the number of a board and its answer to the request PC_INFO.
 pub(super) fn info(number: u8, info: &BoardInfo, profile: &Profile, inventory: Option<&Inventory>) -> Value {
     let application = info.has_application();
     let status: Vec<&str> =

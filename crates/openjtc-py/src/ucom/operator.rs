@@ -66,7 +66,7 @@ impl Operator for Hand {
                 }
                 return;
             }
-            // For running boards, another event already reports the reboot.
+            // Another event already reports reboots of running boards.
             Event::Supervision { change: Supervision::UnknownRebooted { .. }, .. } => ("rebooted", None),
             Event::Supervision { .. } => return,
             Event::BoardError { board, .. } => ("error", Some(*board)),
@@ -95,8 +95,8 @@ impl Operator for Hand {
         let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
         let mut halts = self.shared.halts();
         if self.shared.has_ended() && !local.end_sent {
-            // The running request must undo its changes, possibly on boards that do not answer. The Stop is sent
-            // before that, so that no board continues to run meanwhile.
+            // The session ends, but the running request must first undo its changes, possibly on boards that do not
+            // answer. The Stop is sent before that, so that no board runs in the meantime.
             local.end_sent = true;
             halts.push(Halt::Started);
         }

@@ -71,7 +71,8 @@ impl Owner {
         self.call_after(py, after, act)
     }
 
-    /// Like [`Self::call`], for a request that was made after the Stop with the number `after`: see [`Self::now`].
+    /// Like [`Self::call`], for a request that was made when `after` was the number of the last Stop (see
+    /// [`Self::now`]).
     pub(super) fn call_after<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -84,7 +85,7 @@ impl Owner {
     /// Returns the number of the last Stop. A method that reads files before its request must call this function first. A Stop while
     /// the method reads the files is then detected.
     pub(super) fn now(&self) -> Result<u64, Failure> {
-        // In a forked process, the lock of the queue may never be released.
+        // In a forked process, the lock of the queue is perhaps never released, so the process is checked first.
         self.is_here()?;
         Ok(self.shared.queue.stops())
     }
@@ -110,7 +111,7 @@ impl Owner {
                 }),
                 Received::Nothing => Ok(()),
             };
-            // The loop also checks signals here, because reports may arrive without a pause.
+            // Signals are also checked here, because reports can arrive without a pause.
             let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
                 self.shared.queue.cancel(|request| *request == id);
@@ -223,7 +224,8 @@ impl Owner {
         })
     }
 
-    /// Stops all boards that this session has started, and releases the bus. Returns the boards that may not be stopped.
+    /// Stops all boards that this session has started, and releases the bus. Returns the boards that possibly still
+    /// run.
     pub(super) fn close(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         if !self.process.is_this() {
             // A forked process does not have the thread, and the boards belong to the parent process.

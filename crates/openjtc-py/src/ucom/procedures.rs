@@ -19,7 +19,7 @@ use super::objects;
 use super::worker_state::WorkerState;
 use crate::error::Failure;
 
-/// Time for which the doctor listens to the bus before it sends queries.
+/// Time for which the diagnosis (`doctor`) listens to the bus before it sends queries.
 const LISTEN: Duration = Duration::from_millis(1500);
 
 /// Returns the profile in a file, or the default profile. `on_lost` replaces the reaction to a lost board.
@@ -78,7 +78,7 @@ pub(super) fn init(
     listed: Option<Inventory>,
     (renew, force, check): (bool, bool, bool),
 ) -> Result<(Value, Option<Inventory>), Failure> {
-    // The content of the inventory file takes precedence, because another program may have changed the file.
+    // The content of the inventory file takes precedence, because another program can have changed the file.
     state.inventory = listed.or_else(|| state.inventory.take().map(Inventory::without_records));
     let compared = state.inventory.as_ref().filter(|_| state.inventory_file.is_some() && !renew);
     let expected = compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect());

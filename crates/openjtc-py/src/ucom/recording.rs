@@ -1,4 +1,5 @@
-//! Recording of the bus to a file. The bus of the session passes its frames to a separate thread, which may wait for a disk.
+//! Recording of the bus to a file. The bus of the session passes its frames to a separate thread, because writing to
+//! a disk can take long.
 
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -55,8 +56,8 @@ impl Tap {
         if let Some(sender) = &*lock(&self.sink.0) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // An error is ignored. It occurs if the writer has ended, for example because the disk is full, and the
-            // writer reports the error itself.
+            // An error is ignored. It means that the writer has ended, for example because the disk is full. The
+            // writer itself reports the cause.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }
     }

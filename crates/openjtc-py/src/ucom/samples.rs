@@ -32,7 +32,7 @@ impl ChainSamples {
         let since = Instant::now();
         let patience = patience.and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok());
         loop {
-            // A waiting reader restarts the deadline, in the same way as a call does.
+            // A waiting reader counts as a call of the program, so it restarts the deadline.
             chain.owner.shared.asked();
             let left = patience.map_or(LOOK, |patience| patience.saturating_sub(since.elapsed()));
             let sample = py.detach(|| self.listener.next(left.min(LOOK)));

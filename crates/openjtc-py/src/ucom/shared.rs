@@ -81,7 +81,7 @@ pub(super) struct Shared {
     asked_at: Mutex<Option<Instant>>,
     /// Boards that the session has started. The list of boards can be read even after the thread of the session has ended.
     started: Mutex<Vec<u8>>,
-    /// Boards that may not be stopped.
+    /// Boards that possibly still run.
     not_stopped: Mutex<Vec<u8>>,
     seen: Mutex<Value>,
 }
@@ -95,7 +95,7 @@ fn stopped() -> Failure {
     failure(ErrorKind::Fault, "cancelled", "the call was cancelled by a stop before it began", "")
 }
 
-/// Returns the failure for a fault of the chain's thread.
+/// Returns the failure for an internal fault of the thread that runs the session.
 pub(super) fn fault() -> Failure {
     failure(ErrorKind::Fault, "fault", "internal error of the chain's thread", "connect again")
 }
@@ -126,17 +126,17 @@ impl Shared {
         *lock(&self.started) = boards;
     }
 
-    /// Marks all started boards as possibly not stopped, after a fault of the thread.
+    /// Marks all started boards as possibly still running, after a fault of the thread.
     pub(super) fn all_left(&self) {
         self.left(std::mem::take(&mut *lock(&self.started)));
     }
 
-    /// Sets the boards that may not be stopped at the end of the session.
+    /// Sets the boards that possibly still run at the end of the session.
     pub(super) fn left(&self, boards: Vec<u8>) {
         *lock(&self.not_stopped) = boards;
     }
 
-    /// Removes and returns the boards that may not be stopped.
+    /// Removes and returns the boards that possibly still run.
     pub(super) fn take_left(&self) -> Vec<u8> {
         std::mem::take(&mut *lock(&self.not_stopped))
     }
@@ -195,8 +195,8 @@ impl Shared {
         lock(&self.seen).clone()
     }
 
-    /// Reports that running boards were stopped because the program made no call within the deadline. `not_stopped` contains the
-    /// boards that may not be stopped.
+    /// Reports that running boards were stopped because the program made no call within the deadline. `not_stopped`
+    /// contains the boards that possibly still run.
     pub(super) fn deadline(&self, time_s: f64, deadline: Duration, not_stopped: &[u8]) {
         let mut text =
             format!("no call was made to the chain for {} s: its boards are stopped", deadline.as_secs_f64());

@@ -58,7 +58,8 @@ pub(super) struct Update {
 }
 
 impl Read {
-    /// Reads the image. If each cycle has its own image, reads both images. Also returns the flash date in the format of the profile.
+    /// Reads the image. If the two cycles of an update send different images, reads both images. Also returns the
+    /// flash date in the format of the profile.
     pub(super) fn read(
         &self,
         first: &Source,
@@ -86,7 +87,7 @@ impl Read {
         Ok((image(first, &options)?, second, self.day(profile)?))
     }
 
-    /// Returns the flash date in the format of the profile. The flash date is 0 if the headers contain no date.
+    /// Returns the flash date in the format of the profile, or 0 if the profile sends no header.
     fn day(&self, profile: &Profile) -> Result<u16, Failure> {
         if !has_header(profile) {
             let text = "date: the date is part of the header, but the profile sends no header";
@@ -141,7 +142,8 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// Returns the flash number that each board must have. The caller passes this flash number, or it is read from the inventory.
+/// Returns the selected boards, each with the flash number that it must have. The flash number is passed by the
+/// caller or read from the inventory.
 fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = update.flash_number {
         return match numbers {
@@ -153,7 +155,8 @@ fn targets(state: &WorkerState, update: &Update, numbers: &[u8]) -> Result<Vec<U
             }
         };
     }
-    // The board number alone can select a single board. An update of several boards requires an inventory.
+    // Without an inventory, the board number alone selects a single board. An update of several boards requires an
+    // inventory.
     if let ([board], Boards::Some(_), None) = (numbers, &update.boards, &state.inventory) {
         return Ok(vec![UpdateTarget { board: *board, flash_number: None }]);
     }
@@ -228,7 +231,7 @@ pub(super) fn update(
     }
 }
 
-/// Adds an event with the result of each board, because the report may not reach a caller.
+/// Adds an event with the result of each board, because the report does not always reach a caller.
 fn note_outcomes(state: &WorkerState, report: &UpdateReport) {
     let time_s = state.driver.now_us() as f64 * 1e-6;
     for one in report.boards.iter().filter(|_| !report.dry_run) {

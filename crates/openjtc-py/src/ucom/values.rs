@@ -117,7 +117,7 @@ pub(super) fn running(state: &mut WorkerState) -> Result<Value, Failure> {
         if known.is_some_and(|known| known.names.dimensions().so == 0) {
             continue;
         }
-        // If another failure explains the missing outputs, that failure is reported instead.
+        // If an alarm explains the missing outputs, the alarm is reported instead.
         state.shared.check()?;
         return Err(no_value(board, "outputs", one["age_s"].as_f64()));
     }
@@ -132,7 +132,8 @@ fn of_board(state: &mut WorkerState, board: u8) -> Result<Value, Failure> {
     let followed = held.followed.outputs(&state.driver.master, now_us);
     let followed =
         followed.iter().find(|(number, ..)| *number == board).map(|(_, last, _, stale)| (*last, *stale));
-    // If this session does not run the board, another program may run it. The last received outputs are then used.
+    // If this session does not run the board, another program may run it. In this case the last outputs on the bus
+    // are used.
     let other =
         || held.snapshots.get(&board).map(|last| (last, now_us.saturating_sub(last.time_us) > OLD_US));
     let last = followed.or_else(other);
@@ -167,7 +168,7 @@ pub(super) fn value(state: &mut WorkerState, board: u8, name: &str) -> Result<Va
         Buffer::Par => "parameters",
     }];
     if buffer == Buffer::So && all["stale"] == json!(true) {
-        // If another failure explains the missing outputs, that failure is reported instead.
+        // If an alarm explains the missing outputs, the alarm is reported instead.
         state.shared.check()?;
         return Err(no_value(board, name, all["age_s"].as_f64()));
     }

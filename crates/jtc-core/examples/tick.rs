@@ -99,7 +99,7 @@ fn main() {
     let mut start = None;
     let mut ticks = 0;
     while recorded.len() < 4_000 {
-        // The later commands of the queue require HoldPos.
+        // The last two commands of the queue are sent only in HoldPos.
         let ready = queue.len() > 2 || controller.telemetry().state == ControllerState::HoldPos;
         let host = queue
             .front()

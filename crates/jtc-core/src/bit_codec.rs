@@ -122,7 +122,8 @@ impl BitCodec for usize {
 }
 
 impl BitCodec for f64 {
-    // The function is not inlined, because a snapshot contains hundreds of these values.
+    // The function is not inlined, because a snapshot contains hundreds of these values and each inlined copy would
+    // enlarge the program.
     #[inline(never)]
     fn write<S: BitSink>(&self, to: &mut S) {
         self.to_bits().write(to);

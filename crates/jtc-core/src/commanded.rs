@@ -30,7 +30,7 @@ impl Commanded {
     /// Age of the oldest stored set values, ticks.
     pub(crate) const OLDEST: u8 = SLOTS as u8 - 1;
 
-    /// Begins the next tick of the record.
+    /// Begins the next tick, which has its own slot in the ring buffer.
     pub(crate) fn next_tick(&mut self) {
         self.now = self.now.wrapping_add(1);
     }
@@ -58,9 +58,9 @@ impl Commanded {
         self.velocity(config.delay_ticks.max(1))
     }
 
-    /// Fills the stored set values of a joint as if it had moved at the constant `velocity` (rad/s) and had been at
-    /// `position` (rad) `ticks` ago. With a delay of `ticks`, `position` is then the due position of the joint, and
-    /// it changes at `velocity` in the next ticks.
+    /// Fills the stored set values of a joint as if it had moved at a constant `velocity` (rad/s) and had been at
+    /// `position` (rad) `ticks` ago. If the configured delay is `ticks`, the due position of the joint is then
+    /// `position`, and it changes at `velocity` in the next ticks.
     pub(crate) fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         let (way, mut after) = (velocity * DT, f64::from(ticks));
         for ago in 0..SLOTS as u8 {
@@ -107,7 +107,8 @@ mod tests {
     }
 
     proptest! {
-        /// Set values of earlier ticks can be read from any start index of the ring buffer, even if a tick stores its values twice.
+        /// The set values of earlier ticks can be read at any position of the ring buffer, even if a tick stores its
+        /// values twice.
         #[test]
         fn j62_the_last_set_values_are_kept(start in any::<u8>(), values in prop::collection::vec(-3.0..3.0f64, 8..300)) {
             let mut commanded = Commanded { now: start, ..Commanded::default() };
@@ -123,9 +124,9 @@ mod tests {
             }
         }
 
-        /// After the stored set values of a joint were replaced, its measured position is equal to the due position.
-        /// It remains equal in the next ticks if the joint keeps its velocity. The stored set values of other joints
-        /// do not change.
+        /// The stored set values of a joint are replaced. Its measured position is then equal to the due position,
+        /// and stays equal in the next ticks if the joint keeps its velocity. The stored set values of the other
+        /// joints do not change.
         #[test]
         fn j44_j62_a_joint_that_begins_anew_has_no_error(
             start in any::<u8>(),
@@ -153,8 +154,8 @@ mod tests {
         }
     }
 
-    /// When the set position of a joint sags, all its stored set positions and the stored position errors of its PID
-    /// controller shift by the same distance.
+    /// When the set position of a joint sags, all its stored set positions shift by the distance of the sag. The
+    /// stored position errors of its PID controller shift by the same distance.
     #[test]
     fn j43_j62_a_sag_is_no_motion() {
         let mut commanded = Commanded::default();

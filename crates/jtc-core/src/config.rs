@@ -33,10 +33,12 @@ pub struct Config {
     /// Time over which the drives average their speed, ms. The controller compares the change of the position with the reported speed over
     /// this time (J-35). With a time of 0, the controller does not make this comparison.
     pub drive_speed_window_ms: u8,
-    /// Torque that twists a gear by 1 rad, N·m/rad. The positions before and after the gear may differ by this elastic twist (J-35).
+    /// Torque that twists a gear by 1 rad, N·m/rad. Because of this elastic twist, the position of the motor side of
+    /// a gear can differ from the position of the joint side (J-35).
     pub gear_stiffness: f64,
-    /// Resolution of the joint encoders, rad. The encoders of the known drives have 16 bits per revolution, which is much coarser than the
-    /// resolution on the bus. While a joint is at rest, the integral does not change within one encoder step (J-41).
+    /// Resolution of the joint encoders, rad. The encoders of the known drives have 16 bits per revolution, which is
+    /// much coarser than the resolution on the bus. While a joint is at rest with a position error within one encoder
+    /// step, its integral does not change (J-41).
     pub encoder_step: f64,
     /// Delay from the measurement to the time when the resulting torque takes effect, in ticks (J-62). The highest allowed delay is 7. The
     /// drives have a control loop of 1 ms, in which they read the encoder and apply the torque. A drive can receive a Move frame between
@@ -52,16 +54,18 @@ pub struct Config {
     pub gripper_config_bits: u8,
     /// Ticks between two statuses that contain no response record (J-04).
     pub status_period_ms: u16,
-    /// Number of consecutive Moves without an answer or an acknowledgement after which the controller raises an error (J-14). The number
-    /// also applies to consecutive Moves without a usable answer of one joint (J-35). After fewer missing answers, the controller predicts
-    /// the motion of the joint (J-63).
+    /// Number of consecutive Moves without an answer or an acknowledgement after which the controller raises an error
+    /// (J-14). A joint that gives no usable answer to this number of consecutive Moves also causes an error (J-35).
+    /// As long as fewer answers are missing, the controller predicts the motion of the joint (J-63).
     pub missed_moves_max: u8,
     /// Time for which a node may be silent after its reset without an error, ms.
     pub node_boot_ms: u32,
-    /// Longest time from READY to ENABLE, ms (J-16). The controller measures this time while it requests the drives to enable.
+    /// Longest time that the drives may take to change from READY to ENABLE, ms (J-16). The controller measures this
+    /// time while it requests the drives to enable.
     pub enable_timeout_ms: u32,
-    /// Highest speed at which the controller enables the joints, rad/s (J-16). Every joint must have been slower than this speed for
-    /// `enable_still_ms`, so that a falling arm is not stopped abruptly.
+    /// Highest speed at which the controller enables the joints, rad/s (J-16). The joints are enabled only after
+    /// every joint has been slower than this speed for `enable_still_ms`. Otherwise, enabling would stop a falling
+    /// arm abruptly.
     pub enable_speed_max: f64,
     /// Time for which every joint must have been slower than `enable_speed_max`, ms.
     pub enable_still_ms: u16,
@@ -74,8 +78,8 @@ pub struct Config {
     /// Duration of the ramp of path time for pause, stop and resume, ms (J-33). The ramp is longer if the acceleration or torque limits
     /// require it.
     pub ramp_ms: u16,
-    /// Measured speed at which the controller raises an error while the torque is on, as a multiple of the velocity limit of the joint
-    /// (J-35).
+    /// Over-speed threshold as a multiple of the velocity limit of the joint (J-35). If the measured speed is above
+    /// this threshold while the torque is on, the controller raises an error.
     pub overspeed_factor: f64,
     /// Time for which a joint may exceed the over-speed threshold before the controller raises an error, ms.
     pub overspeed_ms: u16,
@@ -84,12 +88,14 @@ pub struct Config {
     /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after this
     /// time, the controller treats the moving joints as overloaded, and each of them lowers its load (J-33, J-70).
     pub braking_ms_max: u16,
-    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share counts as
-    /// a push (J-66).
+    /// Torque with which a yielding joint opposes a slow push, as a share of its torque limit (J-68). A feedback
+    /// torque above this share counts as a push (J-66).
     pub yield_torque_share: f64,
-    /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms within any 100 ms (J-43). During this
-    /// time, the controller commands the torque limit, and the integral does not change. With a time of 0, the joint is overloaded in the
-    /// first tick with a torque above its limit. A single missing point in a recorded trajectory causes a torque peak of only a few
+    /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms within any 100 ms
+    /// (J-43). During this time, the controller commands the torque limit, and the integral does not change. With a
+    /// time of 0, the joint is overloaded in the first tick with a torque above its limit.
+    ///
+    /// For comparison: a single missing point in a recorded trajectory causes a torque peak of only a few
     /// milliseconds.
     pub torque_over_ms: u16,
     /// If `true`, an overloaded joint makes the controller switch the torque of the arm off, as the manual describes. If `false`, the
@@ -97,21 +103,22 @@ pub struct Config {
     pub torque_release: bool,
     /// `true` if a held stop ends only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms (J-43). Directly after
-    /// enabling, the load of the joint may be unknown, and the controller must catch this load.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an overload, ms
+    /// (J-43). A joint that was just enabled can carry a load that the controller does not know. The joint then needs
+    /// its full torque until this load has come to rest.
     pub catch_ms_max: u16,
     /// Time over which the controller blends out a torque step at a change of state, ms (J-25, J-44).
     pub blend_ms: u16,
-    /// Torque up to which Teaching holds a joint at standstill, as a share of the torque limit and including the friction of the joint
-    /// (J-25).
+    /// Highest torque that Teaching and the friction of a joint together oppose to a push at standstill, as a share
+    /// of the torque limit (J-25).
     pub teach_stiction: f64,
     /// Share of the joints' Coulomb friction that Teaching compensates (J-25).
     pub teach_friction: f64,
     /// Highest speed of the flange in a jog, m/s (J-58). In Teaching, the damping increases above this speed, up to its full value at twice
     /// this speed (J-25). With a limit of 0, the controller does not limit the speed of the flange.
     pub tool_speed_max: f64,
-    /// Time in which a motion can stop after the safety input has become 0, before the torque is switched off, ms (J-22). With a time of 0,
-    /// the controller switches the torque off at once.
+    /// Time, ms, that a motion has for stopping after the safety input has become 0 (J-22). Then the controller
+    /// switches the torque off. With a time of 0, the controller switches the torque off at once.
     pub safety_input_ramp_ms: u16,
     /// Range of speeds around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
@@ -133,9 +140,9 @@ pub struct Config {
 }
 
 impl Config {
-    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded. The commanded range is defined
-    /// by the position limits of the joint. If the drives keep to their working area, the range is clipped to this area (J-43). If `joint`
-    /// is not a valid index, the range is empty.
+    /// Returns the lowest and highest position (rad) that may be commanded for the joint with index `joint`. These
+    /// are the position limits of the joint. If the drives limit their motion to their working area, the range is
+    /// reduced to this area (J-43). If `joint` is not a valid index, the range is empty.
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);

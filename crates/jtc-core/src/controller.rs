@@ -35,7 +35,8 @@ pub struct Controller<M> {
     // Parameters and commands that the controller has received from the host.
     pub(crate) parameters: HostParameters,
     pub(crate) teaching: bool,
-    /// Time for which a request for Teaching has waited until the controller holds the arm, ms.
+    /// Time for which an accepted request for Teaching has waited, ms. Teaching begins when the controller holds the
+    /// arm.
     pub(crate) teaching_waits_ms: u32,
     pub(crate) pump: bool,
     // Store of the trajectory. The next fields belong to its execution.
@@ -45,7 +46,7 @@ pub struct Controller<M> {
     pub(crate) trajectory: TrajectoryState,
     pub(crate) clock: PathClock,
     pub(crate) phase: Phase,
-    /// Ticks since a pause or stop was commanded on the path, until the arm is at rest (J-33).
+    /// Ticks since a pause or stop was commanded on the path (J-33). `None` if the arm is not braking.
     pub(crate) braking_ms: Option<u16>,
     /// Ticks since the safety input began to stop a motion. When the motion has stopped, the controller switches the
     /// torque off (J-22).
@@ -99,8 +100,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises an internal error that does not come from a joint or from the bus, because the device failed and was therefore reset (J-12).
-    /// The error latches like any other error (J-21). The board calls this function before the first tick.
+    /// Raises an internal error of the device itself, not of a joint or of the bus. The board calls this function
+    /// before the first tick, if the device has failed and was therefore reset (J-12). The error latches like any
+    /// other error (J-21).
     pub fn raise_internal(&mut self) {
         self.errors.raise_device();
     }
@@ -154,8 +156,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !clearing
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         if initialised && !self.powered() && !self.parameters.holdable(self.nodes.positions(), &self.config) {
-            // The torque limits cannot hold the arm with this model. The model arrived before the positions were known, so the host must
-            // send it again.
+            // With this model, the torque limits cannot hold the arm. The model was not checked earlier, because it
+            // arrived before the positions were known. The host must send it again.
             self.parameters.withdraw_model();
             initialised = false;
         }
@@ -164,8 +166,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            // J-60: after a change of the payload, the controller can learn an unmodelled load only when the whole
-            // payload has been blended into the model.
+            // J-60: Teaching waits until the whole payload has been blended into the model. Before that, the
+            // controller cannot determine the load that the model does not contain.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
                 && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
@@ -204,8 +206,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             ControllerState::HoldPos | ControllerState::Operate => {}
         }
         if last == ControllerState::Teaching {
-            // After Teaching, the model torque also contains the torque that decelerates the arm. The whole torque
-            // must therefore continue without a step, including the model torque.
+            // After Teaching, the model torque also contains the torque that decelerates the arm. Therefore no part
+            // of the torque may have a step, including the model torque.
             self.motion.law.change_whole_torque();
         } else {
             self.motion.law.change_mode();
@@ -267,8 +269,8 @@ mod tests {
     }
 
     /// The last torque consists of 8 N·m from the model and 4 N·m for friction. After Teaching, the next torque
-    /// begins at the sum of 12 N·m. After other states, only the friction part of 4 N·m continues, because the torque
-    /// of the model may step.
+    /// begins at the sum of 12 N·m. After other states, only the 4 N·m for friction continue, because a step of the
+    /// model torque is allowed.
     #[test]
     fn j25_j44_after_teaching_no_part_of_the_torque_steps() {
         for (last, whole) in [(ControllerState::Teaching, true), (ControllerState::Operate, false)] {

@@ -87,7 +87,7 @@ impl Errors {
         any(&self.held)
     }
 
-    /// Ends a held stop, because the controller cannot hold an arm without torque.
+    /// Ends a held stop when the torque is switched off, because the controller cannot hold an arm without torque.
     pub(crate) fn end_held_stop(&mut self) {
         self.held = [0; JOINTS];
     }

@@ -15,7 +15,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Starts the path after Execute in Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        // If joints are not enabled yet, the controller checks their positions again when they are enabled.
+        // The check of the approach needs the held positions of all joints. If a joint is not enabled yet, the
+        // controller makes this check later, when all joints are enabled.
         if !self.near(&first) || (self.motion.set.all_holding() && self.approach_to(&first).is_none()) {
             return Err(DataStatus::StartPositionMismatch);
         }
@@ -92,9 +93,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Slows down the clock of the path or of the approach, because this motion overloads a joint (J-75). Returns `false` if the arm is not
-    /// on a path or an approach, or if it is already stopping. In the tick in which the arm arrives at its target, no reaction to the
-    /// overload is necessary.
+    /// Slows down the clock of the path or of the approach, because this motion overloads a joint (J-75). Returns
+    /// `false` if the arm is not on a path or an approach, or if it is already stopping.
+    ///
+    /// If the arm arrives at its target in this tick, no reaction to the overload is necessary. The function then
+    /// returns `true` and changes nothing.
     pub(crate) fn hold_back(&mut self) -> bool {
         if self.state != ControllerState::Operate {
             return false;
@@ -161,7 +164,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     self.begin_braking();
                 }
             }
-            // The arm comes to rest before it reaches the target of the approach.
+            // A pause or stop during the approach stops the arm before it reaches the target of the approach.
             Phase::Approaching { clock, leave, .. } if clock.time > 0.0 => {
                 if leave.replace(to).is_none() {
                     clock.halt();
@@ -183,7 +186,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn walk(&mut self) {
         match self.phase {
             Phase::Waiting { elapsed_ms } => {
-                // Drives may need seconds to enable. Until all drives are enabled, the arm is held and may sag.
+                // Drives can need seconds to enable. Until all drives are enabled, the controller holds the arm,
+                // which can sag in this time.
                 self.motion.set.hold(&self.config);
                 if self.parameters.blend_left_ms() > 0 {
                     self.motion.law.payload_comes();
@@ -201,7 +205,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     match if self.near(&to) { self.approach_to(&to) } else { None } {
                         Some(phase) => self.phase = phase,
                         None => {
-                            // The controller has accepted Execute, so it stores the cause of this stop for the host.
+                            // The controller has already accepted Execute, so it cannot refuse this command any more.
+                            // It stores the cause of the stop for the host.
                             self.keep_cause(StopCause { kind: StopKind::Approach, ..StopCause::default() });
                             self.set_trajectory(TrajectoryState::Stop);
                         }
@@ -210,7 +215,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Phase::Approaching { from, length_ms, mut clock, leave } => {
                 if clock.time == 0.0 {
-                    // Until this tick, the controller held the arm without friction compensation.
+                    // Friction compensation begins in this tick. The transfer blends it in, so that the torque has no
+                    // step.
                     self.motion.law.change_mode();
                 }
                 clock.advance(length_ms);
@@ -222,7 +228,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 } else if !arrived {
                     self.phase = Phase::Approaching { from, length_ms, clock, leave };
                 } else {
-                    // The path begins at rest.
+                    // The approach has ended, so it is no longer held back. The path begins at rest.
                     self.motion.hold_back.end();
                     if self.clock.time == 0.0 {
                         self.phase = Phase::AtStart;
@@ -283,14 +289,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Executes one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues.
+    ///
     /// During a pause or stop, the controller may use all available torque for braking. After `stop_ms`, the stop
     /// ends as soon as every joint is slow enough to count as at rest. If path time or a jog has not stopped at the
-    /// end of the braking time, the available torque was too low, and the moving joints count as overloaded. If the
-    /// controller already holds the arm at the end of the braking time but an external force moves it, the normal
-    /// limits apply.
+    /// end of the braking time, the available torque was too low. The moving joints then count as overloaded. If the
+    /// commanded motion has ended by then but an external force moves the arm, the normal limits apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
-            // A jog is active and does not come to rest, so the earlier pause or stop is over.
+            // A jog is active and is not coming to rest, so no pause or stop is in progress any more.
             self.braking_ms = None;
         }
         let Some(ms) = self.braking_ms else { return false };

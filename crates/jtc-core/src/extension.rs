@@ -66,8 +66,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::StoreArm => self.store_arm(),
             Command::Disable if self.settable() || self.holds_at_rest() => {
-                // J-53: without parameters, the controller changes to Init, without torque, and stays in Init. In Init and Error a host can
-                // then send another arm. The gains, model and friction of the new arm need not match the parameters of the last arm (J-71).
+                // J-53: the parameters are withdrawn, so the controller changes to Init, without torque, and stays in
+                // Init. In Init and Error, a host can then send another arm. The parameters of this arm are not
+                // compared with the parameters of the last arm (J-71).
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -99,7 +100,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
-            // When the host clears a held stop, an operator may still press a jog key. The controller therefore
+            // An operator may still hold a jog key down when the host clears a held stop. Therefore the controller
             // refuses the Jogs of a key that was pressed during the held stop.
             if self.stops_held() && velocities.iter().any(|velocity| velocity != 0.0) {
                 self.extensions.refuse_jogs();
@@ -110,8 +111,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let untrusted = self.nodes.untrusted() != 0;
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
-            // The wire format uses f32, so the host may round a velocity at the limit up to the next f32 number. The comparison also
-            // rejects NaN.
+            // A host may round a velocity at the limit up to the next f32 number, because the wire format uses f32.
+            // Such a velocity is accepted. The comparison also rejects NaN.
             let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
             // J-53: an absent joint does not move.
@@ -269,7 +270,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let all = |taken: fn(Live) -> bool| {
             values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))
         };
-        // In every state, a tick has time to apply a few settings in addition to its normal computation.
+        // A tick always has time to apply a few settings in addition to its normal computation, so these settings are
+        // accepted in every state.
         let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
         let standing = self.stands()
             && values.len() <= STANDING_MAX

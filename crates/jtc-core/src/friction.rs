@@ -11,8 +11,8 @@ pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
 
-/// Like [`polynomial`], but with the reciprocal of the width of the smoothed sign. Around a speed of zero, the smoothed sign of the speed
-/// is a straight line. `sign_slope` is the reciprocal of the speed at which this line reaches ±1, s/rad.
+/// Like [`polynomial`], but with `sign_slope` (s/rad) instead of the width of the smoothed sign. Around standstill,
+/// the smoothed sign is a straight line with this slope: it reaches ±1 at the speed 1/`sign_slope`.
 #[inline]
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
     // If the speed is NaN, the c1 term makes the torque NaN.
@@ -42,7 +42,8 @@ pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     at(1.0).unwrap_or(0.0).min(at(-1.0).unwrap_or(0.0)).max(0.0)
 }
 
-/// Clips `x` without `clamp`, because `clamp` needs comparisons. The processor of the board has instructions for `max` and `min`.
+/// Limits `x` to the range from `low` to `high`. The processor of the board has instructions for `max` and `min`, so
+/// this is faster than `clamp`.
 fn within(x: f64, low: f64, high: f64) -> f64 {
     x.max(low).min(high)
 }
@@ -83,8 +84,8 @@ pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     inside.then_some(low + y * (high - low))
 }
 
-/// Finds the cell of an axis that contains `value`. Returns the position of `value` within this cell (0..1), and the
-/// element of `cells` for this cell. Returns `None` if `value` is outside the axis.
+/// Finds the cell of an axis that contains `value`, and the element of `cells` that belongs to it. Returns the
+/// position of `value` within the cell (0..1) and this element. Returns `None` if `value` is outside the axis.
 fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Option<(f64, T)> {
     let mut found = None;
     // The loop has no early exit, so that it takes the same number of instructions for every value.
@@ -213,7 +214,8 @@ mod tests {
         }
     }
 
-    /// Returns a table with the torque `c0 + c1·|v|` against each direction of the motion. The velocities are `first + i · 0.1`, rad/s.
+    /// Returns a table with the friction torque `c0 + c1·|v|` against the motion. `forward` and `backward` contain c0
+    /// and c1 for each direction. The velocities are `first + i · 0.1`, rad/s.
     fn straight(first: f32, forward: [f32; 2], backward: [f32; 2]) -> TableOf<f32> {
         let velocity: [f32; 20] = core::array::from_fn(|i| first + i as f32 * 0.1);
         let torque = velocity.map(|v| {

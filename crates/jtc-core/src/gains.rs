@@ -17,25 +17,26 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Additional delay of the derivative torque, ticks, on top of [`Config::delay_ticks`]. It consists of half of the
-/// window over which the derivative is computed, and half of the tick for which a torque is constant.
+/// Delay of the derivative torque in addition to [`Config::delay_ticks`], ticks. It is half of the window over which
+/// the derivative is computed, plus half of a tick, because a torque is constant for one tick.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Additional delay of the torque of the position error, ticks, on top of [`Config::delay_ticks`].
 const POSITION_AGE: f64 = 0.5;
-/// Factors in the formula for the required inertia. `PER_KD` multiplies Kd times the delay of its torque, and
-/// `PER_KP` multiplies Kp times both delays. If Kp is at most half of the Kp that Kd can damp, the required inertia
-/// is 1.1 to 1.7 times the smallest inertia with which a joint is stable.
+/// Factors in the formula for the required inertia. `PER_KD` multiplies Kd and the delay of its torque. `PER_KP`
+/// multiplies Kp and both delays. With these factors, the required inertia is 1.1 to 1.7 times the smallest inertia
+/// at which a joint is stable. This applies if Kp is at most half of the highest Kp that Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
-/// Largest sag of a joint, as a share of the position error limit, when new gains allow less integral torque than
-/// before.
+/// Largest permitted sag of a joint under new gains, as a share of the position error limit. A joint sags if its new
+/// gains allow less integral torque than its old gains.
 const SAG: f64 = 0.25;
 /// Least torque that the position gain must produce at the position error limit, as a share of the torque limit.
 const STIFF: f64 = 0.03;
 /// Time over which new gains are blended in, and duration of the trial of new gains, ms.
 const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
-/// Time after a change of gains during which the controller attributes an unstable control loop to the new gains, ms.
+/// Time after a change of gains, ms. If a control loop becomes unstable within this time, the controller assumes that
+/// the new gains are the cause.
 const BLAMED_MS: u16 = 10_000;
 /// Factor by which the gains of a joint with an unstable control loop are reduced. If the loop is unstable again
 /// within `AGAIN_MS` (ms) after this reduction, the controller raises an error.
@@ -135,9 +136,10 @@ fn position_delay(delay_ticks: u8) -> f64 {
 }
 
 /// Returns `true` if a held joint does not fall when these gains are applied (J-71). `p` is the present torque of the
-/// position error, and `i` is the present torque of the integral, N·m. At the position error limit, the position gain
-/// must produce a minimum torque. If the new gains allow less integral torque, the resulting position error must be
-/// small.
+/// position error, and `i` is the present torque of the integral, N·m.
+///
+/// The position gain must produce a minimum torque at the position error limit. If the integral must release torque
+/// under the new gains, the resulting position error must be small.
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -148,7 +150,8 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
 /// Trial of gains that a host has sent while the torque was on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
-    /// Gains before the trial. `None` if the controller may not restore any gains.
+    /// Gains before the trial, which the controller restores if the new gains fail. `None` if there are no such
+    /// gains.
     before: Option<[PidGains; JOINTS]>,
     /// Time of the trial in which all joints were settled and no joint yielded, ms.
     held_ms: u16,
@@ -170,7 +173,8 @@ impl Trial {
     /// `before`.
     pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
-        // If the gains in `before` are still on trial, the controller does not know yet whether they hold the arm stable.
+        // If the gains in `before` have not held the arm for the whole trial, they may be unstable. The controller
+        // then keeps the older gains that it has already stored.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
@@ -181,19 +185,20 @@ impl Trial {
     }
 
     /// Ends the trial, because the controller no longer holds the arm. Returns the earlier gains if the new gains
-    /// have not yet held the arm for long enough. Returns `None` otherwise.
+    /// have not held the arm for long enough, and `None` otherwise.
     pub(crate) fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
         before
     }
 
-    /// Discards the stored earlier gains if `may` returns `false` for them. The controller can then not restore them.
+    /// Discards the stored earlier gains if the function `may` returns `false` for them. The controller then cannot
+    /// restore these gains.
     pub(crate) fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
         self.before = self.before.filter(may);
     }
 
-    /// Returns `true` if a time of the trial or of the blend has not elapsed.
+    /// Returns `true` during a trial or a blend of gains, and as long as an instability of a joint is remembered.
     #[inline(always)]
     pub(crate) fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
@@ -214,8 +219,8 @@ impl Trial {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// Returns the gains of this tick during the blend to the new gains `given`. Kp and Kd change gradually, and the
-    /// integral gain changes at once. Returns `None` if the blend is over.
+    /// Returns the gains of this tick during the blend to the new gains `given`, or `None` if the blend is over. Kp
+    /// and Kd change gradually. The integral gain changes at once.
     pub(crate) fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
@@ -241,9 +246,11 @@ impl Trial {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
-    /// Handles the failure of joints (one bit each) with their `gains`. `unstable` marks the joints with unstable
-    /// control loops. If the gains must change, returns the cause and the new gains. The new gains are the gains
-    /// before the trial. If no earlier gains are stored, the unstable joints get softer gains.
+    /// Handles joints that have `failed` and joints with `unstable` control loops (one bit each). `gains` are the
+    /// present gains.
+    ///
+    /// If the gains must change, returns the cause and the new gains. The new gains are the gains before the trial.
+    /// If no earlier gains are stored, the unstable joints get softer gains.
     pub(crate) fn fails(
         &mut self,
         failed: u8,
@@ -262,7 +269,7 @@ impl Trial {
             (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
         })?;
         self.blend_from(gains);
-        // For the joints that fail, the gains change at once, without a blend.
+        // The gains of the joints that failed change at once, without a blend.
         for j in 0..JOINTS {
             if failed >> j & 1 != 0 {
                 self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];
@@ -272,7 +279,8 @@ impl Trial {
     }
 }
 
-/// Returns gains that are reduced for the `joints` (one bit each). With the reduced gains, the damping is sufficient for Kp.
+/// Returns gains that are reduced for the `joints` (one bit each). Their integral gain is 0, and their Kd is high
+/// enough to damp the reduced Kp.
 fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains; JOINTS] {
     core::array::from_fn(|j| match gains[j] {
         own if joints >> j & 1 == 0 => own,

@@ -1,4 +1,5 @@
-//! Execution of the host's commands in bounded slices, with one response record for each command (J-04, J-06).
+//! Execution of the host's commands, with one response record for each command (J-04, J-06). A long command is
+//! divided into slices. Each tick executes one slice.
 pub(crate) mod line_upload;
 pub(crate) mod priority;
 pub(crate) mod slices;
@@ -48,8 +49,9 @@ enum Served {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Executes urgent commands (Stop and Pause) first, then the oldest events of the host link. A tick executes
-    /// short events up to the first long event, or one slice of a long event. Returns the number of completed events.
+    /// Executes urgent commands (Stop and Pause) first, then the oldest events of the host link. A tick executes all
+    /// short events before the next long event. If the oldest event is long, a tick executes one slice of it. Returns
+    /// the number of completed events.
     pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
         for (line, commands) in inputs.urgent.iter().enumerate() {
             for (command, count) in commands.iter() {
@@ -72,8 +74,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         done
     }
 
-    /// Executes Stop and Pause at once, before earlier frames (J-04). The response records of Stop and Pause are sent later, when their
-    /// frames are processed.
+    /// Executes Stop and Pause at once, before frames that arrived earlier (J-04). Their response records are sent
+    /// when their own frames are processed.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
         self.priorities.iter_mut().for_each(|priority| priority.stopped |= stops);
@@ -106,7 +108,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                             Command::TrajSetExecStatus(exec) if received.overtaken => {
                                 (priority.overtaken(exec, self.trajectory).into(), Served::Quickly)
                             }
-                            // The controller received this Jog before a Stop or a Pause that has already taken effect.
+                            // This Jog arrived before a Stop or a Pause that has already taken effect, so it is
+                            // refused.
                             Command::Jog(_) if received.overtaken => {
                                 (SliceOutcome::Refused(DataStatus::NotAllowed), Served::Quickly)
                             }
@@ -121,8 +124,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // If the state does not allow a command, its refusal takes no computation, so the tick
-                            // can process another event. A Jog is an exception, because the controller may compute
+                            // If the state does not allow a command, the refusal takes no time, so the tick can
+                            // process another event. A Jog is an exception, because the controller may have computed
                             // its motion before the refusal.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
@@ -158,7 +161,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     pub(crate) fn carry_out(&mut self, received: &HostEvent<'_>, command: Command<'_>) -> SliceOutcome {
-        // New parameters would change the torque of a moving arm.
+        // New parameters are refused during a jog, because they would change the torque of a moving arm.
         let jogging = self.motion.set.jogging();
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
@@ -166,7 +169,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
-            // J-69: the controller is still reacting to a finding, so the host cannot clear its cause yet.
+            // J-69: while the controller still reacts to a push, an overload or another cause of a held stop, the
+            // host cannot clear this cause.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
                 if self.is_reacting() =>
             {
@@ -209,7 +213,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 SliceOutcome::Done
             }
-            // J-23: the reset would remove the torque from a moving arm.
+            // J-23: joints are not reset in Operate, in Teaching or during a jog, because the reset would remove the
+            // torque from a moving arm.
             Command::ResetCanDevices { nodes }
                 if nodes & JOINTS_MASK != 0
                     && (jogging
@@ -238,9 +243,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21). If a joint still reports a fault, the controller raises the error again in this tick. If
-    /// no error would be cleared for this reason, the controller refuses the command. It does not execute a refused
-    /// command later, when the fault has ended.
+    /// Clears errors (J-21). If a joint still reports a fault, the controller raises this error again in the same
+    /// tick. If nothing else would be cleared, the command is refused. A refused command is not repeated later, when
+    /// the fault has ended.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -370,7 +375,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Ok(());
         }
         match (self.trajectory, command) {
-            // J-33: a Pause must not turn a Stop on the path into a Pause.
+            // J-33: while the arm stops on the path, a Pause is refused, because it must not turn the Stop into a
+            // Pause.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>
             {
@@ -431,9 +437,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Err(DataStatus::IncorrectValue)
     }
 
-    /// Checks that the bearing temperatures are inside the friction table (J-36). If the controller received friction parameters after the
-    /// trajectory, the velocities of the path must also be inside the table. No other parameter that is accepted in HoldPos affects this
-    /// check.
+    /// Checks that the bearing temperatures are inside the friction table (J-36). If friction parameters have arrived
+    /// after the trajectory, the velocities of the path must also be inside the table. No other parameter that is
+    /// accepted in HoldPos affects this check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));

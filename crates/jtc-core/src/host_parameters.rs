@@ -188,9 +188,9 @@ impl HostParameters {
         self.payload.forget();
     }
 
-    /// Returns `true` if every joint can hold the payload in `config` at `at` (rad), or needs less torque than with
-    /// the present payload (J-60). If a position is unknown or the model is missing, the function returns `true`,
-    /// because the controller checks the payload again when Init ends.
+    /// Returns `true` if every joint can hold the payload in `config` at `at` (rad), or if it needs less torque than
+    /// with the present payload (J-60). Also returns `true` if a position is unknown or the model is missing, because
+    /// the controller then checks the payload when Init ends.
     pub(crate) fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
@@ -284,8 +284,9 @@ impl HostParameters {
         self.receive(missing_parameter::PID);
     }
 
-    /// Computes the effective inertia of the joints of a model, with the settings in `config`, one pose per slice (J-71). After the last
-    /// pose, refuses the model if the received gains need more inertia, and calls `used` otherwise.
+    /// Computes the effective inertia of the joints of a model, with the settings in `config`, one pose per slice
+    /// (J-71). After the last pose, the function compares the inertia with the inertia that the received gains need.
+    /// If it is too low, the model is refused. Otherwise, the function calls `used`.
     fn look_at(
         &mut self,
         model: &ArmModel,

@@ -41,8 +41,8 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// Largest increase of a value between two points due to rounding, in rad and rad/s. An increase due to rounding is too small to matter for
-/// any limit.
+/// Largest amount by which rounding can increase a value between two points, rad and rad/s. It is too small to matter
+/// for any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// Returns a value that rises smoothly from 0 to 1 for `u` from 0 to 1, with zero slope at both ends.
@@ -51,8 +51,8 @@ pub(crate) fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Weights of the samples of both points in the position, velocity and acceleration at one time between the points (Hermite basis). The
-/// weights are the same for all joints.
+/// Weights of the samples of the two points for a time between the points (Hermite basis). The interpolated position,
+/// velocity and acceleration are weighted sums of these samples. The weights are the same for all joints.
 struct Weights {
     /// Weights of the positions, velocities and accelerations of both points in the interpolated position.
     position: [[f64; 2]; 3],
@@ -62,8 +62,8 @@ struct Weights {
     acceleration: [f64; 2],
 }
 
-/// Units of the samples of a trajectory, and the changes that one unit causes within a step between two points. All
-/// values are constant for a trajectory.
+/// Units of the samples of a trajectory, and the motion that one unit of velocity or acceleration causes in the step
+/// between two points. All values are constant for a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
     /// Position (rad), velocity (rad/s) and acceleration (rad/s²) that one unit of a sample represents.
@@ -162,9 +162,9 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Returns the derivative of the interpolated position (rad/s) at the same time as [`interpolate`]. The derivative is
-/// the velocity of the cubic polynomial, plus a correction. The correction is necessary if the velocities and
-/// accelerations of both points do not explain the whole distance.
+/// Returns the derivative of the interpolated position (rad/s) at the same time as [`interpolate`]. It is the
+/// velocity of the cubic polynomial plus a correction. The correction is zero if the cubic velocity, integrated from
+/// one point to the other, gives exactly the distance between both points.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {

@@ -43,8 +43,9 @@ pub struct Inputs<'a> {
     /// Stop and Pause commands that have arrived on each line since the last tick. Stop and Pause commands take effect in this tick, before
     /// all waiting events (J-04). The frames of these commands also appear as events in the order of arrival.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// Oldest events of the host link that the controller has not completed. The controller reads at most [`jtc_wire::EVENTS_MAX`] of these
-    /// events per tick. In the next tick, the caller must pass the events that were not completed again.
+    /// Oldest events of the host link that the controller has not completed yet. The controller reads at most
+    /// [`jtc_wire::EVENTS_MAX`] of these events per tick. If an event is not completed in this tick, the caller must
+    /// pass it again in the next tick.
     pub host: &'a [HostEvent<'a>],
     /// `true` if the serial transmitters can accept a status now.
     pub status_free: bool,

@@ -67,8 +67,8 @@ pub(crate) struct Motion {
 bit_codec!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
-    /// Switches the torque off. After the torque was switched off, no joint is held, and no torque is stored. Each part is reset in place,
-    /// because a new value would be built on the stack and copied.
+    /// Resets all parts of the motion when the torque is switched off: no joint is held, and no torque is stored.
+    /// Each part is reset in place, because a new value would be built on the stack and copied.
     pub(crate) fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
         set.release(nodes);
@@ -79,8 +79,8 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Makes the joints in `yields` yield from the next tick on (J-68), and the joints in `lowers` lower their loads (J-70). The function
-    /// takes the inertia of the arm from the ramp.
+    /// Makes the joints in `yields` yield from the next tick on (J-68), and the joints in `lowers` lower their loads
+    /// (J-70). The inertia of each joint is the inertia that was computed for the last ramp of path time.
     pub(crate) fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
@@ -104,7 +104,8 @@ impl Motion {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Returns two flags for each joint: `true` if the joint is at its torque limit, and `true` if it lags its set position too far.
+    /// Returns two flags for each joint. The first is `true` if the joint is at its torque limit. The second is
+    /// `true` if the joint is too far behind its set position.
     pub(crate) fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let lags = |j: usize| {
             let (error, limit) = self.lag(j, nodes, config);
@@ -114,17 +115,19 @@ impl Motion {
         (saturated, core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// Returns the position error of a joint, and its limit while the path is held back, rad. The limit is half of the maximum, so that the
-    /// arm still stops on its path (J-75).
+    /// Returns the position error of a joint, and its limit while the path is held back, rad. The limit is half of
+    /// the normal limit. The other half is a reserve, so that the arm can stop on its path (J-75).
     pub(crate) fn lag(&self, j: usize, nodes: &Nodes, config: &Config) -> (f64, f64) {
         let j = j.min(JOINTS - 1); // so that the compiler sees that the index is in range
         let limit = 0.5 * config.joints[j].position_error_max;
         (self.set.due(config)[j] - nodes.positions()[j], limit)
     }
 
-    /// Returns `true` if Teaching may begin: the arm is held at rest, and the loads of its joints are known. In a
-    /// held stop, an obstacle may press on the arm (`contact`), and Teaching may begin during this contact. If the
-    /// request for Teaching has waited (`waits_ms`) for [`KNOWN_MS`] in a held stop, the loads need not be known.
+    /// Returns `true` if Teaching may begin: the arm is held at rest, and the loads of its joints are known.
+    ///
+    /// `contact` is `true` in a held stop, in which an obstacle may still press on the arm. Teaching may then begin
+    /// during this contact. If the request has waited for [`KNOWN_MS`] (`waits_ms`), the loads need not be known
+    /// either.
     pub(crate) fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
@@ -132,15 +135,18 @@ impl Motion {
             && (overdue || self.law.knows_loads(&self.set.holding, config, contact))
     }
 
-    /// Executes one tick of Teaching. Updates the inertia for a ramp of path time, because Teaching may end during a motion.
+    /// Executes one tick of Teaching. If the arm moves at the end of Teaching, a ramp brings it to rest, so this
+    /// function keeps the inertia for the ramp up to date.
     pub(crate) fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
             self.ramp.begin(nodes, config, dynamics);
         }
     }
 
-    /// Ends Teaching. The arm comes to rest and is held, and the integral continues the torque that Teaching used for the load. Moving
-    /// joints stop within `ramp_ms`. If the torque limits require it, these joints take longer, up to `stop_ms` (J-33).
+    /// Ends Teaching. The arm comes to rest and is held. The integral takes over the torque that Teaching used for
+    /// the load.
+    ///
+    /// Moving joints stop within `ramp_ms`, or more slowly if the torque limits require it, within `stop_ms` (J-33).
     pub(crate) fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let mut length_ms = f64::from(config.ramp_ms);
         if nodes.velocities().iter().any(|v| moves(*v)) {

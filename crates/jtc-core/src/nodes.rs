@@ -52,7 +52,7 @@ pub(crate) struct Nodes {
     /// Number of consecutive Moves without acknowledgement.
     unacknowledged: u8,
     sent_move: bool,
-    /// Number of consecutive Moves that the controller has sent since the last other frame.
+    /// Number of consecutive Moves since the controller has sent a frame other than Move.
     moves: u8,
     configured_last: bool,
     /// Check that compares the positions and speeds of the drives (J-35).
@@ -110,7 +110,7 @@ impl Nodes {
         }
     }
 
-    /// Sets the velocity that the answers of the last 5 ms of a joint show, rad/s.
+    /// Sets the velocity that results from the answers of the last 5 ms, rad/s.
     #[cfg(test)]
     pub(crate) fn move_at(&mut self, joint: usize, velocity: f64) {
         self.nodes[joint].measured.move_at(velocity);
@@ -200,8 +200,9 @@ impl Nodes {
         self.misfits
     }
 
-    /// Returns the disagreement of the two encoders of a joint since its drive was configured (J-35). The second element is the size of a
-    /// jump (rad) or the factor of a speed.
+    /// Returns the disagreement of the two encoders of a joint since its drive was configured (J-35). The second
+    /// element is the size of an encoder jump (rad), or the ratio of the speed from the positions to the reported
+    /// speed.
     pub(crate) fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
         self.node(joint).measured.misfit()
     }
@@ -296,8 +297,7 @@ impl Nodes {
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
-            // When the position becomes accurate, it may jump by any distance. The earlier measurements are therefore
-            // discarded.
+            // A position that becomes accurate can jump by any distance, so the earlier measurements are discarded.
             node.measured.forget();
         }
         node.report = *report;
@@ -316,8 +316,9 @@ impl Nodes {
         }
     }
 
-    /// Uses the `commanded` velocities (rad/s) as the new reference for predictions of the joints in `found`. The set
-    /// values of these joints were restarted, and such a restart does not change their motion (J-63).
+    /// Sets the `commanded` velocities (rad/s) as the reference for predictions of the joints in `found`. The set
+    /// values of these joints were restarted. Such a restart is not a motion of the joint, so it must not affect the
+    /// predictions (J-63).
     pub(crate) fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {
@@ -398,9 +399,11 @@ impl Nodes {
             && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))
     }
 
-    /// Executes ClearCurrentErrors for the nodes in `mask`. The controller requests Init from the nodes with an error until these nodes
-    /// report Init. An error that is only in the word of occurred errors is not a reason to switch the torque off. Such an error is
-    /// therefore cleared only while the torque is off. Returns `true` if any node has an error to clear.
+    /// Executes ClearCurrentErrors for the nodes in `mask`. The controller requests Init from each node with an error
+    /// until this node reports Init. Returns `true` if any node has an error to clear.
+    ///
+    /// The request for Init switches the torque off. Therefore errors that exist only in the word of occurred errors
+    /// are cleared only while the torque is off.
     pub(crate) fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;
@@ -441,8 +444,8 @@ impl Nodes {
                 node.restart(config);
             }
         }
-        // After a change of the velocity scale, the nodes are configured again, because their positions and speeds
-        // may then agree.
+        // A new velocity scale can end a disagreement between the positions and the reported speeds. The nodes are
+        // therefore configured again, which clears the record of a disagreement.
         let bits = |config: &Config| {
             let Config { joint_config_bits, gripper_config_bits, gripper, velocity_full_scale, .. } = *config;
             (joint_config_bits, gripper_config_bits, gripper, velocity_full_scale)

@@ -1,4 +1,5 @@
-//! Reactions of the controller to findings about a joint (J-66), for cases in which the controller need not switch the torque off.
+//! Reactions of the controller to findings about a joint (J-66), for cases in which the controller need not switch
+//! the torque off.
 //!
 //! | finding | reaction |
 //! |---|---|
@@ -13,8 +14,10 @@
 //! | any other overloaded joint, at rest, or still moving at the end of the time for a stop | the joint lowers its load |
 //! | a set value outside a limit of the path | the arm stops on its path, or its jog ends |
 //!
-//! The first row that applies to a joint is used. All reactions except releasing the arm and holding back path time end in a held stop
-//! (J-69). In a held stop, the arm is held, the cause is shown, and the arm does not move until the host clears the stop.
+//! The first row that applies to a joint is used. A joint *lowers its load* if its torque limit cannot hold the load:
+//! the joint then sinks slowly. All reactions except releasing the arm and holding back path time end in a held stop
+//! (J-69). In a held stop, the arm is held, the cause is shown, and the arm does not move until the host clears the
+//! stop.
 mod held_stop;
 
 use jtc_wire::{RawPoint, StopCause, StopKind};
@@ -62,7 +65,8 @@ fn reaction(
     } else if overloaded && !settled {
         Some((Reaction::Lower, StopKind::Overload, torque))
     } else if (pushed && !releases) || (overloaded && strained) {
-        // A push is visible in the feedback torque of the joint, or only in the speed of the joint.
+        // If the push is visible in the feedback torque, the cause is `Push`. If only the speed of the joint shows
+        // the push, the cause is `Shove`.
         Some((Reaction::Yield, if strained { StopKind::Push } else { StopKind::Shove }, torque))
     } else if errors & joint_error::POSITION_ERROR != 0 {
         Some((Reaction::Yield, StopKind::PositionError, joint_error::POSITION_ERROR))
@@ -86,8 +90,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         // With a loop over the index, the compiler can see that the index is in range.
         for j in 0..JOINTS {
             let again = self.parameters.trial.again(j);
-            // The torque of a joint that yields is limited. An unstable control loop of this joint therefore counts
-            // only if it was already unstable shortly before.
+            // A joint that yields has limited torque. An unstable control loop of such a joint therefore counts only
+            // if the joint was already unstable shortly before.
             let found =
                 Found { unstable: found[j].unstable && (again || !self.motion.law.yields(j)), ..found[j] };
             let Some((reaction, kind, cause)) = reaction(&found, mode, self.config.torque_release, again)
@@ -138,8 +142,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// Ends a trial of gains when the controller stops holding the arm. Gains on trial have not held the arm long enough, so the controller
-    /// does not enable the arm again with these gains.
+    /// Ends a trial of gains (J-71) when the controller stops holding the arm, and restores the earlier gains. The
+    /// gains on trial have not held the arm long enough, so the controller must not enable the arm again with them.
     pub(crate) fn end_trial(&mut self) {
         let Some(gains) = self.parameters.trial.end() else { return };
         self.parameters.pid = gains;
@@ -193,12 +197,12 @@ mod tests {
         controller
     }
 
-    /// Returns `found` for joint 2, and no findings for the other joints.
+    /// Returns findings in which joint 2 has `found`, and the other joints have no findings.
     const fn second(found: Found) -> [Found; JOINTS] {
         [HELD, found, HELD, HELD, HELD, HELD]
     }
 
-    /// Begins a trial of gains that are half as high as the present gains. Returns the present gains.
+    /// Begins a trial of gains that are half as high as the present gains. Returns the gains before the trial.
     fn try_gains(controller: &mut Controller<[RawPoint; 4]>) -> [PidGains; JOINTS] {
         let before = controller.parameters.pid;
         controller.parameters.pid.iter_mut().for_each(|gains| gains.kp *= 0.5);
@@ -206,9 +210,9 @@ mod tests {
         before
     }
 
-    /// If a joint yields during a trial of gains, or lowers its load before it has settled, the gains on trial are
-    /// the cause. The controller restores the gains before the trial. If a settled joint is overloaded, the cause is
-    /// another one.
+    /// During a trial of gains (J-71), the new gains are the cause if a joint yields, or if a joint is overloaded
+    /// before it has settled. The controller then restores the earlier gains. An overload of a settled joint has
+    /// another cause.
     #[test]
     fn j66_j71_a_joint_that_yields_during_a_trial_of_gains_gets_the_gains_before_the_trial() {
         let overloaded = Found { overloaded: true, ..HELD };
@@ -249,7 +253,7 @@ mod tests {
         }
     }
 
-    /// An overload on the path stops the arm if the path cannot be slowed down any more.
+    /// If a joint is overloaded on the path and the controller cannot slow the path down (J-75), the arm stops.
     #[test]
     fn j66_j75_an_overload_in_motion_stops_the_arm_if_holding_back_does_not_help() {
         let overloaded = second(Found { overloaded: true, ..HELD });
@@ -264,8 +268,8 @@ mod tests {
         );
     }
 
-    /// If a trial of gains ends early, the controller restores the gains before the trial, and the host sees the
-    /// cause.
+    /// If the controller ends a trial of gains early, it restores the gains before the trial, and stores the cause
+    /// for the host.
     #[test]
     fn j71_a_trial_of_gains_that_ends_early_restores_the_gains_before_it() {
         let mut controller = holding();

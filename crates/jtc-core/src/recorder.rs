@@ -127,7 +127,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     {
         controller.hash_arm();
         let errors = controller.errors.word();
-        // A held stop is not an error that ends a log (J-69), because a worse error may follow.
+        // A held stop does not end a log (J-69), because a more serious error may follow.
         let (in_error, torque) = (controller.errors.any(), controller.state.has_torque());
         let new_error = !core::mem::replace(&mut self.was_in_error, in_error) && in_error;
         if self.writer.state != LogState::Recording && torque && !self.writer.powered {
@@ -168,7 +168,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.begin();
             self.snapshot(controller);
         } else if self.writer.is_empty() {
-            // The hash of the arm is known only some ticks after the start of the device.
+            // The hash of the arm is known only some ticks after the start of the device. Until then, the recorder
+            // does not begin a log, unless an error occurs.
             if controller.extensions.hash.is_none() && !new_error {
                 return;
             }
@@ -198,8 +199,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         self.uncertain |= !self.reference.write(inputs, outputs.host_done, check, &mut self.writer);
         self.since_snapshot += 1;
         let due = if self.uncertain { EARLY_SNAPSHOT_MS } else { SNAPSHOT_MS };
-        // While the parameters of the arm change, the hash of the arm is not known. The parameters change only for a short time, unless a
-        // host sends parameters again and again.
+        // A snapshot waits until the hash of the arm is known, but at most for two periods. The hash is unknown while
+        // the parameters of the arm change, and a host may send parameters again and again.
         let named = controller.extensions.hash.is_some() || self.since_snapshot >= 2 * SNAPSHOT_MS;
         if self.since_snapshot >= due && named {
             self.snapshot(controller);

@@ -60,7 +60,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// once per period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        // The function makes the same computation while the line is busy, because every tick must do the same work.
+        // The function computes `wanted` also while the line is busy, because every tick must do the same work.
         let wanted = !self.records.is_empty() | (self.since_status_ms >= self.config.status_period_ms);
         let due = wanted && free;
         if due {

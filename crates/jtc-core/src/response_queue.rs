@@ -26,9 +26,10 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Appends a response record to the queue. Returns `false` if the queue was full, so that a record is lost. The
-    /// lost record is the waiting record for noise, if the queue contains one. Otherwise, a new record for noise is
-    /// lost, or the oldest record if the new record is not for noise.
+    /// Appends a response record to the queue. Returns `false` if the queue was full, so that a record is lost.
+    ///
+    /// A full queue loses its record for noise, if it contains one. If not, it loses the new record if this record is
+    /// for noise, and its oldest record in all other cases.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
             // The record for noise that already waits also represents the new noise.
@@ -64,7 +65,8 @@ impl ResponseQueue {
         let response = *self.slot(0);
         self.first = (self.first + 1) % RECORDS_MAX;
         self.len -= 1;
-        // The record for noise moves forward by one position, or was removed.
+        // `noise` counts from the oldest record, which was removed, so `noise` decreases by one. If the removed
+        // record was the record for noise, the queue no longer contains one.
         self.noise = self.noise.and_then(|place| place.checked_sub(1));
         Some(response)
     }
@@ -193,8 +195,8 @@ mod tests {
         }
     }
 
-    /// When the queue drops the record for noise, the other response records keep their order, for any position of
-    /// the dropped record.
+    /// When a full queue drops its record for noise, the other response records must keep their order. The test
+    /// covers several positions of the dropped record.
     #[test]
     fn j04_what_goes_for_another_leaves_the_others_in_order() {
         for place in [0, 1, 30, 62, 63] {

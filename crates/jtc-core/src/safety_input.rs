@@ -16,7 +16,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
         self.safety_stop_ms = match self.safety_stop_ms {
-            // The controller raised the error in the last tick.
+            // The stop has ended, and the controller raised the error in the last tick.
             Some(OVER) => None,
             Some(_) if !self.powered() || self.stands_still() || self.motion.law.is_yielding() => Some(OVER),
             Some(ms) => {

@@ -27,8 +27,8 @@ pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> Con
     } else if !initialised {
         ControllerState::Init
     } else if teaching && (state == ControllerState::Teaching || teachable) {
-        // An accepted teach request waits until every joint is held at rest. The controller can learn the loads of
-        // the arm only at rest (J-25).
+        // An accepted teach request waits until every joint is held at rest, because the controller can estimate the
+        // loads of the joints only at rest (J-25).
         ControllerState::Teaching
     } else if execute {
         ControllerState::Operate

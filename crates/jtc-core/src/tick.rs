@@ -101,7 +101,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A pending teach request times out. After the timeout, the operator no longer expects the arm to become compliant.
+        // The controller cancels a teach request that has waited too long, because the operator no longer expects the
+        // arm to become compliant.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         if self.parameters.blend_left_ms() > 0 {
@@ -121,7 +122,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return self.rest();
         }
         if jogged {
-            // After the jog, the arm has come to rest.
+            // The jog has ended and the arm is at rest, so the control mode changes.
             self.motion.law.change_mode();
         }
         self.control(ControlMode::Hold)
@@ -142,7 +143,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.keep_ramp(&self.nodes, &self.config, &self.parameters.dynamics);
         self.motion.set.follow_measured(&self.nodes);
         if self.parameters.blend_left_ms() > 0 {
-            // The model now contains a part of the mass that Teaching has estimated.
+            // The model takes over a part of the mass that Teaching has estimated. Teaching therefore reduces its own
+            // estimate.
             self.motion.law.give_way_to_payload(self.parameters.next_mass());
             self.parameters.blend_payload();
         }
@@ -291,7 +293,7 @@ mod tests {
         }
     }
 
-    /// In Teaching, the gains have no effect, so their blend waits.
+    /// In Teaching, the gains have no effect, so the blend to new gains pauses.
     #[test]
     fn j71_new_gains_are_blended_in_while_the_gains_have_an_effect() {
         for (mode, goes_on) in

@@ -68,8 +68,9 @@ mod tests {
 
     #[test]
     fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
-        // The first and the ninth late tick are 16 ms apart. The tenth late tick comes 2 ms after the last of the ticks `between`, which
-        // are on time.
+        // Nine late ticks, each with 2 ms, are followed by `between` ticks on time and the tenth late tick. The first
+        // and the tenth late tick are then 18 + `between` ms apart. This is a failure only if the time is less than a
+        // second.
         for (between, too_many) in [(981, true), (982, false)] {
             let mut late = TickOverruns::default();
             assert!(!(0..9).any(|_| late.count(1)));

@@ -102,7 +102,8 @@ fn j53_absent_is_set_in_init_and_error_only() {
         rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
         assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
         assert!(!is_absent(&rig, j));
-        // In Error, after a drive has stopped answering, the controller accepts the settings for absent joints.
+        // After a drive has stopped answering, the controller is in Error. In this state, it accepts the settings
+        // that declare the joint absent.
         rig.nodes[j].silent = true;
         rig.until(50, |r| r.state() == ControllerState::Error);
         assert_eq!(set(&mut rig, &all), DataStatus::NoError);
@@ -240,7 +241,7 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
 
-/// The controller accepts a payload or a model whose load is too high only for an absent joint.
+/// If the load of a payload or of a model is too high only for an absent joint, the controller must accept it.
 #[test]
 fn j53_absent_joints_hold_nothing() {
     let payload = |mass: f64| {
@@ -259,7 +260,8 @@ fn j53_absent_joints_hold_nothing() {
         assert_eq!(rig.state(), ControllerState::HoldPos);
         let expected = if there { DataStatus::IncorrectValue } else { DataStatus::NoError };
         assert_eq!(rig.ask(FrameType::SetSettings, &payload(8.0)), expected);
-        // At the end of Init, the controller checks the load again and accepts the load.
+        // The controller passes through Error and Init again. At the end of Init, it checks the load once more and
+        // must accept it.
         rig.press_stop(10);
         rig.clear(true, 0x7F);
         rig.run(3_000);

@@ -19,7 +19,8 @@ fn points() -> Vec<RawPoint> {
         .collect()
 }
 
-/// A pause that has not ended yet ends when Teaching begins, because a hand then moves the joints.
+/// After a pause, the controller waits until the arm is at rest. When Teaching begins, the controller no longer
+/// waits, because a hand then moves the joints. The motion in Teaching must not cause an error.
 #[test]
 fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     let mut rig = Rig::holding();
@@ -79,8 +80,8 @@ fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     }
 }
 
-/// If a person touches an arm after a pause, the controller continues to hold the arm. Only path time that does not come to rest is an
-/// error.
+/// A person who touches the arm after a pause moves it slightly. The controller must continue to hold the arm,
+/// because only path time that does not come to rest is an error.
 #[test]
 fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     let mut rig = Rig::holding();
@@ -145,7 +146,7 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
             });
             let rest = set(&rig).0;
             assert!(ticks <= 230, "{start} after {after_ms} ms: {ticks} ms");
-            // At the beginning of the ramp of path time, the arm may still accelerate, as on a path.
+            // While path time begins to slow down, the arm may still accelerate a little, as on a path.
             assert!(fastest < speed.abs() + 0.4, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
             assert!(0.0 < rest && rest <= at, "{start} after {after_ms} ms: {at} {rest} rad");
             assert!(at - rest < 0.13 * fastest + 1e-3, "{start} after {after_ms} ms: {at} {rest} rad");
@@ -159,9 +160,9 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     }
 }
 
-/// A simulated arm has a load that the controller knows, in random poses. The first point is at the largest distance that is allowed: 0.02
-/// rad, or 0.3 rad with a wide tolerance. During the approach, no torque reaches its limit. If Execute is refused, only little torque
-/// remains for an approach.
+/// A simulated arm with a load that the controller knows begins paths in random poses. The first point is as far away
+/// as the tolerance permits (0.02 or 0.3 rad). During the approach, no torque may reach its limit. Execute may be
+/// refused only if little torque remains for an approach.
 #[test]
 fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     let seed = 13;
@@ -235,8 +236,8 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     }
 }
 
-/// A path may begin outside a position limit if the arm is at that position (J-36). For any start tolerance, the approach does not move an
-/// arm inside its limits beyond a limit.
+/// A path can begin outside a position limit only if the arm is already there (J-36). If the arm is inside its
+/// limits, the approach must not move it beyond a limit, for any start tolerance.
 #[test]
 fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     for (at, first, tolerance, answer) in [

@@ -1,4 +1,6 @@
-//! Tests of enabling an arm that carries an unmodelled load (J-43). The controller catches every load within the torque limits.
+//! Tests of enabling an arm that carries an unmodelled load (J-43). When the joints are enabled, they sag until the
+//! controller holds the load, that is, until it has *caught* the load. The controller must catch every load within
+//! the torque limits.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -98,15 +100,15 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
     assert!(most > 0.93 && fought >= 6, "no load was near the limit: {most}, {fought}");
 }
 
-/// When joint 2 of an arm without brakes is enabled, it moves nearly as fast as allowed. The controller must catch
-/// the load in motion.
+/// An arm without brakes moves almost as fast as permitted when its joint 2 is enabled. The controller must catch the
+/// unmodelled load during this motion.
 #[test]
 fn j43_an_unknown_payload_is_caught_in_motion() {
     for velocity in [-0.2, 0.2] {
         let mut it = Let::new(Config::avena(), 2.5, POSES[1], 0.1);
         it.arm.brakes = false;
         while !it.enabled() {
-            // Hands slow the moving arm down.
+            // Until the joints are enabled, hands let the arm move only at this velocity.
             (it.arm.q, it.arm.v) = (POSES[1], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
             it.run(1);
         }
@@ -142,8 +144,9 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
     assert!(cases > 20, "{cases}");
 }
 
-/// While the controller catches the load of a joint that was just enabled, it tolerates an overload for a time that a
-/// setting determines. A load that is added after this time and overloads the joint is an error again (J-43).
+/// While the controller catches the load of a joint that was just enabled, it tolerates an overload, but only for the
+/// time in the setting `catch_ms_max`. A load that is added after this time and overloads the joint must be an error
+/// (J-43).
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {
@@ -158,7 +161,8 @@ fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     }
 }
 
-/// An Execute that waits for a joint also waits until the load of this joint is caught.
+/// If Execute must wait for a joint to be enabled, it must also wait until the controller has caught the load of this
+/// joint.
 #[test]
 fn j34_an_execute_waits_until_the_load_is_caught() {
     let mut it = Let::new(Config::avena(), 2.6, POSES[1], 0.1);

@@ -7,7 +7,8 @@ use jtc_core::{Config, ControllerState, TrajectoryState, Violation};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 use rig::{Rig, floats, point, rad, rest, segment_body};
 
-/// Returns a rig whose position limits differ in both directions, and whose other limits have no effect.
+/// Returns a rig whose upper and lower position limits have different magnitudes. Its other limits are so high that
+/// they have no effect.
 fn rig() -> Rig {
     let mut config = Config::avena();
     for joint in &mut config.joints {
@@ -58,7 +59,7 @@ fn j30_a_refused_segment_0_leaves_the_old_trajectory_as_it_was() {
     let mut rig = rig();
     let good: Vec<_> = (0..40).map(|i| point(2, 0.0005 * f64::from(i), 0.0, 0.0)).collect();
     assert_eq!(load(&mut rig, 0, 1, &good), DataStatus::NoError);
-    // The bad trajectory is as long as the old trajectory, so it would overwrite every point.
+    // The refused trajectory has as many points as the stored trajectory, and must not overwrite any of its points.
     let mut bad = vec![point(2, 0.015, 0.0, 0.0); 39];
     bad.push(point(2, 3.0, 0.0, 0.0));
     assert_eq!(load(&mut rig, 0, 1, &bad), DataStatus::IncorrectValue);
@@ -141,7 +142,8 @@ fn j36_velocities_outside_the_friction_table_are_refused_at_loading_and_at_execu
     assert_eq!(load(&mut rig, 0, 1, &swing(0.35)), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((6, 4, Quantity::FrictionVelocity)), "the table ends sooner below zero");
     assert_eq!(load(&mut rig, 0, 1, &swing(0.25)), DataStatus::NoError);
-    // Narrower friction tables arrive after the trajectory.
+    // After the trajectory, the host loads friction tables with a smaller range of velocities. The controller must
+    // therefore refuse Execute.
     assert_eq!(rig.ask(FrameType::FrictionTable, &table(-0.3, 0.2, 0.0, 60.0)), DataStatus::NoError);
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
     assert_eq!(why(&rig), Some((2, 4, Quantity::FrictionVelocity)));
@@ -215,14 +217,15 @@ fn j36_temperature_is_asked_at_execute_and_j42_in_motion_the_nearest_column_is_u
 #[test]
 fn j42_friction_acts_at_the_commanded_velocity_not_at_the_measured_one() {
     let mut rig = rig();
-    // The torque in the friction table depends only on the velocity, and is equal to the number of the row.
+    // In this friction table, the torque depends only on the velocity. The torque is equal to the index of its row.
     let rows = floats((0..6).flat_map(|_| {
         let axis = |from: f32, to: f32| (0..20).map(move |i| from + (to - from) * i as f32 / 19.0);
         axis(-0.95, 0.95).chain(axis(0.0, 60.0)).chain((0..400).map(|i| (i / 20) as f32))
     }));
     assert_eq!(rig.ask(FrameType::FrictionTable, &rows), DataStatus::NoError);
     assert_eq!(load(&mut rig, 0, 1, &swing(0.3)), DataStatus::NoError);
-    // The measured velocity is far outside the friction table, so the controller must not look this velocity up in the table.
+    // The measured velocity is far outside the friction table. The controller must use the commanded velocity, and
+    // must not look up the measured velocity in the table.
     rig.nodes[4].report.velocity = -1.2;
     rig.exec(ExecCommand::Execute);
     for at in [130, 250, 420, 610] {
@@ -271,8 +274,8 @@ fn j34_the_start_is_checked_again_when_every_joint_is_enabled() {
     }
 }
 
-/// The result of the check must not change for trajectories that are already in use (19 columns of int16, 10 ms
-/// apart).
+/// For trajectory files that are already in use, the result of the check must not change. These files have 19 columns
+/// of int16, and their points are 10 ms apart.
 #[test]
 fn j36_the_existing_trajectories_keep_their_verdicts() {
     for (name, passes) in [("TrajectoryInt.csv", true), ("TrajectoryInt_Long.csv", false)] {
@@ -392,7 +395,7 @@ fn j36_j58_a_path_from_outside_the_limits_inwards_is_executed() {
             assert!(low >= lowest && high <= highest, "{from} to {to}: {low}..{high}");
         }
     }
-    // The controller refuses a path that moves further beyond the limit, or that begins too far beyond the limit.
+    // The controller must refuse a path that moves further out of the limits, or that begins too far outside.
     for (from, to) in [(1.165, 1.169), (-0.555, -0.56), (1.175, 0.8), (-0.575, 0.0)] {
         let mut rig = standing(from);
         let body = segment_body(3, 0, 1, 10, &quintic(from, to));

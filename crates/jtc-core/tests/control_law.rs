@@ -71,7 +71,8 @@ fn j40_gravity_is_a_setting() {
     for j in 0..6 {
         assert!((model(&down)[j] + model(&up)[j]).abs() < 1e-9);
     }
-    // At position zero, the arm is stretched vertically. Joint 1 is loaded only if gravity is horizontal.
+    // At position zero, the arm is stretched vertically. Gravity loads joint 2 (index 1) only if gravity is
+    // horizontal.
     assert!(model(&down)[1].abs() < 1.0);
     assert!(model(&sideways)[1].abs() > 50.0);
 }
@@ -163,7 +164,8 @@ fn j44_no_torque_step_at_any_switch() {
     let points: Vec<_> = (0..60).map(|_| rest(0)).collect();
     rig.upload(&points, 10);
     rig.send(FrameType::TrajSetExecStatus, &[3]);
-    // The permitted 1.5 N·m per tick cover the change of the integral and the blend over 100 ms.
+    // The permitted change of 1.5 N·m per tick covers the change of the integral and the blend of the torque over 100
+    // ms.
     run_without_steps(&mut rig, 1200, 1.5);
     assert_eq!(rig.trajectory(), TrajectoryState::Finish);
     rig.send(FrameType::TeachingModeEnable, &[]);
@@ -184,15 +186,15 @@ fn j25_teaching_compensates_gravity_and_damps_what_moves() {
     rig.run(150);
     rig.run(100);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
-    // The joint has more friction than Teaching requires, so Teaching adds only damping. It also compensates half of
-    // the Coulomb friction.
+    // The Coulomb friction of this joint is so high that Teaching adds no dry friction (J-25). Teaching adds only
+    // damping, and compensates half of the Coulomb friction.
     rig.nodes[2].report.velocity = 0.2;
     rig.run(3);
     let t = rig.controller.telemetry().joints[2];
     assert!((t.torque_other + 60.0 * 0.2).abs() < 0.01, "{t:?}");
     assert!(t.torque_friction > 1.0 && t.torque_friction < 6.0, "{t:?}");
     assert!((t.torque - t.torque_model - t.torque_friction - t.torque_other).abs() < 1e-9, "{t:?}");
-    // In Teaching, the torque never exceeds the torque limit of the joint.
+    // In Teaching, the torque must never exceed the torque limit of the joint, even close to the highest speed.
     rig.nodes[2].report.velocity = -1.999;
     rig.nodes[5].report.velocity = 1.999;
     rig.run(5);
@@ -273,7 +275,7 @@ fn j06_refused_parameters_change_nothing() {
     let mut polynomial = vec![0.0f32; 24];
     polynomial[23] = f32::NEG_INFINITY;
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &floats(polynomial)), DataStatus::IncorrectValue);
-    // In this table, the values of an axis of the last joint do not increase.
+    // In this table, two consecutive velocities of the last joint are equal, but velocities must increase strictly.
     let mut table: Vec<f32> = (0..6)
         .flat_map(|_| (0..20).map(|i| i as f32).chain((0..20).map(|i| i as f32)).chain((0..400).map(|_| 1.0)))
         .collect();

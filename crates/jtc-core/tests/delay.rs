@@ -141,8 +141,8 @@ impl ExactArm {
     fn holding(late: u8) -> Self {
         let mut rig = Rig::holding_with(delayed(late));
         rig.follow = false;
-        // The controller receives an answer of this tick in the next tick. The answer of this tick shows the effect of the command of the
-        // last tick.
+        // The controller receives an answer one tick after it was sent, and this answer shows the effect of the
+        // command of one tick before. The queue therefore has two entries fewer than `late`.
         Self { rig, here: [0.0; 6], past: vec![[0.0; 6]; usize::from(late) - 2].into() }
     }
 
@@ -178,7 +178,7 @@ impl ExactArm {
                     "an arm that is led is where it is to be: {joint:?}"
                 );
                 let pid = [joint.torque_p, joint.torque_i, joint.torque_d];
-                // The bus carries velocities in steps of 61 µrad/s.
+                // The bus carries velocities in steps of 61 µrad/s, so the torque is not exactly zero.
                 let quiet = pid.iter().all(|part| part.abs() < 0.05);
                 assert!(quiet, "{what}, tick {tick}, joint {}: {pid:?}, {joint:?}", j + 1);
             }
@@ -198,7 +198,8 @@ impl ExactArm {
     }
 }
 
-/// If an arm follows its set values exactly, the torque of the PID controller is zero when a motion begins, continues or ends.
+/// If an arm follows its set values exactly, the torque of the PID controller must be zero, also when a motion
+/// begins, continues or ends.
 #[test]
 fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
     const EXEC: FrameType = FrameType::TrajSetExecStatus;
@@ -257,7 +258,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
         }
         arm.rig.nodes[JOINT].report.velocity = velocity;
         arm.rig.nodes[JOINT].report.state = jtc_bus::NodeState::ENABLED;
-        // The joint continues its motion until the controller has received its answer.
+        // The joint continues its motion until the controller receives the answer with the enabled state.
         for _ in 0..900 {
             arm.past.push_front(arm.here);
             let seen = arm.past.pop_back().expect("as many as before");
@@ -364,9 +365,9 @@ fn j62_without_a_delay_the_present_set_value_is_compared() {
     assert!(moved > 0.2, "{moved} rad/s");
 }
 
-/// The prediction for a lost measurement is equal to this measurement. For an arm that follows its set values exactly, the torque of the
-/// PID controller is therefore zero. The loss may occur at any time in a motion with corners of the velocity, and the answers may have any
-/// age.
+/// The prediction for a lost measurement must be equal to this measurement. For an arm that follows its set values
+/// exactly, the torque of the PID controller is then zero. The loss may occur at any time, also when the acceleration
+/// changes suddenly, and the answers may have any age.
 #[test]
 fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
     for late in [2, 4, DELAY_MAX] {
@@ -382,14 +383,14 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
             }
             assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
         }
-        // The prediction uses the rate of the last 5 ms. This rate still contains a corner of the velocity up to 4 ms
-        // after the corner, which causes an error of the prediction.
+        // The prediction uses the rate over the last 5 ms. For some milliseconds after a sudden change of the
+        // acceleration, this rate still contains earlier positions, which causes an error of the prediction.
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }
 
-/// Measurements may be lost while position hold begins during a motion. The prediction continues as usual, because the restarted set values
-/// do not change the true motion.
+/// Measurements are lost while Teaching ends and the position hold begins during a motion. The set values restart,
+/// but the true motion does not change. The prediction must therefore continue without a step.
 #[test]
 fn j63_a_loss_over_the_end_of_teaching_makes_no_step() {
     for late in [2, 5] {

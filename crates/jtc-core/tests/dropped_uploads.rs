@@ -65,8 +65,8 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
                     (rig.state(), rig.trajectory()),
                     (ControllerState::HoldPos, TrajectoryState::Null)
                 );
-                // A client that continues the upload gets an error for each segment, and the controller never executes any part of the
-                // upload.
+                // If a client continues the dropped upload, the controller must refuse each segment, and must never
+                // execute any part of the upload.
                 for n in received..SEGMENTS {
                     assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NotAllowed, "segment {n}");
                     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed);
@@ -77,8 +77,8 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
     }
 }
 
-/// A Stop arrives in any tick while segments wait or are being processed. It drops these segments together with their
-/// upload.
+/// A Stop can arrive in any tick while segments wait or are being processed. It must drop these segments together
+/// with their upload.
 #[test]
 fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     for begun in 0..3 {
@@ -133,7 +133,7 @@ fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     rig.until(2_000, |rig| rig.trajectory() == TrajectoryState::Finish);
     rig.tick();
     assert_eq!(rig.controller.telemetry().point, 590);
-    // The next upload is possible, and the order of its segments is checked as usual.
+    // The next upload must be possible, and the controller must check the order of its segments as usual.
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 0, 10)), NoError);
     assert_eq!(rig.ask(FrameType::Trajectory, &segment(9, 2, 10)), IncorrectSegmentOrder);
 }
@@ -175,7 +175,8 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
             for ticks in [0, 1, 5, 19, 23] {
                 let case = format!("line {line}, segment {at}, {ticks} ms");
                 let mut rig = Rig::holding();
-                // The controller can no longer execute the earlier trajectory.
+                // The upload below replaces this trajectory, so the controller must not execute this trajectory
+                // later.
                 rig.upload(&[rest(0); 60], 10);
                 rig.plain = true;
                 rig.statuses.clear();
@@ -214,7 +215,8 @@ fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     for command in [None, Some(UrgentCommand::Pause), Some(UrgentCommand::Stop)] {
         let mut rig = Rig::holding();
         rig.plain = true;
-        // The Stop or Pause arrives before the upload. A Pause may also arrive during the upload.
+        // The Stop or Pause arrives before the upload and does not affect the upload. A Pause during the upload does
+        // not affect it either.
         if let Some(command) = command {
             rig.urgent(1, command);
             rig.run(3);
@@ -257,7 +259,7 @@ fn j58_joints_are_jogged_during_an_upload() {
             assert_eq!(jog(&mut rig), NoError, "after segment {n}");
             rig.run(100);
         }
-        // J-51: the line of segment 0 decides which data status the controller reports.
+        // J-51: the line of segment 0 determines the data status of the refused Execute.
         let refused = if plain { IncorrectValue } else { NotAllowed };
         assert_eq!(rig.exec(ExecCommand::Execute), refused, "not while joints are jogged");
         // A Stop ends the jog and also drops the upload.
@@ -270,8 +272,8 @@ fn j58_joints_are_jogged_during_an_upload() {
     }
 }
 
-/// The response record of an earlier Stop on the line does not hide a later Stop. Segment 0 between these two Stops was sent before the
-/// second Stop.
+/// Several Stops arrive, and segment 0 of an upload is sent before the last of these Stops. The last Stop must drop
+/// this upload, even while response records of the earlier Stops still wait.
 #[test]
 fn j30_each_of_several_stops_drops_the_upload_before_it() {
     for frames_first in 0..2 {

@@ -1,5 +1,5 @@
-//! Tests of enabling (J-16): the controller enables joints only while the arm is almost at rest. If a joint moves nevertheless, this joint
-//! comes to rest without a torque step.
+//! Tests of enabling (J-16): the controller enables joints only while the arm is almost at rest. If a joint moves
+//! when it is enabled, the joint comes to rest without a torque step.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -9,8 +9,8 @@ use rig::Rig;
 
 const JOINT: usize = 1;
 
-/// Swings joint 1 in Error, after the cause of the error has ended and the host has cleared it. `report` maps the true position and
-/// velocity to the reported position and velocity.
+/// Swings joint 2 while the controller is in Error. The cause of the error has ended, and the host has cleared the
+/// error. `report` maps the true position and velocity to the reported position and velocity.
 fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     let start = rig.nodes[JOINT].report.position;
     for k in 0..ticks {
@@ -63,7 +63,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
                 rig.nodes[..6].iter().all(|n| n.report.state == NodeState::READY),
                 "which the status shows"
             );
-            // The controller enables a joint only after the joint has been slow for 50 ms.
+            // The controller may enable the joints only after joint 2 has been slow for 50 ms.
             let from = rig.sent.len();
             swing(&mut rig, 49, 0.2, report);
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
@@ -151,7 +151,7 @@ fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     assert!((400..=410).contains(&ticks), "{ticks} ms");
 }
 
-/// If a joint leaves OperationEnable after it was enabled, this is still an error, whether the arm moves or not.
+/// If a joint leaves OperationEnable after it was enabled, this must be an error, whether the arm moves or not.
 #[test]
 fn j16_the_gate_hides_no_joint_that_leaves_operation_enable() {
     let mut rig = Rig::holding();

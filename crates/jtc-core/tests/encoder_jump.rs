@@ -33,7 +33,8 @@ fn cause(rig: &mut Rig) -> Option<StopCause> {
     rig.info().reactions.expect("reported").stop.map(|(cause, _)| cause)
 }
 
-/// A held arm does not move when an encoder jumps. The jump causes a held stop, and the status shows the cause.
+/// A held arm must not move when an encoder jumps. The jump must cause a held stop, and the status must show the
+/// cause.
 #[test]
 fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     let mut random = Random(35);
@@ -59,7 +60,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// An arm in motion does not follow a jump of an encoder either. The arm comes to rest on its true path.
+/// If an encoder jumps during a motion, the arm must not follow the jump. It must come to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -120,7 +121,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert!((position - arm.q[0] - 0.05).abs() < 2e-4, "{position} of {}", arm.q[0]);
 }
 
-/// A wrong reading of an encoder that is shorter than five answers is not a jump.
+/// A wrong encoder reading that lasts for fewer than five answers must not count as a jump.
 #[test]
 fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     for ticks in 1..5 {
@@ -134,7 +135,8 @@ fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     }
 }
 
-/// A person who moves the arm by hand does not feel the jump. Teaching ends, and the controller holds the arm at its present position.
+/// A person moves the arm by hand when an encoder jumps, and must not feel the jump. Teaching must end, and the
+/// controller must hold the arm at its present position.
 #[test]
 fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -170,8 +172,8 @@ fn j35_a_speed_of_another_scale_is_a_held_stop() {
     }
 }
 
-/// The controller cannot hold a joint whose encoder moves while the motor is at rest. The drive of such a joint misbehaves, which is an
-/// error.
+/// If an encoder changes while the motor is at rest, the controller cannot hold this joint. It must therefore report
+/// an error of the drive.
 #[test]
 fn j35_an_encoder_that_slips_is_an_external_error() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -198,9 +200,8 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump is rarely a single step. A jump may pass through a value in between, or consist of two parts. It may
-/// coincide with lost answers or with a jump of another joint, and it may go back. In all these cases, the arm does
-/// not move.
+/// A jump does not always occur in a single step. It can pass through an intermediate value, consist of two parts, go
+/// back, or coincide with lost answers or with a jump of another joint. In all these cases, the arm must not move.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     // Each course contains offsets of joints 2 and 4 from the true position (rad), each with its start time (ms). The second element of a
@@ -237,8 +238,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer with a wrong position and a wrong speed does not count as a jump, and the controller does not use this
-/// answer.
+/// If both the position and the speed of an answer are wrong, the controller must not use this answer, and must not
+/// count it as a jump.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {
@@ -286,8 +287,8 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
                 *last = now;
             }
         }
-        // The positions in this test contain much noise. The noise may look like a push and end the jog, which is
-        // permitted in this test.
+        // The positions in this test contain so much noise that the controller may detect a push and end the jog.
+        // Only a detected jump or a wrong scale is a fault.
         let kind = cause(&mut rig).map(|cause| cause.kind);
         let alarm = matches!(kind, Some(StopKind::EncoderJump | StopKind::SpeedScale));
         assert!(!alarm && rig.state() == ControllerState::HoldPos, "seed {}: {kind:?}", seed + 1);
@@ -295,7 +296,8 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     }
 }
 
-/// In Teaching, a hand twists the gears before the motors begin to turn. The controller must not take this twist for a slipping encoder.
+/// In Teaching, a hand twists the gears before the motors begin to turn. The controller must not detect this twist as
+/// a slipping encoder.
 #[test]
 fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     for stiffness in [3_400.0, 10_000.0] {

@@ -1,5 +1,5 @@
-//! Tests of the bounds of friction parameters from a host (J-06, J-42). The controller accepts all values of arms with these drives, and
-//! refuses values that would throw an arm.
+//! Tests of the bounds of friction parameters from a host (J-06, J-42). The controller accepts all values that occur
+//! on arms with these drives. It refuses values with which the friction compensation itself would drive the arm.
 use crate::rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};
@@ -49,7 +49,8 @@ fn friction_on_a_path(rig: &mut Rig) -> Vec<[u64; 6]> {
         .collect();
     rig.execute(&points);
     let mut torques = Vec::new();
-    // The list begins with the first friction torque, because the number of ticks until a response record arrives may differ.
+    // The list begins with the first friction torque. The number of ticks before it is not compared, because a
+    // response record may arrive after a different number of ticks.
     while torques.len() < 500 {
         rig.tick();
         let torque = rig.controller.telemetry().joints.map(|j| j.torque_friction.to_bits());
@@ -67,11 +68,13 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&known)), DataStatus::NoError);
     let four = known.map(|[c0, c1, c2, c3, ..]| [c0, c1, c2, c3]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&four)), DataStatus::NoError);
-    // An existing host sends the rows of its file from left to right, so the coefficients have the reverse order.
+    // An existing host sends the coefficients of its file from left to right, so their order is reversed. The
+    // controller must accept these coefficients as well.
     let reversed = known.map(|[a, b, c, d, e, f]| [f, e, d, c, b, a]);
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&reversed)), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::FrictionTable, &table_wire(&tables())), DataStatus::NoError);
-    // The friction is zero, contains noise around standstill, or acts in only one direction.
+    // The controller also accepts friction that is zero, that contains noise around standstill, or that acts in only
+    // one direction.
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &wire(&[[0.0; 6]; 6])), DataStatus::NoError);
     for table in [
         table_of(-0.95, |_| 0.0),
@@ -83,7 +86,8 @@ fn j06_the_friction_of_the_known_arm_is_taken_in_every_form() {
     }
 }
 
-/// The controller refuses the frame, and the friction torque on a path is the same as without the frame.
+/// Checks that the controller refuses the frame, and that the friction torque on a path is then the same as without
+/// the frame.
 fn refused_whole(what: &str, frame_type: FrameType, body: &[u8]) {
     let (mut asked, mut quiet) = (Rig::holding(), Rig::holding());
     assert_eq!(asked.ask(frame_type, body), DataStatus::IncorrectValue, "{what}");
@@ -146,7 +150,8 @@ fn j06_the_bounds_of_friction_are_settings() {
 #[test]
 fn j06_a_polynomial_is_bounded_at_slow_speeds_too() {
     let limits = Config::avena().joints.map(|joint| joint.torque_max);
-    // At 0.02 rad/s, the torque is 1.7 times the torque limit against the motion, and 0.78 times this limit along the motion.
+    // At 0.02 rad/s, the torque of the first polynomial is 1.7 times the torque limit against the motion. The torque
+    // of the second polynomial is 0.78 times this limit along the motion.
     for shares in [
         [1.946984127, -12.050370370, 21.744197531, -10.161740153],
         [-1.017777778, 12.327407407, -22.332839506, 10.155720165],

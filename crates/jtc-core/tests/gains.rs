@@ -154,8 +154,9 @@ fn causes(rig: &mut Rig) -> u16 {
     rig.status().joints.iter().fold(0, |all, joint| all | joint.internal)
 }
 
-/// The swing has no external cause. The integral is too strong for the inertia of the joint, and the checks of the controller cannot detect
-/// this in advance. The arm swings within the two seconds of the trial, and the controller restores the earlier gains.
+/// The arm begins to swing because the integral is too strong for the inertia of the joints. The checks of the
+/// controller cannot detect this in advance. The arm swings within the two seconds of the trial, and the controller
+/// restores the earlier gains.
 #[test]
 fn j71_gains_that_make_the_arm_swing_are_taken_back() {
     // The last gains in this list cause so little torque that only the growth of the swing is detected.
@@ -166,7 +167,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         let from = arm.q;
         let swinging = of([[kp, ki, kd]; 6]);
         assert_eq!(give(&mut arm, &mut rig, &swinging), DataStatus::NoError);
-        // The trial begins at rest. A touch is sufficient to start a swing.
+        // The arm is at rest when the trial begins. A short, light push is sufficient to start the swing.
         arm.run(&mut rig, 550);
         arm.push = [10.0, 20.0, 15.0, 5.0, 4.0, 4.0];
         arm.run(&mut rig, 30);
@@ -177,7 +178,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         assert_eq!(rig.state(), ControllerState::HoldPos, "{kp} {ki} {kd}");
         assert_eq!(found(&rig), StopKind::Gains, "{kp} {ki} {kd}: causes {causes:#x}");
         assert!(farthest < 0.05, "{kp} {ki} {kd}: {farthest} rad");
-        // The controller holds the arm again with the earlier gains.
+        // After the clear, the controller must hold the arm with the earlier gains.
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
         arm.run(&mut rig, 1_000);
         let before = shipped();
@@ -190,8 +191,8 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
     }
 }
 
-/// If a push overloads a joint while gains are on trial, the controller must restore the earlier gains. After the trial, a push does not
-/// change the gains.
+/// If a push overloads a joint during a trial of gains (J-71), the controller must restore the earlier gains. After
+/// the trial, a push must not change the gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     for (wait, taken_back) in [(600, true), (1_700, true), (2_300, false)] {
@@ -215,8 +216,8 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     }
 }
 
-/// A joint swings with a growing amplitude, far below its torque limit. The controller replaces gains on trial by the earlier gains. The
-/// controller keeps gains that have passed their trial.
+/// An external force makes a joint swing with a growing amplitude, far below its torque limit. During a trial of
+/// gains, the controller must restore the earlier gains. After the trial, it must keep the new gains.
 #[test]
 fn j71_a_swing_that_grows_ends_the_trial() {
     for (wait, taken_back) in [(600, true), (2_300, false)] {
@@ -311,8 +312,8 @@ fn stiffness_when_pushed(arm: &mut Plant, rig: &mut Rig) -> f64 {
     stiffness(rig, 0)
 }
 
-/// During a trial, the operator presses the emergency stop because the arm shakes, or a drive reports a fault. The controller does not
-/// enable the arm again with the gains on trial.
+/// During a trial of gains, the operator presses the emergency stop because the arm shakes, or a drive reports a
+/// fault. When the controller enables the arm again, it must use the earlier gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
     for (wait, taken_back) in [(1_000, true), (2_300, false)] {
@@ -368,8 +369,8 @@ fn j71_teaching_does_not_end_a_trial() {
     assert_eq!(found(&rig), StopKind::Gains);
 }
 
-/// After Disable, the host may set gains, model and settings that do not match. The controller does not store such an
-/// arm. Here the joints have too little inertia for the gains.
+/// After Disable, the controller accepts gains, model and settings that do not match, but it does not store such an
+/// arm. In this test, the rotors have too little inertia for the gains.
 #[test]
 fn j71_an_arm_that_would_be_refused_is_not_stored() {
     use FrameType::{Disable, SetSettings, StoreArm};
@@ -384,8 +385,8 @@ fn j71_an_arm_that_would_be_refused_is_not_stored() {
     assert_eq!(rig.ask(StoreArm, &[]), DataStatus::IncorrectValue);
 }
 
-/// If gains, model and settings do not match, the controller refuses the last of these frames, which then has no effect. After Disable, a
-/// host can upload another arm in any order.
+/// Gains, model and settings arrive in separate frames. If they do not match, the controller refuses the frame that
+/// arrives last, and this frame must have no effect. After Disable, a host can upload another arm in any order.
 #[test]
 fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     use FrameType::{
@@ -416,7 +417,7 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     assert_eq!(rig.ask(FrictionPolynomialUseDefault, &[]), good);
     rig.clear(true, 0);
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // Each slice of a model takes a separate tick, so that no tick becomes too long.
+    // The controller processes a model in parts, each in a separate tick, so that no tick becomes too long.
     rig.send(ArmModelUseDefault, &[]);
     let ticks = rig.until(100, |rig| rig.waiting() == 0);
     assert!((18..=20).contains(&ticks), "{ticks}");
@@ -435,7 +436,7 @@ fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
 }
 
 /// Two joints swing with new gains, so the controller restores the earlier gains. The swing of the second joint began
-/// before this change, so the controller must not soften the restored gains because of this swing.
+/// with the new gains. The controller must therefore not soften the restored gains because of this swing.
 #[test]
 fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
     let mut config = Config::avena();

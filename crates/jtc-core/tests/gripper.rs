@@ -41,8 +41,8 @@ fn pump(rig: &mut Rig, on: bool) {
     rig.run(2);
 }
 
-/// Executes ticks and checks that the gripper does not disturb the arm. The arm has no error and does not change its state, and at most
-/// about one of 20 ticks sends another frame than Move.
+/// Executes ticks and checks that the gripper does not disturb the arm. The arm must have no error and keep its
+/// state, and at most about one of 20 ticks may send a frame other than a Move.
 fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {
@@ -64,7 +64,7 @@ fn j23_a_gripper_that_falls_silent_is_shown_and_nothing_more() {
         let status = rig.status();
         assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, FLAG, FLAG));
         assert_eq!((status.errors, status.occurred, status.node_init), (0, 0, 1 << GRIPPER));
-        // The gripper and its pump have been on all the time, so the gripper has kept its workpiece.
+        // The gripper did not answer for a time, but its pump has been on, so the gripper has kept its workpiece.
         rig.nodes[GRIPPER].silent = false;
         undisturbed(&mut rig, 300, state);
         let status = rig.status();
@@ -144,7 +144,8 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         pump(&mut rig, true);
         assert!(rig.pump);
     }
-    // A joint causes the controller to return to Init. After this, the pump must not start without a command either.
+    // A joint changes back to Init, and the controller therefore returns to Init. When the controller reaches HoldPos
+    // again, the pump must not start without a command.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.state = NodeState::INIT;
@@ -210,7 +211,8 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
-        // The gripper still holds its workpiece after Init.
+        // A joint loses its configuration, so the controller returns to Init. The gripper must hold its workpiece all
+        // the time.
         rig.nodes[2].configured = false;
         rig.nodes[2].report.state = NodeState::INIT;
         rig.run(400);
@@ -241,8 +243,8 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     );
 }
 
-/// A pump command that arrives during the bring-up of the gripper is executed after the bring-up. The gripper does not execute a command
-/// that arrived before its reset.
+/// A pump command that arrives during the bring-up of the gripper takes effect after the bring-up. After a restart of
+/// the gripper, an earlier command has no effect.
 #[test]
 fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     let mut rig = Rig::new(Config::avena());

@@ -103,8 +103,9 @@ fn j25_an_arm_with_a_payload_that_the_model_lacks_stays_where_it_was_found() {
     }
 }
 
-/// A hand moves the arm to another pose at 0.2 rad/s and lets go of it. In this pose, friction holds the torque that neither the learned
-/// load nor the model explains. If friction cannot hold this torque, the arm creeps.
+/// A hand moves the arm to another pose at 0.2 rad/s and lets go of it. In the new pose, neither the model nor the
+/// learned load explains the whole torque, and friction must hold the rest. The arm must stay in its pose, or creep
+/// if the friction is too low.
 #[test]
 fn j25_where_a_hand_lets_go_the_arm_stays_or_creeps() {
     for arm in arms() {
@@ -169,8 +170,8 @@ fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     None
 }
 
-/// The controller does not learn a push of 2 s as a load, but learns a push of 12 s. When the push ends, no joint
-/// becomes faster than 0.6 rad/s.
+/// The controller must not learn a push of 2 s as a load, but it learns a push of 12 s. When the push ends, no joint
+/// may become faster than 0.6 rad/s.
 #[test]
 fn j25_a_lean_that_ends_drives_no_joint_fast() {
     let (ur5, z1, avena) = (ArmFile::ur5(), ArmFile::z1(), ArmFile::avena());
@@ -195,8 +196,8 @@ fn j25_a_lean_that_ends_drives_no_joint_fast() {
     }
 }
 
-/// All joints are pushed at once, up to the highest torque that the controller learns as a load. When the person lets
-/// go, no joint becomes faster than 0.6 rad/s.
+/// A person pushes all joints at once, with up to the highest torque that the controller learns as a load. When the
+/// person lets go, no joint may become faster than 0.6 rad/s.
 #[test]
 fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     println!("seed 3");
@@ -242,9 +243,10 @@ fn j25_a_push_dies_out() {
     }
 }
 
-/// The push is a quarter of the torque limit. Against the push, the controller uses at most three tenths of the
-/// torque limit. In wrist joints, the push is an eighth of the limit. The rotors of wrist joints have so little
-/// inertia that a stronger push would cause over-speed.
+/// A hand pushes a joint towards the end of its range with a quarter of its torque limit, and the joint must not
+/// leave its range. Against the push, the controller uses at most three tenths of the limit. For wrist joints, the
+/// push is an eighth of the limit, because their rotors have little inertia and a stronger push would cause
+/// over-speed.
 #[test]
 fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     for arm in arms() {
@@ -269,7 +271,8 @@ fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     }
 }
 
-/// Teaching ends when a push ends. The set values are at rest within 500 ms, no joint reaches its torque limit, and no error is raised.
+/// Teaching ends at the moment at which a push ends. The set values must be at rest within 500 ms, no joint may reach
+/// its torque limit, and no error may occur.
 #[test]
 fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     for friction in [0.7, 1.0, 1.3] {

@@ -61,8 +61,8 @@ fn j25_a_joint_that_is_led_too_fast_is_held_and_not_released() {
     assert!(ended >= 4, "{ended}");
 }
 
-/// If a hand continues to push while the arm is held, the controller learns the push as a load. When the hand lets go, the learned load
-/// moves the joint slowly over a small distance, and then fades.
+/// If a hand continues to push a held arm, the controller learns the push as a load. When the hand lets go, the
+/// learned load may move the joint only slowly and over a small distance, and must then fade.
 #[test]
 fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
     for (arm, joint, share) in [
@@ -95,8 +95,8 @@ fn j68_a_load_that_was_a_hand_does_not_drive_a_joint_for_long() {
     }
 }
 
-/// Answers of a joint that a hand moves are lost. The torque of the springs fades, followed by damping and friction compensation, because
-/// the last speed is too old. The torque has no step.
+/// The answers of a joint are lost while a hand moves the joint. First the torque of the springs fades, and then the
+/// damping and the friction compensation, because the last known speed is too old. The torque must have no step.
 #[test]
 fn j25_the_torque_of_a_joint_that_does_not_answer_fades() {
     let base = ArmFile::avena();
@@ -131,8 +131,8 @@ fn j25_the_torque_of_a_joint_that_does_not_answer_fades() {
     assert!(step < 0.45 * damped.abs() && last < -0.6 * damped.abs(), "{step} N·m, {last} N·m");
 }
 
-/// A hand repeatedly lifts a payload that is not configured, at speeds at which the arm would also rise without the hand. Teaching still
-/// holds the payload after this.
+/// A hand repeatedly lifts a payload that is not configured. At these speeds, the learned load alone would also lift
+/// an arm without the payload. Teaching must still hold the payload afterwards.
 #[test]
 fn j25_a_payload_that_is_lifted_slowly_is_still_carried() {
     let arm = ArmFile::avena();
@@ -160,8 +160,9 @@ fn j25_a_payload_that_is_lifted_slowly_is_still_carried() {
     assert!(least > 0.5, "{least} of the payload is left");
 }
 
-/// A clamp holds a joint away from its commanded position, with up to a quarter of its torque limit. At its beginning, Teaching uses only
-/// the part of the clamp torque that was learned. The learned torque fades when a hand moves the joint away from the clamp.
+/// A clamp holds a joint away from its commanded position, with up to a quarter of the torque limit of the joint. The
+/// controller has learned a part of this torque as a load, and Teaching begins with this part. The learned torque
+/// fades when the clamp is opened and a hand moves the joint away.
 #[test]
 fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
     for (arm, joint, share) in
@@ -184,7 +185,8 @@ fn j25_a_clamp_is_carried_as_a_load_and_goes_when_the_arm_is_led() {
             most = most.max(plant.push[joint].abs());
         }
         let about = format!("{} joint {} {share} of the limit", arm.name, joint + 1);
-        // With weak gains, the controller may have detected the clamp as a push before Teaching.
+        // With weak gains, the controller may have detected the clamp as a push before. Teaching must begin
+        // nevertheless.
         assert_eq!(rig.state(), ControllerState::Teaching, "{about}");
         assert!(most <= (share.abs() + 0.06) * limit, "{about}: {most} N·m");
         // The clamp is opened, and a hand moves the joint away from the clamp by half a radian.

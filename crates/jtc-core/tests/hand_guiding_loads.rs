@@ -54,8 +54,8 @@ fn j25_j60_a_payload_that_is_given_and_taken_away_leaves_no_load() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// The controller learns a payload in a pose in which its full load acts on a joint. The host then configures this payload in the upright
-/// pose, in which the payload does not cause a load. Teaching uses the weight of the payload only once.
+/// The controller learns a payload in a pose in which its full load acts on a joint. In the upright pose, in which
+/// the payload causes no load, the host then configures this payload. Teaching must not use its weight twice.
 #[test]
 fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.3), 4_000);
@@ -97,8 +97,9 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// A joint has lowered a load of any cause (J-70), and the controller has learned the torque of the damper. When the
-/// load is then removed, no joint may leave its position range.
+/// A joint lowers a load that it cannot hold (J-70). The load that the controller learns meanwhile also contains the
+/// torque that has damped the joint. When the load is then removed in Teaching, no joint may leave its position
+/// range.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -197,8 +198,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
     assert!(ended <= 4, "{ended} of 144 ended Teaching");
 }
 
-/// A hand lifts a payload that is not configured, and knocks against the arm. Teaching still holds the payload after
-/// this.
+/// A hand lifts a payload that is not configured, and knocks against the arm. Teaching must still hold the payload
+/// afterwards.
 #[test]
 fn j25_a_payload_that_is_lifted_is_still_carried() {
     for (arm, mass, joint, way) in [
@@ -239,7 +240,7 @@ fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     assert!(way < 0.01 && speed < 0.05, "{way} rad, {speed} rad/s");
 }
 
-/// The arm file specifies friction, but the simulated arm has no friction. Teaching still damps the arm.
+/// The arm file specifies friction, but the simulated arm has no friction. Teaching must damp the arm nevertheless.
 #[test]
 fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     for arm in [ArmFile::avena(), ArmFile::z1(), ArmFile::rough_ur5()] {
@@ -265,7 +266,7 @@ fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     }
 }
 
-/// While the arm comes to rest, the controller refuses the next motion and new gains.
+/// While the arm comes to rest after hand guiding, the controller must refuse the next motion and new gains.
 #[test]
 fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     let arm = ArmFile::avena();
@@ -376,7 +377,7 @@ fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     assert!(way > 0.3 && speed < 0.6, "{way} rad, {speed} rad/s");
 }
 
-/// The load torque in Teaching is equal to the learned load, and acts completely at rest.
+/// In Teaching, the load torque must be equal to the whole learned load while the arm is at rest.
 #[test]
 fn j25_the_load_that_was_found_is_carried() {
     let arm = ArmFile::avena();
@@ -390,8 +391,8 @@ fn j25_the_load_that_was_found_is_carried() {
     }
 }
 
-/// The arm puts down a payload that is not configured. The arm then rises slowly until the controller detects that only the learned load
-/// drives the arm.
+/// In Teaching, a payload that is not configured is taken off the arm. The learned load then moves the arm slowly
+/// upwards, until the controller detects that only this load drives the arm.
 #[test]
 fn j25_an_arm_whose_payload_is_put_down_rises_slowly_and_stops() {
     for (mass, friction) in [1.0, 3.0].into_iter().flat_map(|m| [0.7, 1.0, 1.3].map(|f| (m, f))) {

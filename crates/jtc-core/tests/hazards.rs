@@ -26,7 +26,8 @@ fn j16_drives_that_lost_their_supply_are_configured_again() {
     rig.defaults();
     rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.state == NodeState::INIT);
     rig.run(1);
-    // An emergency stop also cuts the supply of the drives. The drives are configured, but still in Init.
+    // An emergency stop also cuts the supply of the drives. At this time, the drives are configured but still in
+    // Init. They must be configured again afterwards.
     rig.safety_input = false;
     rig.run(3);
     for node in &mut rig.nodes {
@@ -196,7 +197,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
-    // The controller still refuses a trajectory outside the limits.
+    // After Teaching, the controller must still refuse a trajectory outside the limits.
     rig.ask(FrameType::TeachingModeDisable, &[]);
     rig.run(300);
     rig.follow = true;
@@ -208,7 +209,7 @@ fn j43_an_arm_beyond_a_position_limit_is_held_and_can_be_taught_back() {
 
 #[test]
 fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
-    // While the other joints come to rest after Teaching, a joint that has sagged is enabled.
+    // A joint that has sagged is enabled late, while the other joints come to rest after Teaching.
     let mut rig = Rig::with_a_slow_drive(roomy(Config::avena(), 100.0));
     rig.run(50);
     rig.ask(FrameType::TeachingModeEnable, &[]);
@@ -227,7 +228,7 @@ fn j44_a_joint_that_is_enabled_late_starts_from_its_model_torque() {
         let t = rig.controller.telemetry().joints[2];
         assert!((t.torque - t.torque_model).abs() < 1.0 || t.state != NodeState::ENABLED, "{t:?}");
     }
-    // The bounds of the integral in this frame exclude zero.
+    // In this frame, the range from the lower to the upper bound of the integral does not contain zero.
     let mut rig = Rig::new(Config::avena());
     rig.defaults();
     rig.send(FrameType::PidParam, &floats((0..6).flat_map(|_| [100.0, 10.0, 1.0, 1.0, 2.0])));
@@ -300,7 +301,8 @@ fn j12_the_first_frame_after_an_error_is_move_in_init_too() {
             "instead of {:?} in tick {tick}",
             healthy[tick]
         );
-        // The controller has only postponed the frame, and sends it after the clear.
+        // The emergency stop has only postponed the frame of the bring-up. The controller must send this frame after
+        // the clear.
         rig.safety_input = true;
         rig.clear(true, 0x7F);
         rig.run(300);
@@ -363,13 +365,14 @@ fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
     assert!((last - 1.2 * before).abs() < 0.02 * before.abs(), "{before} to {last}");
 }
 
-/// A torque that alternates between its two limits never stays long at one of them. It is an error nevertheless.
+/// A torque that alternates between its two limits stays at each limit only for a short time. The controller must
+/// detect this as an error nevertheless.
 #[test]
 fn j43_torque_that_swings_between_its_limits_is_an_error() {
     for held_ms in [0, 1_000] {
         let swung = swings_until_error(held_ms);
-        // Directly after enabling, the controller takes the first half swing for a load that it must catch. The error
-        // may then come up to 10 ticks later.
+        // Directly after enabling, the controller treats the first half of a swing as a load that it must catch. The
+        // error may therefore come up to 10 ticks later.
         assert!((10..=40 + 10 * usize::from(held_ms == 0)).contains(&swung), "{swung}");
     }
 }
@@ -386,7 +389,8 @@ fn swings_until_error(held_ms: usize) -> usize {
     rig.follow = false;
     let mut swung = 0;
     for k in 0..200 {
-        // A position error of 4 mrad causes 32 N·m at a Kp of 8000. The sign of this error changes every 8 ms.
+        // At a Kp of 8000, a position error of 4 mrad causes a torque of 32 N·m. The sign of the position error
+        // changes every 8 ms.
         rig.nodes[0].report.position = if (k / 8) % 2 == 0 { 4e-3 } else { -4e-3 };
         rig.tick();
         if rig.state() == ControllerState::Error {

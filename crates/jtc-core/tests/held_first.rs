@@ -25,7 +25,7 @@ fn way(arm: &Plant) -> f64 {
 }
 
 /// In the first tick of HoldPos, and while the load swings, the controller does not know the load of the arm.
-/// Teaching must not begin yet.
+/// Teaching must wait until the controller holds the load.
 #[test]
 fn j25_teaching_waits_until_the_load_is_held() {
     for factor in [0.3, 1.0] {
@@ -38,7 +38,8 @@ fn j25_teaching_waits_until_the_load_is_held() {
             rig.send(FrameType::TeachingModeEnable, &[]);
             arm.run(&mut rig, 3_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0), "after {after} ms");
-            // With a third of the modelled friction, the arm creeps under the remaining load.
+            // With a third of the modelled friction, the arm creeps because of the part of the load that the
+            // controller has not learned.
             let most = if factor == 1.0 { 0.03 } else { 0.1 * 3.0 };
             assert!(way(&arm) < most, "after {after} ms, friction times {factor}: {} rad", way(&arm));
         }
@@ -78,8 +79,8 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
-/// A drive enables its joint seconds later than the other drives. The load of this joint swings and disturbs the
-/// other joints, so the controller must catch the loads of the other joints again.
+/// A drive enables its joint seconds later than the other drives. The load of the late joint then swings and disturbs
+/// the other joints. The controller must catch the loads of these joints again.
 #[test]
 fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     for late in [1, 2] {
@@ -98,8 +99,8 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// The gains of this test make a control loop unstable although no unmodelled load swings. The controller tolerates a
-/// swing while it catches a load, but must not tolerate this swing.
+/// While the controller catches the load of a joint that was just enabled, it tolerates a swing of this joint. It
+/// must not tolerate a swing that unstable gains cause.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {
@@ -122,7 +123,8 @@ fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
         };
         let (without, with) = (fastest(0), fastest(1_000));
         println!("{kp} {ki} {kd}: {without} without a catch, {with} rad/s with one");
-        // The speed of the joint stays below the velocity limit, and far below the speed at which a drive trips.
+        // Even while the controller tolerates a swing, the speed of the joint must stay below the velocity limit, and
+        // far below the speed at which a drive switches off.
         assert!(with < 1.5, "{kp} {ki} {kd}: {with} rad/s, {without} without a catch");
     }
 }

@@ -23,7 +23,7 @@ fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Resu
     // In each tick, the joints of the rig are at the commanded positions of the previous tick.
     let mut rig = Rig::new(Config { delay_ticks: 1, ..config.clone() });
     rig.defaults();
-    // The default friction is valid only for slower joints.
+    // The default friction is valid only for slower joints, so the test uses zero friction.
     rig.send(FrameType::FrictionPolynomial, &floats([0.0; 24]));
     rig.run(700);
     assert_eq!(rig.state(), ControllerState::HoldPos);
@@ -66,7 +66,8 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
         }
         config
     };
-    // The wire format cannot represent the last two limits exactly. A client sends the nearest value above or below the limit.
+    // The wire format cannot represent the velocity limits 3.15 and 3.2 rad/s exactly. A client sends the nearest
+    // value, which is slightly above or below the limit.
     for (config, first, last) in
         [(Config::avena(), 590, 700), (fast(3.15, 20.0), 735, 850), (fast(3.2, 20.0), 735, 850)]
     {
@@ -93,8 +94,8 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
     }
 }
 
-/// A Stop, a Pause, a released key or missing Jog frames end a jog within 520 ms, even at the velocity limit. The
-/// same time limit applies to a Stop on a path.
+/// A Stop, a Pause, a released key or missing Jog frames must bring a jog to rest within 520 ms, even at the velocity
+/// limit. The same time limit applies to a Stop on a path.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {
@@ -127,8 +128,8 @@ fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     }
 }
 
-/// A Stop arrives on another line while a jog key is pressed. The arm comes to rest, and moves again only after the operator has released
-/// the key.
+/// A Stop or Pause arrives while a jog key is pressed. The arm must come to rest, and may move again only after the
+/// operator has released the key.
 #[test]
 fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     for (line, command) in [(0, UrgentCommand::Stop), (1, UrgentCommand::Stop), (1, UrgentCommand::Pause)] {
@@ -152,7 +153,8 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
             let speed = rig.controller.telemetry().joints[0].set_velocity;
             assert!(ms < 520 || speed == 0.0, "{ms} ms: {speed} rad/s");
         }
-        // The controller accepts the command that ends a jog, and this command does not count as a pressed key.
+        // A Jog with rate 0 ends a jog. The controller accepts it and does not treat it as a pressed key, so the next
+        // Jog moves the joint.
         rig.run(400);
         assert_eq!(rig.ask(FrameType::Jog, &body(0.0)), DataStatus::NoError);
         rig.run(110);
@@ -162,9 +164,9 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     }
 }
 
-/// A simulated arm with a load that the controller knows is jogged in random poses at any rate. Either one joint moves at its velocity
-/// limit, or all joints move. No torque reaches its limit, and the arm comes to rest within the permitted time. If the controller refuses a
-/// jog, only little torque remains for a motion.
+/// A simulated arm with a load that the controller knows is jogged in random poses. Either one joint moves, at any
+/// rate up to its velocity limit, or all joints move. No torque may reach its limit, and the arm must come to rest
+/// within the permitted time. The controller may refuse a jog only if little torque remains for a motion.
 #[test]
 fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     let seed = 11;
@@ -224,9 +226,9 @@ fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of {TRIALS} refused; at most {:.0} % of a torque limit", 100.0 * most);
 }
 
-/// Joint 2 needs nearly all of its torque limit to hold its load. The controller refuses to lift the load, to lower the load towards a pose
-/// with a higher load, and to move joint 3 outwards. The controller accepts a motion downwards that reduces the load. If half of the torque
-/// limit remains, the controller executes every jog as commanded.
+/// Joint 2 needs nearly all of its torque limit to hold its load. The controller must refuse each jog that increases
+/// this load: upwards, downwards to a pose with a higher load, and joint 3 outwards. It must accept a jog downwards
+/// that reduces the load. If half of the torque limit remains, it must execute every jog.
 #[test]
 fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unloads_it_is_taken() {
     let model = Parameters::avena().model;
@@ -271,8 +273,8 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
     }
 }
 
-/// When the next jog begins, the Stop or the end of the last jog counts as completed, even if a person touches a joint. The controller must
-/// not take this jog for a failed stop.
+/// When the next jog begins, the Stop or the end of the last jog counts as completed, even if a person touches a
+/// joint. The controller must not treat the motion of the new jog as a stop that has failed.
 #[test]
 fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     let body = |rate: f32| floats([rate, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -309,8 +311,8 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     }
 }
 
-/// An arm carries 3.5 or 4 kg. An operator holds a key down that moves joint 2 outwards, until the controller stops
-/// the joint. No error occurs, and enough torque remains for the motion back.
+/// An arm carries 3.5 or 4 kg. An operator holds down a key that moves joint 2 outwards, until the controller stops
+/// the joint. No error may occur, and enough torque must remain for the motion back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     for (mass, seconds) in [(3.5, 20), (4.0, 20)] {
@@ -338,8 +340,8 @@ fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     }
 }
 
-/// The computation of the torque that remains for a jog takes time. Therefore the controller processes only one Jog per tick, whether it
-/// refuses this Jog or not.
+/// The controller needs time to compute the torque that remains for a jog. It therefore processes only one Jog frame
+/// per tick, even if it refuses this frame.
 #[test]
 fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     let pose = [0.0, 1.2, 0.2, 0.0, 0.0, 0.0];
@@ -388,8 +390,9 @@ fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     }
 }
 
-/// An operator presses, changes and releases keys of several joints in random poses. The flange never exceeds the tool speed limit, and
-/// reaches this limit if a single joint moves. The test computes the flange speed from the poses of the flange in consecutive ticks.
+/// An operator presses, changes and releases keys of several joints in random poses. The flange must never exceed the
+/// tool speed limit, and must reach this limit if a single joint moves. The test computes the speed of the flange
+/// from its poses in consecutive ticks.
 #[test]
 fn j58_a_jog_keeps_to_the_tool_speed_limit() {
     const LIMIT: f64 = 0.25;

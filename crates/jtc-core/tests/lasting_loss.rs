@@ -152,8 +152,8 @@ fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
     }
 }
 
-/// A joint that is stuck does not follow its command. If the arm loses its torque for this reason, and the next answers are missing, the
-/// prediction must not move the joint back.
+/// A joint is stuck and does not follow its command, so the controller switches the torque off. If the next answers
+/// of the joint are missing, the predicted position must stay at the true position of the joint.
 #[test]
 fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     for velocity in [0.25, -0.25] {
@@ -166,7 +166,7 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
         assert_eq!(rig.state(), ControllerState::Error);
         let stuck = rig.nodes[JOINT].report.position;
         for k in 1..=4 {
-            // The answer to the Move of this tick was also lost.
+            // In each tick, the test also drops the answer that is still on its way.
             rig.drop_answers(JOINT);
             rig.tick();
             let t = rig.controller.telemetry().joints[JOINT];
@@ -176,8 +176,8 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     }
 }
 
-/// Missing acknowledgements in four of five ticks do not cause a transmit timeout. If a joint fails during this time, the controller does
-/// not predict its motion for longer than usual.
+/// If four of five Moves are not acknowledged, no transmit timeout occurs. If a joint fails during this time, the
+/// controller must not predict its motion for longer than usual.
 #[test]
 fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
     for start in 0..5 {
@@ -195,8 +195,8 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // In the first tick after the failure, the answer to the previous Move still arrives. After the first tick, five Moves get
-                // no answer.
+                // In the first tick after the failure, the answer to the previous Move still arrives. The next five
+                // Moves get no answer, and the error occurs after the fifth of them.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

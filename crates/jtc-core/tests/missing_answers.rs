@@ -139,7 +139,7 @@ fn j63_lost_answers_make_no_torque_step() {
             let faulty = run(motion, Fault::Lost { ms });
             let worst = worst_step(&clean, &faulty);
             assert!(worst < 1.0, "{motion:?}, {ms} answers lost: {worst} N·m");
-            // The position that the control law used was correct all the time.
+            // With lost answers, the control law must use nearly the same position as without lost answers.
             for (clean, faulty) in clean.iter().zip(&faulty) {
                 let off = (clean.position - faulty.position).abs();
                 assert!(off < 2e-4, "{motion:?}, {ms} answers lost: {off} rad");
@@ -158,8 +158,8 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
         }
         rig.run(3);
         rig.nodes[JOINT].glitch = 0.3;
-        // An answer arrives one tick after its Move. The controller tolerates four implausible answers, and the fifth implausible answer is
-        // an error.
+        // An answer arrives one tick after its Move. The controller must tolerate four consecutive implausible
+        // answers, and the fifth must be an error.
         rig.run(5);
         assert_eq!((rig.state(), rig.errors()), (state, 0));
         assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);
@@ -190,7 +190,8 @@ fn j63_silence_and_implausible_answers_count_together() {
         }
         rig.tick();
         assert_eq!(rig.errors(), NODE_ERROR, "{max}");
-        // After a usable answer, the count of missing answers starts again at zero.
+        // A usable answer sets the count of missing answers to zero, so repeated losses with usable answers in
+        // between are not an error.
         let mut rig = Rig::holding_with(Config { missed_moves_max: max, ..Config::avena() });
         for tick in 0..500 {
             rig.nodes[JOINT].silent = tick % u32::from(max) != 0;
@@ -200,8 +201,8 @@ fn j63_silence_and_implausible_answers_count_together() {
     }
 }
 
-/// A drive that does not know its exact position yet may later correct its position by a sector. This change of the
-/// position must not be an error.
+/// A drive that does not know its exact position yet may later correct its position suddenly. This correction must
+/// not be an error.
 #[test]
 fn j35_a_position_that_becomes_accurate_may_jump() {
     let mut rig = Rig::new(Config::avena());
@@ -225,7 +226,8 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         let from = rig.sent.len();
         rig.until(30, |r| r.state() == ControllerState::Error);
         assert_eq!(rig.status().can_current, 1 << (8 + node));
-        // The answer to the last Move before the silence still arrives. After the answer to the last Move, five answers are missing.
+        // The answer to the last Move before the silence still arrives. Only after this answer do five answers have
+        // to be missing.
         let moves = rig.sent[from..].iter().take_while(|r| matches!(r, Request::Move { .. })).count();
         assert!(moves >= 5);
         let mut rig = Rig::holding();

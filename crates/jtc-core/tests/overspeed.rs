@@ -53,7 +53,8 @@ fn j35_a_glitch_or_a_speed_within_the_limit_is_no_error() {
 #[test]
 fn j35_answers_that_are_missing_neither_count_nor_excuse() {
     let mut config = Config { overspeed_ms: 3, ..Config::avena() };
-    // The prediction of the missing answers needs torque, and this test does not test the torque limit.
+    // While answers are missing, the controller counteracts the predicted motion, which needs torque. The torque
+    // limit is very high, because an overload is not a subject of this test.
     config.joints[3].torque_max = 1e6;
     let mut rig = Rig::holding_with(config);
     rig.nodes[3].report.velocity = 1.9;

@@ -10,7 +10,8 @@ use crate::rig::{Rig, floats};
 
 /// Time after which a test checks the end state, ms.
 const WATCH_MS: usize = 6_000;
-/// Silence of all hosts that host supervision tolerates, ms. The start of each activity takes less time than this silence.
+/// Time without a frame from any host that host supervision tolerates, ms. The start of each activity takes less
+/// time, so it does not trigger host supervision.
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
 /// Simulated arm without brakes, and its controller.

@@ -1,5 +1,5 @@
-//! Tests of the gains and models that the controller accepts, and of the states in which it accepts these parameters. Accepted parameters
-//! must not throw a held arm (J-06).
+//! Tests of the gains and models that the controller accepts, and of the states in which it accepts these parameters.
+//! Accepted parameters must not cause a sudden motion of a held arm (J-06).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -21,7 +21,8 @@ fn torques(rig: &Rig) -> [u64; 6] {
     rig.controller.telemetry().joints.map(|j| j.torque.to_bits())
 }
 
-/// Checks that the controller refuses the frame, and that the arm is then held as without the frame, in every bit.
+/// Checks that the controller refuses the frame, and that the torques are then identical in every bit to the torques
+/// without the frame.
 fn refused_without_a_trace(frame_type: FrameType, body: &[u8], what: &str) {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -82,7 +83,7 @@ fn j06_gains_in_use_are_taken() {
         let mut rig = Rig::holding();
         assert_eq!(rig.ask(FrameType::PidParam, &gains_body(gains)), DataStatus::NoError, "{gains:?}");
     }
-    // The controller accepts these gains for an arm with more joint inertia.
+    // For an arm with more joint inertia, the controller must accept these high gains.
     let mut config = Config::avena();
     config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 2.0);
     let mut rig = Rig::holding_with(config);
@@ -147,14 +148,14 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     };
     let mut rig = Rig::new(Config::avena());
     rig.run(100);
-    // The last of these three parameters would end Init.
+    // The controller leaves Init after the last of these three parameters. The test therefore sends only two of them.
     assert_eq!(rig.ask(frames[0].0, frames[0].1), DataStatus::NoError);
     assert_eq!(rig.ask(frames[4].0, frames[4].1), DataStatus::NoError);
     assert_eq!(rig.state(), ControllerState::Init);
     let mut rig = Rig::holding();
     check(&mut rig, ControllerState::HoldPos, DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    // First, the integral releases the load that it contained with the last model.
+    // Teaching begins only after the integral has released the load that it contained with the last model.
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
@@ -169,7 +170,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
 
 #[test]
 fn j30_a_segment_is_not_copied_on_after_an_error() {
-    // The error occurs at each stage of the copy.
+    // The test causes an error at different stages of the copy.
     for ticks in [1, 5, 15, 25, 29, 33, 37] {
         let mut rig = Rig::holding();
         let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
@@ -266,7 +267,7 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
                     "nothing moves later"
                 );
             }
-            // A new Execute is not cancelled, so the path is executed.
+            // The Stop or Pause has cancelled only the earlier Execute, so the controller executes the path now.
             assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError);
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
@@ -291,7 +292,8 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
         for (j, limits) in Config::avena().joints.iter().enumerate() {
             let torque = t.joints[j].torque;
             prop_assert!(torque.abs() <= limits.torque_max);
-            // The torque changes smoothly over 100 ms. The slope is at most 1.5 times the slope of a straight line over the whole range.
+            // The torque changes smoothly over 100 ms. Its slope is at most 1.5 times the slope of a straight line
+            // from one torque limit to the other.
             let step = (torque - last[j]).abs();
             prop_assert!(step <= 2.0 * limits.torque_max * 0.015 + 0.1, "joint {}: {} N·m", j + 1, step);
             last[j] = torque;
@@ -299,7 +301,8 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     }
     if !accepted {
         quiet.run(300);
-        // The number of ticks until the response record arrived may differ, but the position hold does not differ.
+        // The two rigs may have executed different numbers of ticks before their response records arrived. The
+        // torques of the position hold must be equal nevertheless.
         let (a, b) = (asked.controller.telemetry(), quiet.controller.telemetry());
         for j in 0..6 {
             prop_assert!((a.joints[j].torque_model - b.joints[j].torque_model).abs() < 1e-9);

@@ -92,8 +92,8 @@ proptest! {
     }
 }
 
-/// When the host sets the payload that the arm carries, the model takes over the torque of the load from the
-/// integral. The arm does not move.
+/// When the host sets the payload that the arm carries, the torque of the load moves from the integral to the model.
+/// The arm must not move.
 #[test]
 fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     for pose in POSES {
@@ -109,7 +109,7 @@ fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
                 .fold(0.0, |a: f64, t| a.max(t.abs()))
         };
         let before = missing(&rig);
-        // Friction holds a part of the load.
+        // Friction holds a part of the load, so the integral contains only the rest.
         assert!(before > 4.0, "{before} N·m at {pose:?}");
         assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
         let from = arm.q;
@@ -124,7 +124,8 @@ fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     }
 }
 
-/// If Teaching uses the estimated mass of a payload and the host then sets this payload, the arm stays balanced.
+/// Teaching uses the mass of a payload that the controller has estimated. When the host sets this payload, the arm
+/// must stay balanced.
 #[test]
 fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found() {
     for pose in [POSES[0], POSES[2]] {
@@ -140,7 +141,8 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
         let from = arm.q;
         arm.run(&mut rig, 3_000);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
-        // The learned load is correct except for the friction.
+        // Friction causes an error of the learned load. At most a fifth of this load may therefore remain in addition
+        // to the payload.
         let most = was_found.iter().fold(0.0, |most: f64, found| most.max(found.abs()));
         let telemetry = rig.controller.telemetry();
         for j in 0..6 {
@@ -152,8 +154,8 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
     }
 }
 
-/// A small payload must not make Teaching drop the remaining load. The test sets half of the learned load, and several small payloads in
-/// succession.
+/// If the host sets a payload that is smaller than the learned load, Teaching must still hold the rest of the load.
+/// The test sets several payloads in succession, up to half of the load.
 #[test]
 fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
     for pose in [POSES[0], POSES[2]] {
@@ -175,12 +177,14 @@ fn j60_teaching_waits_until_the_payload_is_in_the_model() {
     let mut rig = holding_at(&POSES[0]);
     assert_eq!(set(&mut rig, &point_mass(1.0)), DataStatus::NoError);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    // Teaching also waits until the integral has released the torque that it contained for the payload, 3 s later.
+    // After the blend, Teaching waits another 3 s, until the integral has released the torque that it contained for
+    // the payload.
     let waited = rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     assert!((BLEND + 2_900..=BLEND + 3_100).contains(&waited), "{waited} ms");
 }
 
-/// An Execute after a Pause also waits for the blend, because the model must not change on a path.
+/// After a Pause, the host sets a payload and then sends Execute. The path must wait for the end of the blend,
+/// because the model must not change on a path.
 #[test]
 fn j60_an_execute_waits_until_the_payload_is_in_the_model() {
     let mut rig = Rig::holding();
@@ -217,8 +221,8 @@ fn j60_j58_joints_are_not_jogged_on_the_way_and_a_payload_is_not_set_while_they_
     assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
 }
 
-/// The controller refuses a payload that a joint cannot hold in its present position, or that is not a valid body. The controller never
-/// applies a refused payload in part.
+/// The controller must refuse a payload that a joint cannot hold in its present position, or that is not a valid
+/// body. It must never apply a part of a refused payload.
 #[test]
 fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);
@@ -247,7 +251,8 @@ fn j60_a_payload_is_taken_whole_or_refused() {
         assert_eq!(set(&mut rig, &bad), DataStatus::IncorrectValue, "{bad:?}");
         assert_eq!(rig.controller.config().payload, good);
     }
-    // If the present payload is too heavy, the controller accepts a reduction of this payload. The payload is now being blended out.
+    // While a payload is being blended out, its remaining part may be too heavy for the arm. The controller must
+    // accept a further reduction of the payload.
     rig.run(BLEND);
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
@@ -256,8 +261,8 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     assert_eq!(set(&mut rig, &Payload::NONE), DataStatus::NoError);
 }
 
-/// The payload remains set after errors and new models. If the arm has no torque, the payload changes at once. The payload is not part of
-/// the arm.
+/// The payload must remain set after errors and new models. Without torque, a change of the payload takes effect at
+/// once. The payload is not part of the arm.
 #[test]
 fn j60_the_payload_stays_through_errors_and_new_models() {
     let payload = point_mass(1.5);
@@ -296,8 +301,8 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(arm(rig.controller.config()), arm(&of_the_bench));
 }
 
-/// The controller refuses a model if the torque limits cannot hold the arm with its present payload. Without a
-/// payload, it also refuses a model that is too heavy.
+/// The controller must refuse a model if the torque limits cannot hold this model with the present payload. Without a
+/// payload, it must also refuse a model that is too heavy.
 #[test]
 fn j06_j60_a_model_is_held_with_its_payload() {
     let mut rig = holding_at(&POSES[1]);
@@ -347,8 +352,8 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// The host may set the learned load as a payload, or send this load in a new model. Teaching then does not use this load twice. An arm
-/// that no hand moves keeps its position.
+/// The host sets the learned load as a payload, or sends it in a new model, just before Teaching. Teaching must not
+/// use this load twice, so an arm that no hand moves must keep its position.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {
@@ -380,7 +385,8 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// A centre of mass without a mass is not a payload, and does not reduce the load in Teaching.
+/// If the host sets a centre of mass but no mass, this is not a payload. It must not reduce the load that Teaching
+/// holds.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -19,7 +19,7 @@ fn path() -> Vec<RawPoint> {
             point(0, 0.25 * (1.0 - cos), 0.25 * w * sin, 0.25 * w * w * cos)
         })
         .map(|mut p| {
-            // The path begins and ends at rest.
+            // The velocity is zero at the start and at the end, so the path begins and ends at rest.
             p.velocity[1..].fill(0);
             p
         })
@@ -109,7 +109,7 @@ fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
             "{name}"
         );
         assert_eq!(rig.errors(), 0, "{name}");
-        // The new trajectory is loaded, and begins at the present position of the arm.
+        // The new trajectory begins at the present position of the arm, so the controller accepts Execute.
         rig.nodes[2].slow_enable = false;
         assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NoError, "{name}");
     }
@@ -154,7 +154,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         let to = if stops { TrajectoryState::Stop } else { TrajectoryState::Execute };
         assert_eq!(rig.trajectory(), to, "plain {plain}, segment {segment}, {} points", points.len());
     }
-    // If the arm does not move, the controller treats a plain line like any other line.
+    // In states without a commanded motion, segment 0 on a plain line has the same effect as on any other line.
     for (name, leave) in [
         ("Teaching", (|rig: &mut Rig| rig.send(FrameType::TeachingModeEnable, &[])) as fn(&mut Rig)),
         ("Error", |rig| rig.press_stop(1)),
@@ -169,7 +169,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         assert_eq!(rig.ask(SEGMENT, &segment), DataStatus::IncorrectValue, "{name}");
         assert_eq!(rig.state(), before, "{name}");
     }
-    // A host can replace paused, stopped and finished paths as usual.
+    // Segment 0 replaces a paused, stopped or finished path at once, on a plain line as on any other line.
     for plain in [true, false] {
         let mut rig = moving(1_000);
         rig.exec(ExecCommand::Pause);
@@ -198,7 +198,7 @@ fn j30_j56_a_replay_stops_where_segment_0_on_a_plain_line_has_stopped() {
         rig.run(7);
     }
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // The log of this recorder contains the motion until the new points arrive.
+    // The flight recorder has recorded the motion until the new points arrive, and a replay must reproduce it.
     let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
     let mut moving = Rig::holding();
     moving.upload(&path(), 10);
@@ -277,8 +277,9 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     }
 }
 
-/// If an upload is dropped, the data status for the client depends on the line when segment 0 arrived. This is also
-/// true if the client was silent for 2 s after that.
+/// If a Stop drops an upload, the state of the line when segment 0 arrived determines the data status of the later
+/// segments. A client with extensions gets NotAllowed, even if its line has become plain because the client was
+/// silent for 2 s.
 #[test]
 fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     let mut rig = Rig::holding();
@@ -289,9 +290,9 @@ fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
 }
 
-/// After one client has executed a trajectory, another client may execute the same trajectory again. The controller
-/// does not know whether this other client can handle data statuses above 6. The data status of its Execute therefore
-/// also depends on its own line.
+/// Several clients can execute the same trajectory, one after another. The controller does not know whether the
+/// client of a later Execute can handle data statuses above 6. The data status of an Execute therefore also depends
+/// on the line of this Execute.
 #[test]
 fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     for plain in [true, false] {
@@ -346,7 +347,8 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
             config.joints[3].acceleration_max = 8.0;
             let mut rig = Rig::holding_with(config);
             rig.plain = true;
-            // The controller does not execute an earlier valid trajectory instead.
+            // Before the refused trajectory, the test uploads a valid one. The controller must not execute the valid
+            // trajectory instead of the refused one.
             rig.upload(&[rest(0); 60], 10);
             assert_eq!(uploaded(&mut rig, &points, segments), vec![DataStatus::NoError; segments], "{case}");
             assert_eq!(
@@ -372,7 +374,8 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
                 }
             }
             assert!(rig.controller.violation().is_some_and(|v| v.joint == 3), "{case}");
-            // The response to a Stop is the same as for any trajectory that is not executed. The next upload is possible after this Stop.
+            // As for any trajectory that is not being executed, the controller refuses a Stop. After this Stop, the
+            // next upload is possible.
             assert_eq!(rig.exec(ExecCommand::Stop), DataStatus::IncorrectValue);
             assert_eq!(uploaded(&mut rig, &vec![rest(0); 60], segments), vec![DataStatus::NoError; segments]);
             assert_eq!(rig.controller.violation(), None);
@@ -403,7 +406,8 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
                 continue;
             }
             assert_eq!(rig.ask(SEGMENT, &body(2)), DataStatus::NoError);
-            // The data status is 6 (wrong content) on both lines, also for a client that knows all data statuses.
+            // The data status of Execute is 6 (wrong content) on every line. A client that knows all data statuses
+            // gets the same data status.
             for (line, plain) in [(0, true), (0, false), (1, true), (1, false)] {
                 rig.plain = plain;
                 rig.statuses.clear();
@@ -440,7 +444,8 @@ fn j30_j36_only_content_is_taken_on_a_plain_line() {
     }
 }
 
-/// The snapshots of the flight recorder contain the result of the check, so a replay refuses the Execute too.
+/// The snapshots of the flight recorder contain the result of the check. The replay must therefore refuse the
+/// Execute, like the device.
 #[test]
 fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
     let (_, points, error) = broken().remove(0);

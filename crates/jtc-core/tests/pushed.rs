@@ -62,9 +62,9 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     }
 }
 
-/// Series of random pushes on an arm. Its masses are wrong by up to 10 %, and its friction is wrong by up to 20 %.
-/// Each push lasts 50 ms to 1 s. Its torque is 60 to 100 % of the remaining torque of the joint, multiplied by
-/// `share`.
+/// Series of random pushes on an arm. The masses of the arm differ from its model by up to 10 %, and its friction
+/// differs by up to 20 %. Each push lasts 50 ms to 1 s. The torque of a push is 60 to 100 % of the remaining torque
+/// of the joint, multiplied by `share`.
 #[derive(Clone, Copy)]
 struct Pushes {
     seed: u64,
@@ -196,10 +196,12 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
     assert_eq!(MOVING.released(&ArmFile::avena()), 0);
 }
 
-/// The test uses the arms as they were imported. The gains of these arms are weak, because the rotors were not measured. A push of 100 to
-/// 180 rad/s² accelerates a joint with weak gains to its over-speed within 12 ms. The speed that its drive reports is 8 ms old. Without
-/// supervision of the speed, more than 80 of these 192 pushes release the arm. With supervision of the reported speed alone, 18 pushes
-/// release the arm.
+/// The test uses the arms as they were imported. Their gains are weak, because their rotors were not measured. A push
+/// of 100 to 180 rad/s² accelerates such a joint to its over-speed within 12 ms, but the speed that its drive reports
+/// is 8 ms old.
+///
+/// Of these 192 pushes, more than 80 release the arm without supervision of the speed. With supervision of the
+/// reported speed alone, 18 pushes release the arm.
 #[test]
 fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
     let released =
@@ -208,9 +210,9 @@ fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a
     assert!(released.iter().flatten().sum::<usize>() <= 2, "{released:?}");
 }
 
-/// The rotor inertias in the arm files are only proposals. If the true rotor inertias are a half or a third of the proposals, the control
-/// loop of a yielding joint is too stiff. A yielding joint with low rotor inertia becomes softer and does not swing. Pushes of 24 to 40 %
-/// of the remaining torque do not release the arm.
+/// The rotor inertias in the arm files are only proposals. If the true inertias are a half or a third of them, the
+/// control loop of a yielding joint is too stiff at first. The joint must become softer and must not swing. Pushes of
+/// 24 to 40 % of the remaining torque must not release the arm.
 #[test]
 fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {
@@ -220,8 +222,9 @@ fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     }
 }
 
-/// Arms with elastic gears get the same pushes as in the other tests. The test prints the results, and over-speed must be the only cause of
-/// a release. In arms without friction, only the controller damps the gears, so some gears swing before the push.
+/// Arms with elastic gears get random pushes (see `Pushes`). The test prints the results. Over-speed must be the only
+/// cause of a release. In arms without friction, only the controller damps the gears, so some gears swing before the
+/// push.
 #[test]
 fn j66_j68_arms_with_elastic_gears_are_pushed() {
     let slick = [ArmFile::avena(), ArmFile::ur5(), ArmFile::z1()].map(|arm| (arm.slick(), 3e4));
@@ -246,8 +249,8 @@ fn j66_j68_arms_with_elastic_gears_are_pushed() {
     }
 }
 
-/// If a person pushes repeatedly, or back and forth, the joint still resists with its full torque. The controller
-/// must not take these pushes for the swing of a joint with less inertia than in the arm file.
+/// A person pushes a joint repeatedly, or back and forth. The controller must not take these pushes for the swing of
+/// a joint with less inertia than in the arm file. The joint must still resist with its full torque.
 #[test]
 fn j68_a_joint_that_is_shaken_stays_held() {
     for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
@@ -281,9 +284,9 @@ fn j68_a_joint_that_is_shaken_stays_held() {
     }
 }
 
-/// A joint hits a wall with a stiffness of 3,000 or 20,000 N·m/rad. From 200 ms after the detection, the drive
-/// presses the joint against the wall with at most the configured share of its torque limit. The result is a held
-/// stop.
+/// A joint hits a wall with a stiffness of 3,000 or 20,000 N·m/rad, which must cause a held stop. From 200 ms after
+/// the detection, the drive may press the joint against the wall with at most the configured share of its torque
+/// limit.
 #[test]
 fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     let model = Parameters::avena().model;
@@ -328,8 +331,8 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     }
 }
 
-/// A hand moves joint 2 up by 1 rad in 5 s, through a stiff spring. The joint resists with at most the configured
-/// share of its torque limit. When the hand lets go, the arm stays in its pose.
+/// A hand moves joint 2 up by 1 rad in 5 s, through a stiff spring. The joint may resist with at most the configured
+/// share of its torque limit. When the hand lets go, the arm must stay in its pose.
 #[test]
 fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     let model = Parameters::avena().model;
@@ -351,8 +354,8 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     assert!((arm.q[1] - there).abs() < 0.06 && fastest(&arm) < 0.01, "{} rad", arm.q[1] - there);
 }
 
-/// Joints lower loads of 90 to 110 % of a torque limit slowly, until the arm is in balance. If needed, the whole
-/// torque limit acts against the motion. The controller never switches the torque off.
+/// Joints must slowly lower loads of 90 to 110 % of a torque limit, until the arm is in balance. If needed, they use
+/// the whole torque limit against the motion. The controller must never switch the torque off.
 #[test]
 fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     let model = |mass: f64| loaded(Parameters::avena().model, mass);
@@ -394,8 +397,8 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     }
 }
 
-/// The gains that hold an arm with 2 kg that are not configured are too weak, or make a control loop unstable. The
-/// controller must not drop the arm.
+/// The arm carries 2 kg that are not configured. Its gains are too weak to hold it, or make a control loop unstable.
+/// The controller must not drop the arm.
 #[test]
 fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     for times in [
@@ -422,8 +425,8 @@ fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     }
 }
 
-/// According to the model, these random motions need 95 % of a torque limit. The true arms are heavier and have more friction, and the
-/// controller does not release any arm.
+/// According to the model, these random motions need 95 % of a torque limit. The true arms are heavier and have more
+/// friction. The controller must slow the motion down (J-75), and must not release any arm.
 #[test]
 fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
     println!("seed 21");

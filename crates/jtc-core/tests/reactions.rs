@@ -29,7 +29,7 @@ fn bench(moving: bool) -> Rig {
 fn bench_with(mut config: Config, moving: bool) -> Rig {
     config.joints[3].torque_max = 2_000.0;
     let mut rig = Rig::holding_with(config);
-    // In the first second, the controller may still catch the load of joints that were just enabled (J-43).
+    // In the first second after enabling, the controller may still be catching the load of the joints (J-43).
     rig.run(1_000);
     if moving {
         rig.move_along(&path(), 500);
@@ -60,7 +60,7 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     let mut rig = bench(true);
     push(&mut rig, 0.097);
     rig.run(2);
-    // While a joint yields, the host cannot clear the stop, and the other joints stop on the path.
+    // While joint 4 yields, the host cannot clear the held stop, and the other joints stop on the path.
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
     rig.run(400);
     let t = rig.controller.telemetry();
@@ -75,12 +75,12 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(status.joints[3].internal_occurred, joint_error::POSITION_ERROR);
     assert_eq!(status.occurred & error::EMERGENCY_OUTPUT, 0);
 
-    // The arm does not move until the host has cleared the stop.
+    // Until the host has cleared the stop, the controller must refuse every motion.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::Jog, &floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])), DataStatus::NotAllowed);
     settle(&mut rig);
-    // If the arm is not at the paused point, the controller refuses to continue the path. If the arm is back at the paused point, the path
-    // continues after an approach.
+    // If the arm is not at the paused point, the controller must refuse to continue the path. If the arm is near this
+    // point again, the path continues after an approach.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     push(&mut rig, 0.012);
     settle(&mut rig);
@@ -97,8 +97,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.controller.telemetry().joints[4].set_position, rad(path()[400].position[4]));
 }
 
-/// When a joint begins to yield, its torque falls within 10 ms to the torque of a weak spring. During this time, the torque has no step
-/// upwards, and the spring follows the joint to any position.
+/// When a joint begins to yield, its feedback torque falls within 10 ms to at most a share (0.3) of the torque limit.
+/// Afterwards the torque stays within this share at any position of the joint, and has no step.
 #[test]
 fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     let mut rig = bench(false);
@@ -123,8 +123,8 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
-/// When a joint is calm again after a push, the controller holds it at its present position, without a torque step. After the third push,
-/// the joint yields until the host clears the stop.
+/// When a joint has calmed down after a push, the controller must hold it at its present position, without a torque
+/// step. After the third push, the joint yields until the host clears the stop.
 #[test]
 fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides() {
     let mut rig = bench(false);
@@ -139,7 +139,8 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
             assert!((torque - last).abs() < 250.0, "a step from {last} to {torque}");
             last = torque;
         }
-        // A held joint pulls towards its hold position. The spring of a yielding joint pulls the joint back.
+        // A yielding joint has a spring that pulls it back with more than 10 N·m. A joint that is held at its present
+        // position has no such torque.
         let yields = rig.controller.telemetry().joints[3].torque < -10.0;
         assert_eq!(yields, time == 3, "time {time}: {} N·m", rig.controller.telemetry().joints[3].torque);
     }
@@ -221,8 +222,8 @@ fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_
     assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NoError);
 }
 
-/// While the arm brakes, it need not follow its path exactly. However, the controller still detects a push away from the present point of
-/// the path.
+/// While the arm brakes, it need not follow its path exactly. If path time is at rest and a person pushes the arm
+/// away from this point of the path, the controller must nevertheless detect the push.
 #[test]
 fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_brakes() {
     let mut rig = bench(true);
@@ -238,8 +239,8 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_bra
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
 }
 
-/// A joint that is stuck does not follow its command. If the controller holds the arm for this reason, and the next answers are missing,
-/// the prediction must not move the joint back.
+/// A joint is stuck and does not follow its command, so the controller holds the arm. If the next answers of the
+/// joint are missing, the predicted position must stay at the true position of the joint.
 #[test]
 fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
     let mut config = Config::avena();

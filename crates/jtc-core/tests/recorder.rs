@@ -91,14 +91,15 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(ticks.last(), Some(&(error + u64::from(AFTER_ERROR_MS))));
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "every tick once");
 
-    // The log does not change when the error ends, when another error occurs, or while time passes.
+    // After the log has stopped, it must not change when the error ends, when another error occurs, or while time
+    // passes.
     let before = blocks(&rig);
     rig.clear(true, 0x7F);
     rig.run(600);
     rig.press_stop(1);
     rig.run(1_000);
     assert_eq!((blocks(&rig), recorder(&rig).state()), (before.clone(), LogState::Error));
-    // A reset of any kind does not change the log either.
+    // A reset of any kind must not change the log either.
     for failed in [false, true] {
         let memory = rig.recorder.take().unwrap().into_memory();
         rig.recorder = Some(Recorder::new(memory, failed));
@@ -107,13 +108,13 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     rig.send(FrameType::ClearLog, &[]);
     rig.run(5);
     assert_eq!(recorder(&rig).state(), LogState::Recording);
-    // An error that is still latched when the new log begins does not count as its first error.
+    // When the new log begins, the old error is still latched. This error must not stop the new log.
     rig.run(1_000);
     assert_eq!(recorder(&rig).state(), LogState::Recording);
 }
 
-/// An emergency stop that is pressed while the device starts counts as an error. The log of a later error must not be lost because of this
-/// early error.
+/// An emergency stop while the device starts is an error and stops the log. When the torque comes on, a new log must
+/// begin, so that the recorder can record a later error.
 #[test]
 fn j56_a_log_without_torque_gives_way_when_torque_comes_on() {
     let mut rig = recorded();
@@ -198,7 +199,8 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
     assert!(cuts > 200, "{cuts}");
 }
 
-/// After any changes in the memory, a reader returns only data that were written, and all data that are complete.
+/// After any damage of the memory, the reader must return only data that were written. It must return all data from
+/// undamaged blocks that follow a snapshot.
 #[test]
 fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     let mut rig = holding();
@@ -214,13 +216,14 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
         damaged[block][word] ^= 1 << bit;
         let (left, _) = contents(&damaged);
         assert!(left.iter().all(|tick| known.contains(tick)), "block {block}, word {word}, bit {bit}");
-        // A reader can still read a snapshot after the damage, and all data after this snapshot.
+        // After the damaged block, the reader must return the next snapshot and all data that follow it.
         let behind = whole[block + 1..].iter().position(|block| block[3] as u16 != 0xFFFF);
         if let Some(first) = behind.map(|first| block + 1 + first) {
             assert!(left.ends_with(&contents(&whole[first..]).0));
         }
     }
-    // The log is read with blocks that are missing at its start or end, and from words that are not a log.
+    // The test removes blocks at the start or at the end of the log. The reader must return only ticks of the
+    // remaining blocks.
     for cut in 0..whole.len() {
         assert!(ticks.ends_with(&contents(&whole[cut..]).0));
         assert!(ticks.starts_with(&contents(&whole[..cut]).0));
@@ -233,7 +236,8 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     for n in 0..50 {
         let mut noise = whole.clone();
         for block in &mut noise {
-            // In every second case, the heads of the blocks stay unchanged.
+            // In this test, the memory contains random words. In every second case, the heads of the blocks stay
+            // unchanged. The reader must not panic.
             block[if n % 2 == 0 { 5 } else { 0 }..].fill_with(&mut next);
         }
         contents(&noise);
@@ -286,10 +290,10 @@ fn j56_a_log_is_read_in_pages_while_recording_rests() {
     rig.run(2_500);
     let before = blocks(&rig);
     let read = fetched(&mut rig);
-    // Recording continued until the host requested the first page.
+    // The host must get all ticks before its request of the first page, and at most a few more.
     let (before, read) = (contents(&before).0, contents(&read).0);
     assert!(read.starts_with(&before) && read.len() < before.len() + 10);
-    // Recording continues without a command when the pause is over, and begins with a snapshot.
+    // After the pause, recording must continue without a command, and must begin with a snapshot.
     let rested = rig.controller.telemetry().tick;
     rig.run(2_500);
     let ticks = replayed(&rig);
@@ -305,7 +309,7 @@ fn j56_an_error_is_recorded_also_while_a_host_reads() {
     page(&mut rig, 0, 0);
     rig.press_stop(1);
     let error = rig.controller.telemetry().tick;
-    // The host continues to read pages.
+    // The host continues to read pages, but this must not pause the recording after an error.
     for _ in 0..20 {
         page(&mut rig, 0, 0);
     }
@@ -372,7 +376,7 @@ fn j56_a_payload_on_its_way_is_replayed() {
     let blocks = blocks(&rig);
     let first = contents(&blocks).1.into_iter().find(|tick| *tick > given).expect("a snapshot");
     assert!(first < given + 300, "it comes while the payload is on its way: {given} {first}");
-    // The replay uses a controller without a payload.
+    // The controller of the replay has no payload at first. It must get the payload from the snapshot.
     let mut other = Rig::new(Config::avena());
     other.defaults();
     let replay = Replay::new(Log::new(&blocks), other.controller, None);
@@ -381,7 +385,8 @@ fn j56_a_payload_on_its_way_is_replayed() {
     assert_eq!(replayed(&rig).last(), Some(&rig.controller.telemetry().tick));
 }
 
-/// If an emergency stop at power-up is cleared at once, it does not stop the log. The log continues when the arm then has torque.
+/// An emergency stop at power-up would stop the log after 300 ms. If the error is cleared and the torque comes on
+/// before that time, the log continues.
 #[test]
 fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     let mut rig = Rig::new(Config::avena());
@@ -402,8 +407,8 @@ fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     assert!(replayed(&rig).contains(&error));
 }
 
-/// A tick may contain a read request together with other requests. The replay processes these requests in their
-/// order, although its controller has no recorder.
+/// In some ticks, hosts send a read request together with another request. The replay must process the requests in
+/// their order, although its controller has no recorder.
 #[test]
 fn j56_requests_beside_others_are_replayed_in_their_turns() {
     let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
@@ -455,8 +460,9 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
     rig
 }
 
-/// A replay has no memory to store an arm, so it refuses a StoreArm at once. The replay does not report this refusal as a difference of the
-/// controller, even with a snapshot in between. After the next snapshot, all outputs are equal.
+/// A device needs several ticks to store an arm. A replay has no memory for an arm and refuses a StoreArm at once.
+/// The replay must not report this as a difference, even if a snapshot is taken while the device stores the arm.
+/// After the next snapshot, all outputs must be equal.
 #[test]
 fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
     for state in [ControllerState::Init, ControllerState::HoldPos] {

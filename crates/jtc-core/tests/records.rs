@@ -67,7 +67,8 @@ fn j04_a_stop_acts_while_a_long_frame_is_executed() {
     let mut rig = moving();
     rig.exec(ExecCommand::Pause);
     rig.until(400, |r| r.trajectory() == TrajectoryState::Pause);
-    // The controller processes this segment in many slices. During these slices, the controller discards the path.
+    // The controller needs many ticks to process this segment. A Stop that arrives meanwhile must take effect at
+    // once, but its response record must come last.
     let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
     rig.statuses.clear();
     rig.send(FrameType::FrictionTableUseDefault, &[]);
@@ -96,9 +97,10 @@ fn j04_a_stop_cancels_the_execute_before_it_and_not_the_one_after() {
         rig.run(20);
         assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Stop));
         let refused = exec_record(DataStatus::NotAllowed);
-        // The arm was already at rest. The trajectory is in the state after a Stop, so a Pause is refused.
+        // The controller refuses both Execute frames, because the command arrived after them. The trajectory is
+        // already in the state Stop, so a Pause is refused and a Stop is accepted.
         assert_eq!(rig.records(), [refused, refused, exec_record(data)]);
-        // The controller executes a later command.
+        // A Stop or Pause does not affect an Execute that arrives after it.
         rig.statuses.clear();
         rig.urgent(0, command);
         rig.send(FrameType::TrajSetExecStatus, &[3]);
@@ -235,7 +237,7 @@ proptest! {
                 found[line].push(rig.statuses.last().unwrap().response.frame_type);
             }
         }
-        // Some frames were sent slowly. Their response records arrived before the loop above.
+        // The response records of the frames that were sent slowly arrived before the loop above.
         let early = rig.records().len() - found[0].len() - found[1].len();
         prop_assert_eq!(early + found[0].len() + found[1].len(), expected[0].len() + expected[1].len());
         for line in 0..2 {

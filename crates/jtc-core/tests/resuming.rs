@@ -53,7 +53,8 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     assert!(rig.controller.telemetry().point > paused.point + 2, "{} after {}", last, paused.point);
 }
 
-/// The timeout of a teach request starts with the command, and not when the controller began to hold the arm.
+/// A teach request may wait for its full timeout, even if the controller has already held the arm for a long time
+/// before the request.
 #[test]
 fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     let mut rig = Rig::holding_with(Config { enable_timeout_ms: 600, ..Config::avena() });

@@ -29,8 +29,9 @@ fn released(bench: &mut Bench) -> usize {
     panic!("the torque stays");
 }
 
-/// A pulse of 1 ms at the safety input is sufficient for the stop. The commanded motion is at rest when the torque is switched off. A joint
-/// that yields, or that a hand moves, may still move until the end of the ramp.
+/// A pulse of 1 ms at the safety input must be sufficient to begin the stop. The commanded motion must be at rest
+/// before the torque is switched off. A joint that yields, or that a hand moves, may still move until the end of the
+/// ramp.
 #[test]
 fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     for (doing, begin) in UNDER_WAY {
@@ -86,7 +87,8 @@ fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     assert!(ticks < 20, "{ticks} ms");
 }
 
-/// If another cause switches the torque off during the ramp, the controller also reports the safety input.
+/// If another error switches the torque off during the ramp, the controller must still report the error of the safety
+/// input.
 #[test]
 fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     for reset in [false, true] {
@@ -105,8 +107,8 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     }
 }
 
-/// While drives are being enabled, the arm has no commanded motion that the controller could stop. The controller
-/// therefore switches the torque off at once.
+/// While drives are being enabled, no commanded motion can be stopped. The controller must therefore switch the
+/// torque off at once.
 #[test]
 fn j22_a_ramp_enables_no_drive() {
     let mut arm = Plant::new(&Parameters::avena().model, LuGre::of_avena_times(1.0), POSES[0]);
@@ -130,7 +132,7 @@ fn j22_nothing_begins_during_the_ramp() {
     bench.run(1);
     bench.rig.safety_input = true;
     bench.until("a path that stands", |rig| rig.trajectory() == TrajectoryState::Stop);
-    // The hand that has pushed the arm keeps it in motion.
+    // The path is at rest, but a hand keeps a joint in motion, so the stop still continues.
     bench.rig.follow = false;
     let rig = &mut bench.rig;
     rig.nodes[1].report.velocity = 0.1;

@@ -128,7 +128,8 @@ fn image(n: usize, seed: u64) -> Vec<u8> {
     (0..n).map(|_| rng.byte()).collect()
 }
 
-/// The test stores many images. Each time, the board finds the last image, and the previous image stays in the other slot.
+/// The test stores many images. After each store, the board must find this image, and the previous image must stay in
+/// the other slot.
 #[test]
 fn j54_the_newest_image_is_found() {
     let mut flash = Flash::new();
@@ -291,7 +292,8 @@ proptest! {
         prop_assert_eq!(flash.current(), None);
     }
 
-    /// If two sequence numbers are not exactly 2³¹ apart, the newer number belongs to the image that was stored later.
+    /// The sequence number of the next image must be newer than the number of the present image. The present image
+    /// stays in use until every action of the next image is completed.
     #[test]
     fn the_next_sequence_number_is_the_newest(found in any::<[Option<u32>; SLOTS]>()) {
         let mut slots = Slots::new(found);

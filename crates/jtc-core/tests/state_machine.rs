@@ -27,7 +27,7 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     // A clear has no effect while the cause of the error is present.
     rig.clear(true, 0x7F);
     assert_eq!(rig.state(), ControllerState::Error);
-    // The end of the cause alone does not end state Error either.
+    // When the cause of the error ends without a clear, the controller must stay in state Error.
     rig.safety_input = true;
     rig.run(200);
     assert_eq!(rig.state(), ControllerState::Error);
@@ -68,7 +68,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.nodes[1].report.errors, 0);
 }
 
-/// A clear that arrives in the same tick as a fault does not hide this fault.
+/// If a clear arrives in the same tick as a fault, it must not hide the fault.
 #[test]
 fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     type Fault = fn(&mut Rig);
@@ -87,8 +87,8 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
                 }
                 rig.tick();
                 fault(&mut rig);
-                // The answer to the Move of this tick contains the fault. The answer with the fault arrives in the next tick, which also
-                // executes the clear.
+                // The fault is in the answer to the Move of this tick. This answer arrives in the next tick, together
+                // with the clear.
                 rig.tick();
                 if occurred {
                     rig.send(FrameType::ClearOccurredErrors, &[]);
@@ -140,12 +140,14 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!(rig.state(), ControllerState::Error, "{name}");
             rig.plain = plain;
             let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
-            // The first clear selects only the controller's errors. The second clear also selects a joint without an
-            // error. The third clear selects the occurred errors, which are all still current.
+            // The controller refuses all three clears, because they cannot clear anything. The first clear selects
+            // only the controller's errors. The second clear also selects a joint without an error. The third clear
+            // selects the occurred errors, which are all still current.
             assert_eq!(rig.clear(true, 0), refused, "{name}");
             assert_eq!(rig.clear(true, 0x01), refused, "{name}");
             assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
-            // A clear for nodes has no effect on the controller's errors.
+            // The controller accepts a clear that selects only nodes. The controller's errors remain, so the state
+            // stays Error.
             assert_eq!(rig.clear(false, 0x01), DataStatus::NoError, "{name}");
             rig.nodes[4].report.state = NodeState::FAULT;
             assert_eq!(rig.clear(false, 0x10), DataStatus::NoError, "{name}");
@@ -161,8 +163,8 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
         }
     }
-    // The controller accepts a clear that also selects the joint with the fault, or that arrives while this joint is
-    // being cleared.
+    // The controller accepts a clear that also selects the joint with the fault. It also accepts a clear while this
+    // joint is already being cleared.
     for joint_first in [false, true] {
         let mut rig = Rig::holding();
         rig.nodes[4].report.state = NodeState::FAULT;
@@ -176,7 +178,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
         rig.run(300);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // The controller accepts a clear that has an effect on another error, but the fault stays.
+    // The controller accepts a clear that clears at least one other error. The fault remains.
     let mut rig = Rig::holding();
     rig.press_stop(1);
     rig.nodes[4].report.state = NodeState::FAULT;
@@ -184,7 +186,8 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
-    // The first clear of the occurred errors sets their word to zero, and the second clear would have no effect.
+    // The first clear of the occurred errors sets their word to zero. The second clear would have no effect, so the
+    // controller refuses it.
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
     // A controller without errors accepts every clear.
@@ -311,7 +314,7 @@ fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
         rig.run(600);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // The controller tolerates a few late ticks, however long they continue.
+    // The controller tolerates a few late ticks per second, for any length of time.
     let mut rig = Rig::holding();
     for _ in 0..100 {
         rig.missed_ticks = 5;

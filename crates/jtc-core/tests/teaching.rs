@@ -7,8 +7,8 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns the distances by which a hand moves the joints from a pose, rad. After this motion, no joint is in the
-/// soft end near a position limit.
+/// Returns the distances by which a hand moves the joints from a pose, rad. After this motion, no joint is so close
+/// to a position limit that the spring at the limit (soft end) acts on it.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]
@@ -36,7 +36,8 @@ fn without_steps(arm: &mut Plant, rig: &mut Rig, ticks: usize) {
         arm.tick(rig);
         let now = torque(rig);
         for j in 0..6 {
-            // A toggle of the last bit of the encoder causes 2.3 N·m of P and D torque. The motion of the arm adds to this torque.
+            // A toggle of the last bit of the encoder causes 2.3 N·m of P and D torque. The torque for the motion of
+            // the arm is added to this value.
             assert!((now[j] - last[j]).abs() < 4.0, "joint {}: {} to {} N·m", j + 1, last[j], now[j]);
         }
         last = now;
@@ -83,8 +84,8 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
     }
 }
 
-/// A mass at the flange cannot explain masses that are wrong in every link. Friction holds the difference between the
-/// true masses and a mass at the flange, so the arm does not drift.
+/// The true masses of all links are wrong by a tenth, which no mass at the flange can explain. Friction holds the
+/// remaining torque, so the arm must not drift.
 #[test]
 fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
     for mass in [0.9, 1.1] {
@@ -95,7 +96,8 @@ fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.002 && led < 0.005, "masses times {mass}: {still}, {led} rad from {pose:?}");
-            // A third of the modelled friction still holds the arm at its first position. At other positions, this arm may creep.
+            // With a third of the modelled friction, the arm still stays at its first position. At other positions,
+            // such an arm may creep.
             let mut arm = Plant::new(&heavier(model(), mass), LuGre::of_avena_times(0.3), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
@@ -127,7 +129,7 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
 /// `mass` kg at the flange or, for 0 kg, a push on the joints. Returns `None` if Teaching waits until the contact has ended.
 fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> {
     let mut arm = Plant::new(&model(), LuGre::of_avena_times(factor), pose);
-    // The controller learns such a long contact as a load, and does not detect it as a push.
+    // With this setting, the controller learns a long contact as a load instead of detecting it as a push.
     let mut rig = arm.holding(Config { yield_torque_share: 0.8, ..Config::avena() });
     let unit = Dynamics::new(&model(), Config::avena().gravity).flange_torque(&pose);
     let push = if mass == 0.0 { [30.0, 0.0, 0.0, 5.0, 0.0, 0.0] } else { unit.map(|u| mass * u) };
@@ -150,8 +152,8 @@ fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> 
     Some(fastest)
 }
 
-/// When Teaching begins, a person leans on the arm, or the arm lies on an object. When the contact ends, the learned load drives the arm,
-/// but slowly.
+/// When Teaching begins, a person leans on the arm, or the arm lies on an object. When this contact ends, the learned
+/// load drives the arm, but it may drive the arm only slowly.
 #[test]
 fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
     let (mut taught, mut reached) = (0, 0.0_f64);
@@ -167,8 +169,8 @@ fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
             reached = reached.max(fastest.unwrap_or(0.0));
         }
     }
-    // In the other cases, Teaching waits until the contact has ended. For example, joint 1 yields if it is pushed
-    // with 30 N·m.
+    // In at least 24 of the 36 cases, Teaching begins during the contact. In the other cases, Teaching waits until
+    // the contact has ended, for example because joint 1 yields to a push of 30 N·m.
     assert!(taught >= 24, "{taught} of 36");
     assert!(reached > 0.3, "{reached} rad/s: nothing was learned");
 }

@@ -99,10 +99,11 @@ fn j25_damping_does_not_drive_light_joints_to_and_fro() {
         for (push, damping) in [-1.5, 1.5].into_iter().flat_map(|p| [(p, None), (p, Some(1000.0))]) {
             let it = braked_with(&light, 0.05, 0.05, damping, joint, push);
             // The damping setting of 1000 N·m·s/rad is limited to the highest damping that the inertia of the joint
-            // tolerates. With this damping, a pushed joint swings only until it has reached its speed.
+            // tolerates. With this damping, a pushed joint swings only until it has reached its final speed.
             let most = if damping.is_some() { 6 } else { 0 };
             assert!(it.turns <= most, "joint {} at {push} N·m, {damping:?}: {}", joint + 1, it.turns);
-            // The damping is at least 90 1/s · 0.2 · 0.05 kg·m² = 0.9 N·m·s/rad. The braking torque acts in addition.
+            // The damping of at least 90 1/s · 0.2 · 0.05 kg·m² = 0.9 N·m·s/rad and the braking torque limit the
+            // speed.
             assert!(it.fastest < 1.5, "joint {}: {} rad/s", joint + 1, it.fastest);
         }
     }
@@ -114,14 +115,14 @@ fn j25_the_wrists_of_the_default_arm_are_damped() {
         let push = 0.3 * Config::avena().joints[joint].torque_max;
         let it = braked(&Parameters::avena().model, 0.7, joint, push);
         assert_eq!(it.turns, 0, "joint {}", joint + 1);
-        // The controller relies on only a fifth of the rotor inertia. With the damping that this inertia permits, a
-        // push of three tenths of the torque limit causes this speed.
+        // The controller relies on only a fifth of the rotor inertia, which limits the damping. A push of three
+        // tenths of the torque limit then causes a speed of 0.4 to 1.2 rad/s.
         assert!((0.4..1.2).contains(&it.fastest), "joint {}: {} rad/s", joint + 1, it.fastest);
     }
 }
 
-/// A drive has a rotor even if the arm file does not contain its inertia. Teaching must damp the joint in this case
-/// as well.
+/// Every drive has a rotor, even if the arm file does not contain the rotor inertia. Teaching must also damp a joint
+/// without a configured rotor inertia.
 #[test]
 fn j25_a_joint_is_damped_where_no_rotor_inertia_is_given() {
     for joint in 3..6 {

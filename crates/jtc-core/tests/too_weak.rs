@@ -16,8 +16,8 @@ fn weak() -> Config {
     config
 }
 
-/// In Teaching, the torque of the joint is at its limit in this pose. Teaching continues, or the controller releases the arm if the setting
-/// requires this.
+/// A hand moves the arm to a pose in which the joint needs more than its torque limit. Teaching must continue with
+/// the torque at its limit. If `torque_release` is set, the controller releases the arm instead.
 #[test]
 fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() {
     for (torque_release, end) in [(false, ControllerState::Teaching), (true, ControllerState::Error)] {
@@ -43,7 +43,7 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
             continue;
         }
         assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
-        // The torque is off now. The controller requires the arm model again, and still requires it while the error is latched.
+        // The torque is off now. The controller requires the arm model again, also while the error is latched.
         assert_eq!(rig.status().jtc_init, 0b100);
         rig.clear(true, 0x7F);
         rig.run(50);
@@ -51,8 +51,8 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
     }
 }
 
-/// The controller checks that the torque limits can hold the arm when it begins to hold the arm. The controller does not check this while a
-/// hand moves the arm.
+/// The controller checks that the torque limits can hold the arm only when it begins to hold the arm. It must not
+/// check this while a hand moves the arm.
 #[test]
 fn j06_the_model_is_judged_where_init_ends() {
     let mut rig = Rig::new(weak());

@@ -160,7 +160,8 @@ fn j31_point_0_is_commanded() {
     assert!(seen);
 }
 
-/// Every commanded position of a paused motion is on the path, and the motion does not skip any part of the path.
+/// Every commanded position of a paused motion must be on the path, and the motion must not skip any part of the
+/// path.
 #[test]
 fn j33_pause_and_resume_follow_the_path() {
     let mut rig = Rig::holding();
@@ -215,8 +216,8 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
 }
 
-/// The controller accepts a pause or stop even in the last milliseconds, when its ramp would reach beyond the last
-/// point. The motion then ends in the state Pause or Stop.
+/// The controller accepts a Pause or Stop even if the motion ends before the ramp of the stop would end. The
+/// trajectory must then end in the state Pause or Stop, and not in Finish.
 #[test]
 fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     let points = motion(101, 10);
@@ -293,7 +294,8 @@ fn j34_commands_follow_the_table() {
             rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
         }
         if trajectory == TrajectoryState::Finish {
-            // The path is not closed, so the test moves the joints back to the start before the second execution.
+            // The path ends at another position than it begins, so the test moves the joints back to the start before
+            // the second execution.
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
         rig

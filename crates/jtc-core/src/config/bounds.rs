@@ -6,8 +6,8 @@ use crate::config::limits::JointConfig;
 use crate::friction;
 use crate::parameters::{PidGains, TableOf};
 
-/// Share of the velocity limit up to which the friction of a joint has been measured. Above this velocity, a fitted friction curve may have
-/// any value.
+/// Highest speed at which the friction of a joint has been measured, as a share of the velocity limit. At higher
+/// speeds, a fitted friction curve can have any value.
 const MEASURED: f64 = 0.5;
 /// Number of speeds at which a friction polynomial is checked. A cubic changes only a little between two of these speeds.
 const SPEEDS: u8 = 16;
@@ -24,8 +24,8 @@ pub struct ParameterBounds {
     pub kd_max: f64,
     /// Largest magnitude of IntMin and IntMax, rad·s. The known arms use magnitudes up to 120.
     pub integral_max: f64,
-    /// Largest torque on a joint at rest that the bounds of its integral may force, as a share of its torque limit.
-    /// The bounds force a torque only if they exclude an integral of zero.
+    /// Largest torque that the bounds of the integral may force on a joint at rest, as a share of its torque limit.
+    /// If the bounds exclude an integral of zero, the integral always produces a torque.
     pub integral_bias_max: f64,
     /// Largest mass of a link, kg. A drive of 360 N·m, the full scale of the bus, can hold 50 kg only up to a distance of 0.73 m.
     pub link_mass_max: f64,
@@ -36,8 +36,9 @@ pub struct ParameterBounds {
     pub friction_max: f64,
     /// Like `friction_max`, but for speeds up to half of the velocity limit. In the known arms, this share is at most 0.82.
     pub slow_friction_max: f64,
-    /// Largest friction torque that acts in the direction of the motion, as a share of the torque limit, at speeds up
-    /// to half of the velocity limit. Measurement noise can cause such a torque in the friction parameters.
+    /// Largest friction torque that drives the joint instead of opposing its motion, as a share of the torque limit.
+    /// The bound applies to speeds up to half of the velocity limit. Measurement noise can cause such a torque in the
+    /// friction parameters.
     pub friction_reversed_max: f64,
     /// Largest friction torque at standstill, as a share of the torque limit.
     pub rest_friction_max: f64,
@@ -144,7 +145,7 @@ impl ParameterBounds {
         } else {
             (-self.friction_max, self.friction_max)
         };
-        // A torque against the motion is positive in both directions.
+        // For both directions, `along` is positive if the torque opposes the motion.
         let along = if velocity < 0.0 { -torque } else { torque };
         OutOfBounds::unless_within(
             "friction torque (N·m)",

@@ -52,8 +52,8 @@ pub(crate) struct Recent {
 bit_codec!(Recent { history, count });
 
 impl Recent {
-    /// Adds a tick to the window. `has` is `true` if the tick has the property. Returns `true` if this tick and more than `most` of the
-    /// last 100 ticks have the property.
+    /// Adds a tick to the window. `has` is `true` if the tick has the counted property, for example a torque at the
+    /// limit. Returns `true` if this tick and more than `most` of the last 100 ticks have the property.
     #[inline]
     pub(crate) fn exceeds(&mut self, has: bool, most: u16) -> bool {
         if has | (self.count > 0) {
@@ -107,7 +107,7 @@ impl Saturation {
     }
 }
 
-/// Time, ticks, within which a torque that reaches each limit twice shows an unstable control loop.
+/// If a torque reaches each of its two limits twice within this time, its control loop is unstable, ticks.
 const TURNS_MS: u32 = 200;
 
 /// Record of the changes of a joint's torque from one limit to the other.
@@ -137,10 +137,10 @@ impl Turns {
     }
 }
 
-/// Returns a joint error for each set value (position, velocity, acceleration) outside its limits, and for a position
-/// `error` (rad, J-62) above its limit. The position limit applies only to `commanded` positions. The controller also
-/// holds an arm that is already outside a position limit, because the host could otherwise never move the arm back. A
-/// rounding error between two points that have passed the check of J-36 is not an error.
+/// Returns the joint errors: one for each set value (position, velocity, acceleration) outside its limits, and one
+/// for a position `error` (rad, J-62) above its limit. The position limit applies only to `commanded` positions,
+/// because an arm that is already outside this limit must be held until the host moves it back. A value that exceeds
+/// its limit only by the rounding of the interpolation (J-36) is not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
     // With these comparisons, a value of NaN counts as outside the limits.
@@ -225,7 +225,8 @@ mod tests {
 
     #[test]
     fn j43_torque_at_its_limit_counts_within_any_100_ms_whichever_sign() {
-        // In any pattern of ticks above the limit, ten such ticks in 100 ms are allowed, but eleven are not.
+        // One tick in every ten is above the limit, which is ten ticks in 100 ms and is allowed. One tick in every
+        // nine is more than ten ticks in 100 ms, which is an overload.
         for (period, allowed) in [(10, true), (9, false)] {
             let (l, mut saturation) = (limits(), Saturation::default());
             let mut good = true;
@@ -235,7 +236,7 @@ mod tests {
             }
             assert_eq!(good, allowed, "one tick of {period}");
         }
-        // Ten consecutive ticks are above the limit, and a pause follows.
+        // Ten consecutive ticks above the limit, followed by a pause of 90 ms, are also allowed.
         let (l, mut saturation) = (limits(), Saturation::default());
         for k in 0..1_000 {
             let torque = if k % 100 < 10 { INF } else { 0.0 };
@@ -259,8 +260,8 @@ mod tests {
     }
 
     /// The control loop is unstable if the torque reaches the upper limit twice and the lower limit twice within 200
-    /// ms. Each pair is a tick number, and `true` for the upper or `false` for the lower limit. The result is the
-    /// index of the pair that shows the instability.
+    /// ms. Each pair in a list is a tick and its limit (`true` for the upper limit). The expected result is the index
+    /// of the pair at which the instability is detected.
     #[test]
     fn j66_a_torque_that_was_at_both_limits_twice_each_within_200_ms_is_unstable() {
         let seen = |hits: &[(u32, bool)]| {

@@ -225,8 +225,9 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // The arm may move at most by the distance `most` after the command. This is the smaller of the remaining
-            // distance and the stopping distance if the approach still accelerates for half of the ramp.
+            // After the command, the arm may move at most by `most`. This is the remaining distance, or the stopping
+            // distance if that is smaller. The stopping distance assumes that the approach still accelerates during
+            // half of the ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");
@@ -248,8 +249,8 @@ fn j33_a_stop_before_the_approach_moves_nothing() {
     );
 }
 
-/// An approach takes the time of a ramp, or the time that the joint with the longest distance needs within its limits. The longer time
-/// applies.
+/// An approach takes at least the time of a ramp. If a joint with a long distance needs more time within its limits,
+/// the approach takes this time.
 #[test]
 fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     for (way, velocity_max, acceleration_max) in
@@ -308,8 +309,8 @@ fn joint_errors(controller: &Controller<[RawPoint; 4]>) -> [u16; JOINTS] {
     core::array::from_fn(|j| controller.errors.joint(j).0)
 }
 
-/// A path or jog that still moves joint 3 at the end of the braking time ends, and joint 3 lowers its load. With `torque_release`, the same
-/// overload is an error that releases the arm.
+/// Joint 3 still moves at the end of the braking time. The path or jog then ends, and joint 3 lowers its load. With
+/// `torque_release`, the same overload is an error that switches the torque of the arm off.
 #[test]
 fn j33_j70_a_motion_that_cannot_be_stopped_ends_with_the_configured_reaction() {
     let most = Config::avena().braking_ms_max;

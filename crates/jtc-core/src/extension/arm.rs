@@ -106,8 +106,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
-            // The host may have sent the gains and the model at different times, so the controller checks again that
-            // the gains match the inertia of this model (J-71).
+            // The gains and the model may come from different times. Therefore the controller checks again that the
+            // gains match the inertia of this model (J-71).
             _ if !self.parameters.gains_are_borne(&self.config) => {
                 return SliceOutcome::Refused(DataStatus::IncorrectValue);
             }

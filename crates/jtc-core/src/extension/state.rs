@@ -39,7 +39,7 @@ pub(crate) struct Extensions {
     /// `true` if the board must write the stored arm to non-volatile memory.
     pub store_requested: bool,
     /// `true` if an arm is stored but the controller could not load or write it. The controller does not use the
-    /// built-in arm instead.
+    /// built-in arm in its place.
     pub unusable: bool,
     /// Hash of the arm in use; `None` until it is computed again.
     pub hash: Option<u64>,

@@ -177,7 +177,7 @@ fn j51_on_a_plain_line_no_data_status_is_above_6() {
             assert_eq!(bench.send_as(false, line, frame), DataStatus::NotAllowed);
         }
     }
-    // A plain line reports only data statuses up to 6. These are the same as on any other line.
+    // On a plain line, a data status up to 6 is unchanged, and each higher status is replaced by a status up to 6.
     for data in DataStatus::ALL {
         let plain = crate::host::in_plain_words(data);
         assert!(plain as u8 <= 6 && (plain == data || data as u8 > 6), "{data:?}: {plain:?}");

@@ -41,8 +41,8 @@ fn j71_the_default_arm_feels_what_is_said() {
 }
 
 proptest! {
-    /// The check uses only a few poses. In any other pose, the effective inertia of a joint is only slightly lower
-    /// than the smallest checked inertia.
+    /// The check of gains computes the inertia only in a few poses. In any other pose, the effective inertia of a
+    /// joint may be only slightly lower than the smallest computed inertia.
     #[test]
     fn j71_a_joint_feels_little_less_in_other_poses(shares in prop::array::uniform6(0.0..1.0f64)) {
         let (model, config) = (Parameters::avena().model, Config::avena());
@@ -88,8 +88,8 @@ fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
 fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
     let limits = Config::avena().joints[1];
     let gains = PidGains { kp: 1_000.0, ki: 100.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
-    // The position error limit is 0.09 rad. With 1 000 N·m/rad, a quarter of this error (0.0225 rad) holds up to 22.5
-    // N·m.
+    // The position error limit is 0.09 rad. With 1 000 N·m/rad, the largest permitted sag of 0.0225 rad (a quarter of
+    // this limit) produces 22.5 N·m.
     for (gains, i, holds) in [
         (gains, 100.0, true),
         (gains, 122.0, true),
@@ -136,8 +136,8 @@ proptest! {
         prop_assert_eq!(last, third);
     }
 
-    /// Softer gains require less inertia than the previous gains. Their damping is at least twice the damping that
-    /// the delay of the Kp torque cancels.
+    /// Softer gains require less inertia than the gains before. The delay of the Kp torque cancels a part of the
+    /// damping. The damping of softer gains is at least twice this part.
     #[test]
     fn j66_softer_gains_are_stable_where_the_others_were_borne(kp in 1.0..50_000.0f64, kd in 0.0..500.0f64, delay in 0..8u8) {
         let own = PidGains { kp, ki: 1000.0, kd, ..given()[0] };
@@ -262,15 +262,16 @@ fn j71_a_joint_with_the_required_inertia_is_accepted() {
 }
 
 /// The position gain must produce 3 % of the torque limit at the position error limit. If the new gains allow less
-/// integral torque, the missing torque may deflect the joint by less than a quarter of the position error limit.
+/// integral torque than before, the position gain must supply the missing torque. This must deflect the joint by less
+/// than a quarter of the position error limit.
 #[test]
 fn j71_a_held_joint_keeps_a_stiff_position_and_sags_little() {
-    // The position gain must produce 3 % of 100 N·m, which is 3 N·m, at 0.5 rad. This requires 6 N·m/rad. With 8
-    // N·m/rad, the largest permitted sag of 0.125 rad holds 1 N·m.
+    // At 0.5 rad, the position gain must produce 3 % of 100 N·m, which is 3 N·m. This requires 6 N·m/rad. With 8
+    // N·m/rad, a position error of 0.125 rad, the largest permitted sag, produces 1 N·m.
     let limits = JointConfig { torque_max: 100.0, position_error_max: 0.5, ..Config::avena().joints[1] };
     let soft = |kp: f64| PidGains { kp, ki: 0.0, kd: 0.0, int_min: 0.0, int_max: 0.0 };
     // The integral bounds of these gains allow torques from −50 to 50 N·m. The largest permitted sag of 0.125 rad
-    // holds 0.125 · 800 = 100 N·m.
+    // produces 0.125 · 800 = 100 N·m.
     let kept = PidGains { kp: 800.0, ki: 100.0, kd: 0.0, int_min: -0.5, int_max: 0.5 };
     for (gains, p, i, holds) in [
         (soft(6.0), 0.0, 0.0, true),
@@ -292,7 +293,7 @@ fn j71_a_held_joint_keeps_a_stiff_position_and_sags_little() {
     }
 }
 
-/// The earlier gains are discarded if the controller may not restore them.
+/// If the controller is not allowed to restore the earlier gains, it discards them.
 #[test]
 fn j71_gains_that_may_not_return_are_discarded() {
     for may in [false, true] {

@@ -7,7 +7,7 @@ use crate::bit_codec::bit_codec;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LineUpload {
     /// `true` if segment 0 of the upload came on a plain line, `false` if the host used extensions (J-51). `None`
-    /// before the first upload, and after the Execute of an upload that did not come on a plain line.
+    /// before the first upload. `None` also after an Execute, unless the upload came on a plain line.
     plain: Option<bool>,
 }
 
@@ -15,7 +15,7 @@ bit_codec!(LineUpload { plain });
 
 impl LineUpload {
     /// Returns `true` if the response record of `command` may contain only data statuses up to 6. For a later segment
-    /// and for Execute, the property of the line at segment 0 decides.
+    /// and for Execute, this depends on whether segment 0 came on a plain line.
     pub(crate) fn in_plain_words(&mut self, command: &Command<'_>, plain: bool) -> bool {
         match command {
             Command::Trajectory(segment) if segment.segment == 0 => *self.plain.insert(plain),
@@ -26,8 +26,9 @@ impl LineUpload {
         }
     }
 
-    /// Records that the controller executes the uploaded trajectory. If another client executes the trajectory again, the controller does
-    /// not know yet whether that client uses the extensions.
+    /// Records that the controller executes the uploaded trajectory. Unless the upload came on a plain line, the
+    /// record of the line is cleared: the next Execute may come from another client, which need not use the
+    /// extensions.
     pub(crate) fn executed(&mut self) {
         self.plain = self.plain.filter(|plain| *plain);
     }

@@ -7,14 +7,13 @@ use crate::bit_codec::bit_codec;
 /// State of the urgent commands of a line until the controller processes their frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Priority {
-    /// Numbers of Stops and Pauses that were accepted and have no response record yet.
+    /// Number of accepted Stops that have no response record yet. `pauses` is the same number for Pauses.
     pub(super) stops: u8,
     pub(super) pauses: u8,
     /// `true` if these Stops and Pauses have cancelled an Execute.
     pub(super) cancelled: bool,
-    /// `true` if a Stop has arrived on any line. The controller then drops an upload that began before this Stop
-    /// (J-30), even if the Stop was refused. The first event that arrived after this Stop clears the flag. The
-    /// response record of an earlier Stop does not clear it.
+    /// `true` after a Stop has arrived on any line, even if this Stop was refused. The controller drops an upload
+    /// that began before the Stop (J-30). The first event that arrived after the Stop clears the flag.
     pub(super) stopped: bool,
 }
 
@@ -27,9 +26,9 @@ impl Priority {
         *accepted = accepted.saturating_add(count);
     }
 
-    /// Returns the data status of an execution command that was received before an urgent Stop or Pause took effect.
-    /// An Execute is refused. A Stop or Pause is successful if it was accepted as an urgent command. It is also
-    /// successful if it cancelled an Execute and the `trajectory` has the commanded state.
+    /// Returns the data status of an execution command that arrived before an urgent Stop or Pause took effect. An
+    /// Execute is refused. A Stop or Pause succeeds if it was accepted as an urgent command. It also succeeds if an
+    /// Execute was cancelled and the `trajectory` is in the state that the command requests.
     pub(crate) fn overtaken(
         &mut self,
         exec: ExecCommand,

@@ -58,8 +58,8 @@ fn j04_commands_of_a_few_instructions_leave_time_for_others_in_the_same_tick() {
     assert_eq!(done_of_three(&mut error, ClearOccurredErrors, &[]), 1);
 }
 
-/// The frame of an urgent Stop may be lost. The first event that arrived after the Stop therefore clears the record
-/// of its line, so that a later Stop is not reported as already accepted.
+/// The frame of an urgent Stop can be lost. Therefore the first event that arrived after the Stop clears the record
+/// of the urgent commands on its line. Otherwise a later Stop would be reported as already accepted.
 #[test]
 fn j04_what_was_overtaken_is_forgotten_with_the_first_event_behind_it() {
     let before = Priority { stops: 2, pauses: 1, cancelled: true, stopped: true };
@@ -157,9 +157,9 @@ fn j36_friction_given_between_two_segments_is_new_to_the_path() {
     assert_eq!(controller.trajectory, TrajectoryState::Stop);
 }
 
-/// If the friction table is newer than the path, Execute checks the whole velocity range of the path against the
-/// table, and refuses this path. The check of the single segments is more exact, so without new parameters Execute
-/// accepts the path.
+/// The velocities of this path are outside the friction table. If the table is newer than the path, Execute checks
+/// the velocity range of the path against the table and refuses the path. Without new friction parameters, Execute
+/// does not repeat this check, because the segments have already passed an exact check.
 #[test]
 fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
     let body = body(0, 1);
@@ -170,7 +170,7 @@ fn j36_the_velocities_of_the_path_are_asked_again_when_friction_is_new() {
         let mut controller = holding();
         (controller.parameters.friction_is_table, controller.parameters.friction_is_new) = (table, new);
         for table in &mut controller.parameters.tables {
-            // The bearings are at 0 °C.
+            // The table contains the temperature of the bearings, 0 °C.
             table.temperature = core::array::from_fn(|i| i as f32);
         }
         let mut fast = TrajectoryCheck::new(&controller.config, 10, None);

@@ -22,23 +22,23 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // A host on a plain line repeats this segment until the controller accepts it, and sends no Stop before
-            // that. Therefore the segment acts as a Stop. The controller refuses the segment in this tick.
+            // A host on a plain line repeats segment 0 until it is accepted, and sends no Stop before. Therefore the
+            // segment also acts as a Stop. In this tick, the segment itself is refused.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
-            // The controller may also leave HoldPos while it processes a segment. It has then cleared the trajectory,
-            // so it refuses the segment.
+            // If the controller has left HoldPos while it processes a segment, it has cleared the trajectory. It then
+            // refuses the segment.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // The controller received this segment before a Stop that has taken effect.
+        // `true` if this segment arrived before a Stop that has already taken effect.
         let stopped =
             received.overtaken && self.priorities.get(received.line).is_some_and(|before| before.stopped);
         if first && !received.plain && stopped {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // A Stop may also drop the upload while the controller processes a segment.
+        // A Stop that arrives while the controller processes this segment also drops the upload.
         let begun = !first || matches!(self.slice_progress, SliceProgress::PointCopy(_));
         if begun && self.store.dropped() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);

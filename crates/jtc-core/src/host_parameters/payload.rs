@@ -1,5 +1,5 @@
-//! Blend of a new payload into the model (J-60). For half a second, the control law uses an arm model between the last and the next
-//! payload. The change therefore does not cause a torque step.
+//! Blend of a new payload into the model (J-60). For half a second, the model changes gradually from the old to the
+//! new payload. The change therefore does not cause a torque step.
 use jtc_dynamics::{Dynamics, LinkInertias};
 
 use crate::JOINTS;
@@ -61,8 +61,8 @@ impl PayloadBlend {
         Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
-    /// Begins a blend from the arm `now` to the arm with the `next` payload. The arm `now` may be in an earlier blend. `heavier` is the
-    /// mass of the next payload minus the mass of the last payload, kg.
+    /// Begins a blend from the present arm `now` to the arm `next` with the new payload. An earlier blend need not
+    /// have ended. `heavier` is the mass of the new payload minus the mass of the last payload, kg.
     pub(crate) fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
         let mass = self.mass + heavier;
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
@@ -96,7 +96,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Ends the blend at once, because the arm is not held.
+    /// Ends the blend at once, because a torque step does not matter while the torque is off.
     pub(crate) fn end(&mut self, dynamics: &mut Dynamics) {
         self.mass = 0.0;
         if core::mem::take(&mut self.left_ms) > 0 {
@@ -110,7 +110,8 @@ mod tests {
     use super::*;
     use crate::{Config, Parameters};
 
-    /// The blend adds 1.25 kg in total, although a payload follows before the blend of the last payload has ended.
+    /// The masses of three successive payload changes add up to 1.25 kg. The blend adds exactly this mass, although
+    /// the second and the third change begin before the previous blend has ended.
     #[test]
     fn j60_as_much_mass_comes_as_is_given() {
         let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);

@@ -11,14 +11,15 @@ use crate::config::Config;
 use crate::config::limits::JointConfig;
 use crate::motion::deceleration::moves;
 
-/// Time for which a joint must be at rest, with a torque within its limit, before its load counts as caught, ms. This
-/// time is longer than the slow phase of an oscillation when its direction changes.
+/// Time for which a joint must be at rest, with a torque within its limit, before its load counts as caught, ms. An
+/// oscillating joint is also slow at each reversal, but for a shorter time.
 const CALM_MS: u16 = 100;
 
 /// Speed below which growth of a swing is treated as noise, rad/s.
 const FAST_SWING: f64 = 0.1;
 
-/// State of a joint whose load may need to be caught.
+/// State of the catch of a joint, in which the controller stops a falling load that the model does not contain. The
+/// state also records how the joint swings.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Catch {
     /// Remaining time of the catch, ms. The remaining time is 0 if the catch is over or if the joint was not enabled.
@@ -66,8 +67,8 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise of a joint at rest does not count as a half swing. Otherwise, a joint that begins to fall after
-            // such noise would look like a growing swing.
+            // Noise of a joint at rest is not recorded as a half swing. If it were, a joint that begins to fall after
+            // the noise would look like a growing swing.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -115,8 +116,10 @@ impl Catch {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// Returns the change of the set position, rad, for a computed torque above the limit by `excess` (N·m) and a position error of `error`
-    /// (rad). Ends the catch if the sag would exceed the position error limit. Also ends the catch if the load pulls in the opposite
+    /// Returns the change of the set position, rad. `excess` is the computed torque above the limit (N·m), and
+    /// `error` is the position error (rad).
+    ///
+    /// The catch ends if the sag would exceed the position error limit. It also ends if the sag would change its
     /// direction, because the joint then swings between both torque limits.
     pub(crate) fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         // The set position moves at most to the measured position of the joint.
@@ -154,8 +157,9 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // If the torque above the limit comes only from the derivative, the set position does not sag. With a
-            // position gain of zero, the set position sags to the measured position and not further.
+            // The first case has a torque above the limit that comes only from the derivative, so the set position
+            // does not sag. The second case has a position gain of zero, so the set position sags to the measured
+            // position.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -331,7 +335,7 @@ mod tests {
         assert!(catch.settled());
     }
 
-    /// A push may cause a growing swing of a joint that has settled. Such a swing does not end the catch.
+    /// A joint that has settled swings with a growing amplitude because of a push. This does not end its catch.
     #[test]
     fn j43_a_growing_swing_ends_only_the_catch_of_a_joint_that_has_not_settled() {
         let mut catch = begun();

@@ -67,8 +67,8 @@ impl Deceleration {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
         let (seconds, left) = (self.length_ms * DT, 1.0 - u);
-        // With the start velocity v and the duration T, `velocity` is a share of v, `way` (its integral) a share of
-        // v·T, and `slope` (its derivative) a multiple of v/T.
+        // v is the start velocity and T is the duration. `velocity` is a share of v. `way` is the integral of
+        // `velocity`, as a share of v·T. `slope` is its derivative, as a multiple of v/T.
         let (velocity, way, slope) = if self.falls {
             (1.0 - smooth(u), u - u * u * u + 0.5 * u * u * u * u, -6.0 * u * left)
         } else {

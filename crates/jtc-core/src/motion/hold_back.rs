@@ -13,13 +13,13 @@ use crate::trajectory::path::PathClock;
 const INERTIA_MS: u16 = 60;
 /// Time from the moment when the last joint leaves its torque limit until the path returns to its normal rate, ms.
 const QUIET_MS: u16 = 200;
-/// Longest time for which joints may be at their torque limits without interruption, ms.
+/// Longest uninterrupted time in which joints may be at their torque limits, ms.
 const PRESSED_MS: u16 = 250;
 /// Longest total time for which the path may be slowed down during one run of the path, ms.
 const RUN_MS: u16 = 5_000;
 /// Rate of path time below which the arm counts as standing on the path. `STANDS_MS` is the longest time at such a
-/// rate before the controller stops the arm, ms. Without this limit, an arm whose torque is only just sufficient to
-/// hold it could stand on the path for ever.
+/// rate, ms. Then the controller stops the arm. Without this limit, an arm with just enough torque to hold itself
+/// could stand on the path for ever.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
@@ -80,8 +80,8 @@ impl HoldBack {
         true
     }
 
-    /// Ends the slow motion, because the arm stops or an approach has ended. The time in which the motion was slow
-    /// still counts for the present run of the path.
+    /// Ends the slow motion, because the arm stops or an approach has ended. The time of the slow motion is kept,
+    /// because the total time in a run of the path is limited.
     pub(crate) fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
@@ -263,8 +263,8 @@ mod tests {
         assert_eq!(after, Some(251), "the limit is 250 ms without interruption");
     }
 
-    /// When the path is held back again after the first reaction has ended, the record of the joints and times at the
-    /// torque limits begins empty.
+    /// The path is held back a second time, after the first time has ended. The record of the joints and times at the
+    /// torque limits then begins empty.
     #[test]
     fn j75_holding_back_begins_without_the_joints_and_times_of_the_earlier_overload() {
         let mut hold_back = HoldBack::default();
@@ -320,8 +320,8 @@ mod tests {
         }
     }
 
-    /// A rate of exactly 0.02 does not count as standing. A lower rate does not count either if it is the normal rate
-    /// of the path.
+    /// A rate of exactly 0.02 does not count as standing. A lower rate does not count as standing either if it is the
+    /// target rate of the clock.
     #[test]
     fn j75_a_path_at_a_rate_of_a_fiftieth_or_at_its_normal_rate_is_not_at_rest() {
         for clock in [at(0.02), PathClock::start(0.0)] {

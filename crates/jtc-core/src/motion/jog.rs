@@ -1,6 +1,8 @@
-//! Jogging moves joints at commanded velocities and is the only motion without a trajectory (J-58). Each joint reaches its velocity with
-//! bounded acceleration and jerk, and slows down automatically before the end of its range. When the jog ends, its clock comes to rest like
-//! path time, so that all joints stop as quickly as on a path (J-33).
+//! Jogging moves joints at commanded velocities and is the only motion without a trajectory (J-58). Each joint
+//! reaches its velocity with bounded acceleration and jerk, and slows down automatically before the end of its range.
+//!
+//! A jog has its own clock. When the jog ends, the rate of this clock falls to zero, like the rate of path time. All
+//! joints therefore stop as quickly as on a path (J-33).
 use jtc_dynamics::sqrt;
 
 use crate::bit_codec::bit_codec;
@@ -161,7 +163,8 @@ impl JointJog {
         let jerk = jerk(limits);
         let wanted = if goes { self.wanted } else { 0.0 };
         let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
-        // The joint may approach its commanded velocity if it can still stop inside its range after this tick.
+        // If the joint can still stop inside its range after this tick, it approaches its commanded velocity in this
+        // tick.
         let onward = self.toward(wanted, jerk, limits.velocity_max, tick);
         let way = self.way(&onward, tick) + onward.stopping_way(jerk);
         let room = if way < 0.0 { low - *position } else { high - *position };
@@ -187,7 +190,8 @@ impl JointJog {
         }
         let round = jerk * tick;
         let left = target - self.velocity;
-        // Highest acceleration that can still be reduced to zero before the joint reaches the target velocity.
+        // Highest acceleration at which the joint can still reach the target velocity without overshoot, because the
+        // jerk limit suffices to reduce the acceleration to zero.
         let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * tick)) - 0.5);
         let next =
             flat.min(self.most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
@@ -195,9 +199,9 @@ impl JointJog {
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
-            // A joint that still accelerates when its jog ends becomes faster until its acceleration is zero. The joint then reaches the
-            // velocity that was commanded before. Rounding to whole ticks can add a few µrad/s above the velocity limit, so the velocity is
-            // bounded.
+            // If a joint still accelerates when its jog ends, it becomes faster until its acceleration has fallen to
+            // zero. It may then reach its earlier commanded velocity. Rounding to whole ticks can add a few µrad/s,
+            // so the velocity is limited.
             let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
             let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / tick };
@@ -214,8 +218,9 @@ impl JointJog {
         } else {
             (self.velocity, self.acceleration)
         };
-        // The stopping distance is first computed from the point of zero acceleration. A joint that accelerates has not reached this point
-        // yet, and a joint that brakes has passed the point.
+        // The stopping distance is first computed from the point at which the acceleration is zero. Then the distance
+        // to or from this point is added or subtracted: an accelerating joint has not reached it yet, and a braking
+        // joint has already passed it.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
         let rise = self.most / jerk;
         let rest = if peak >= self.most * rise {
@@ -288,7 +293,8 @@ mod tests {
                 let ramps = was_ramping || jog.clock.ramping();
                 for j in 0..JOINTS {
                     let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
-                    // While a jog comes to rest, the joints may decelerate as fast as on a trajectory path.
+                    // While a jog comes to rest, the joints are allowed to decelerate as fast as on a trajectory
+                    // path.
                     let most = if ramps { limits.acceleration_max } else { ACCELERATION * limits.acceleration_max };
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
@@ -364,8 +370,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// A joint is jogged at its velocity limit, or up to a thousandth below this limit, and still accelerates when the jog ends. The
-        /// set velocity stays within the limit, and no limit of J-43 is violated, for any tick in which the jog ends.
+        /// A joint is jogged at its velocity limit, or at most a thousandth below it, and still accelerates when the
+        /// jog ends. In whichever tick the jog ends, the set velocity stays within its limit, and no limit of J-43 is
+        /// violated.
         #[test]
         fn j58_the_set_velocity_never_exceeds_its_limit_whenever_a_jog_ends(
             arm in 0..3usize,
@@ -500,7 +507,7 @@ mod tests {
     }
 
     /// While the arm comes to rest after a jog, the operator presses the same jog key, the opposite key or another
-    /// key. The arm comes to rest first, and no joint becomes faster before. The new jog then begins with the
+    /// key. The arm comes to rest first, and meanwhile no joint becomes faster. The new jog then begins with the
     /// acceleration of a normal jog.
     #[test]
     fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {

@@ -15,12 +15,12 @@ use crate::nodes::Nodes;
 use crate::parameters::{PidGains, TableOf};
 use crate::{JOINTS, friction, gains, joint_error};
 
-/// Speed, rad/s, up to which a joint in motion only creeps. The integral of a creeping joint may contain an error of
-/// the friction model, so the controller does not learn a load from it.
+/// Speed, rad/s. A joint that moves more slowly than this speed creeps. The integral of a creeping joint can contain
+/// an error of the friction model, so the controller does not learn a load from it.
 const CREEPS: f64 = 0.05;
 
-/// Share of the torque limit up to which friction can hold a joint. If the torque that is missing in addition to the
-/// learned load is below this share, the load counts as known.
+/// Limit for the torque that a joint needs in addition to its learned load, as a share of the torque limit. Friction
+/// alone can hold such a torque. If the additional torque is below the limit, the load counts as known.
 const LITTLE: f64 = 0.04;
 
 /// Control mode, which determines the active parts of the control law.
@@ -58,8 +58,8 @@ impl ControlMode {
     }
 }
 
-/// After a payload is configured, the integral releases the torque that it contained for this payload. This constant
-/// is the longest time of this release, ms.
+/// Longest time, ms, in which the integral releases the torque that it contained for a payload. The release begins
+/// when the host configures this payload.
 const UNWINDS_MS: u16 = 3_000;
 
 /// Inputs of a tick of the control law.
@@ -118,8 +118,8 @@ impl ControlLaw {
         *loads = Default::default();
     }
 
-    /// Prepares a change of the control mode among HoldPos, Operate and Teaching. The transfer is bumpless, so only the torque of the model
-    /// may step (J-44).
+    /// Prepares a change of the control mode between HoldPos, Operate and Teaching. Only the model torque changes at
+    /// once. The other parts of the torque are blended to their new values (J-44).
     pub(crate) fn change_mode(&mut self) {
         self.transfer.change_mode();
     }
@@ -130,7 +130,7 @@ impl ControlLaw {
         self.transfer.change_model();
     }
 
-    /// Prepares a change of the arm model while the arm is held. The transfer is bumpless, so no torque may step.
+    /// Prepares a change of the arm model while the arm is held. The whole torque is blended, so it has no step.
     pub(crate) fn change_model(&mut self) {
         // The integral contains torque that the last model did not contain. The new model contains this torque, so
         // the integral must release it.
@@ -197,13 +197,14 @@ impl ControlLaw {
             }
             return;
         }
-        // The computed torque may be above the limit. A yielding joint therefore starts from the commanded torque,
-        // which is within the limit.
+        // A yielding joint starts from the commanded torque, which is within the limit. The computed torque can be
+        // above the limit.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // While the load of a pushed joint is unknown, its integral may contain the push, so it does not count as a
-        // load. After hand guiding, the integral contains the torque that Teaching used for the load.
+        // If the load of a pushed joint is unknown, the integral may contain the torque of the push, so the yield
+        // begins without a load. If the joint was guided by hand before, the integral contains the load torque of
+        // Teaching, so it is used as the load.
         let load = if lowers {
             Load::bounded(load.torque(torque.pid.i), limits)
         } else if led {
@@ -246,8 +247,8 @@ impl ControlLaw {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
 
-    /// Returns the feedback torque of the position controller, N·m, in addition to the torques of the model and of
-    /// the load. The feedback torque opposes a push.
+    /// Returns the feedback torque of the position controller, N·m. This is the part of its torque that does not hold
+    /// the load, so it shows a push.
     pub(crate) fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
         pid.p + pid.d + (pid.i - self.load(joint))
@@ -271,12 +272,12 @@ impl ControlLaw {
         ended
     }
 
-    /// Returns `true` if the load of every held joint is known, so that Teaching can hold it. The feedback torque of
-    /// each of these joints must also be small. A load is not known while the integral is still changing, or while it
-    /// releases torque that the model now contains. A person who leans on the arm may stop leaning at any time.
+    /// Returns `true` if Teaching can hold the load of every held joint: each load is known, and each feedback torque
+    /// is small. A high feedback torque may come from a person who leans on the arm and may let go at any time. Loads
+    /// are not known while the integral releases torque that the model now contains.
     ///
-    /// If an obstacle may press on the arm (`contact`), the function does not require that this contact ends. A load
-    /// that was cleared must be learned again even during a contact.
+    /// During a `contact`, only the loads must be known. The feedback torque and the release of integral torque do
+    /// not matter.
     pub(crate) fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
@@ -291,7 +292,7 @@ impl ControlLaw {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
     }
 
-    /// Begins Teaching, which holds the learned loads (J-25), but not a torque that may come from a contact.
+    /// Begins Teaching with the learned loads (J-25). A torque that may come from a contact is not held.
     pub(crate) fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
         let mut loads = [0.0; JOINTS];
         for j in 0..JOINTS {
@@ -304,15 +305,15 @@ impl ControlLaw {
         forget_yields(&mut self.yields);
     }
 
-    /// Records that a payload is added to the model while the arm is held. The unmodelled torque does not count as a load until the
-    /// integral has released the torque that it contained for the payload (J-60).
+    /// Records that a payload is added to the model while the arm is held. The integral still contains the torque for
+    /// this payload and must release it. Until then, the controller learns no load (J-60).
     pub(crate) fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
     }
 
-    /// Reduces the mass that Teaching has estimated by `mass` (kg). This mass is a part of the payload that the host
-    /// has configured during Teaching, and the model contains it from this tick on (J-60).
+    /// Reduces the mass that Teaching has estimated by `mass` (kg). The host has configured a payload during
+    /// Teaching, and from this tick on, the model contains this part of it (J-60).
     pub(crate) fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
@@ -342,8 +343,8 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Shifts the position controllers by the sag of the set positions, rad, so that a sag does not look like a
-    /// motion.
+    /// Shifts the position controllers by the sag of the set positions, rad, so that a sag does not act as a motion
+    /// on the derivative.
     pub(crate) fn sag(&mut self, sag: &[f64; JOINTS]) {
         for (pid, way) in self.pid.iter_mut().zip(sag) {
             pid.shift(*way);
@@ -372,9 +373,9 @@ impl ControlLaw {
         // J-62: a measurement is compared with the set position at the time of the measurement.
         let due = set.due(config);
         // J-40: the model uses the measured position. In Operate, in a jog, and while the arm comes to rest after
-        // Teaching, it also uses the commanded velocity and acceleration. Otherwise it uses zeros. The model torque
-        // acts later than the measurement, so the motion that was commanded since the measurement is added to the
-        // measured position.
+        // Teaching, it also uses the commanded velocity and acceleration. Otherwise, velocity and acceleration are
+        // zero in the model. The model torque takes effect later than the measurement, so the motion that was
+        // commanded since the measurement is added to the measured position.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {

@@ -5,14 +5,15 @@ use crate::bit_codec::bit_codec;
 use crate::config::limits::{self, Recent, Saturation, Turns};
 use crate::{JOINTS, joint_error};
 
-/// Speed, rad/s, above which a torque at the limit in the direction of the motion is not considered part of a catch.
+/// Speed, rad/s. If the torque drives a joint faster than this speed, a torque at the limit does not count as part of
+/// a catch.
 pub(super) const DRIVEN: f64 = 0.05;
-/// Lowest speed of a joint that comes to rest after Teaching, as a share of its set velocity. The controller assumes
-/// that an obstacle stops a slower joint.
+/// Lowest speed of a joint that comes to rest after Teaching, as a share of its set velocity. If a joint is slower,
+/// the controller assumes that an obstacle stops it.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit from which a joint may use twice its permitted feedback torque, because the friction
-/// and inertia of the model may be wrong. If a fast joint hits an obstacle, its feedback torque exceeds even the
-/// double value a few milliseconds later.
+/// Commanded speed from which a joint may use twice its permitted feedback torque, as a share of the velocity limit.
+/// In fast motions, errors of the modelled friction and inertia need more feedback torque. If a fast joint hits an
+/// obstacle, its feedback torque exceeds even the double value a few milliseconds later.
 const FAST: f64 = 0.2;
 /// Highest number of ticks, among the last 100, in which the feedback torque of a joint may exceed its permitted share. After more ticks,
 /// the joint counts as pushed (J-66).
@@ -23,8 +24,8 @@ const PUSHED_MS: u16 = 20;
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
-/// State of the limiter: for each joint, the ticks with a torque at the limit, the ticks with too much feedback torque, and the changes of
-/// the torque from limit to limit.
+/// State of the limiter. For each joint, it records the ticks with a torque at the limit, the ticks with too much
+/// feedback torque, and the jumps of the torque between its limits.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
@@ -112,8 +113,8 @@ impl Limiter {
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
         } else if held_back || mode == ControlMode::Rest {
-            // If the rate of path time changes, the set values have an additional acceleration. An arm that a hand
-            // has moved may come to rest with any acceleration.
+            // A change of the rate of path time adds an acceleration to the set values. An arm that a hand has moved
+            // may come to rest with any acceleration. In both cases, a high set acceleration is not an error.
             joint_error::ACCELERATION
         } else {
             0
@@ -146,13 +147,13 @@ impl Limiter {
             }
             let settled = set.catch[j].settled();
             let (feedback, share) = (law.feedback(j), config.yield_torque_share * limits.torque_max);
-            // A fast joint may use more feedback torque.
+            // The permitted feedback torque increases with the commanded speed.
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // Feedback torque that brakes a moving joint does not count as a push. Feedback torque on a joint at rest counts as a push.
             let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            // After hand guiding, the arm may hit a person before it is at rest. The joint that has hit the person then lags its set
-            // values.
+            // After hand guiding, the arm can hit a person before it is at rest. The joint that has hit the person is
+            // then slower than its set velocity.
             let lags = || {
                 let set = set.point.velocity[j];
                 mode == ControlMode::Rest && feedback * set > 0.0 && v[j] * set.signum() < LAGS * set.abs()
@@ -164,7 +165,8 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // The distance is checked first, because it is rarely above its limit.
+            // The distance is checked first. It is rarely above its limit, so the other conditions are rarely
+            // evaluated.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
             if catching && self.saturation[j].saturated {
@@ -201,8 +203,7 @@ mod tests {
 
     const GAINS: PidGains = PidGains { kp: 100.0, ki: 0.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
 
-    /// Limiter and an arm at position 0. The test sets the torque of the control law, which is the same for all
-    /// joints.
+    /// Limiter and an arm at position 0. The test sets the same torque of the control law for all joints.
     struct Bench {
         config: Config,
         law: ControlLaw,
@@ -341,9 +342,8 @@ mod tests {
         }
     }
 
-    /// A joint that comes to rest after Teaching counts as pushed if it is slower than 0.7 times its set velocity
-    /// while its feedback torque acts along the motion. It may then have met a person. The joint need not have
-    /// settled.
+    /// A joint that comes to rest after Teaching may meet a person. It counts as pushed if it is slower than 0.7
+    /// times its set velocity while its feedback torque acts along the motion. The joint need not have settled.
     #[test]
     fn j25_j66_a_joint_that_lags_on_the_way_to_rest_is_pushed() {
         for (mode, shares, share, pushed) in [
@@ -474,8 +474,8 @@ mod tests {
         }
     }
 
-    /// Without a finding, a joint may have 10 ticks at the limit, 20 ticks with too much feedback torque, and three
-    /// jumps between the limits. After the counters are cleared, the same numbers are permitted again.
+    /// A joint has 10 ticks at the limit, 20 ticks with too much feedback torque, and three jumps between the limits.
+    /// These numbers are still permitted. After the counters are cleared, the same numbers are permitted again.
     #[test]
     fn j66_a_joint_that_begins_to_yield_starts_with_cleared_counters() {
         let mut pushed = Bench::settled().with_feedback(1.5);
@@ -501,8 +501,8 @@ mod tests {
         }
     }
 
-    /// A joint is not pushed if a value is exactly at its limit: the permitted feedback torque, or the speed and
-    /// distance of a sudden push.
+    /// If a value is exactly at its limit, the joint does not count as pushed. The tested values are the feedback
+    /// torque, and the speed and distance of a sudden push.
     #[test]
     fn j66_the_limits_of_a_push_themselves_are_permitted() {
         for shares in [1.0, -1.0] {
@@ -514,8 +514,8 @@ mod tests {
             let velocity = bench.set_velocity(0.8);
             assert!(!bench.run(60, FOLLOW, (0.0, velocity)).1.pushed, "{shares}");
         }
-        // The speed of exactly 0.05 rad/s is not above the limit for braking. The feedback torque therefore does not
-        // count as braking, and the joint is pushed.
+        // A speed of exactly 0.05 rad/s is too low for the feedback torque to count as braking, so the joint counts
+        // as pushed.
         let braking = (ControlMode::Hold, true, false);
         assert!(Bench::settled().with_feedback(1.5).run(21, braking, (0.0, -0.05)).1.pushed);
         let most = Config::avena().joints[1].velocity_max;
@@ -527,8 +527,8 @@ mod tests {
         }
     }
 
-    /// A decelerating joint needs its feedback torque to stop, and a joint in a catch needs it to hold its load.
-    /// Neither counts as pushed.
+    /// A decelerating joint needs its feedback torque to stop. A joint in a catch needs it to hold its load. In both
+    /// cases, the joint does not count as pushed.
     #[test]
     fn j43_j66_a_joint_that_decelerates_or_is_caught_is_not_pushed() {
         for (decelerates, pushed) in [(false, true), (true, false)] {

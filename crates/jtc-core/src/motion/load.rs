@@ -10,12 +10,14 @@ const PERIOD: f64 = crate::JOINTS as f64;
 const TIME_S: f64 = 1.0;
 /// Highest load of a joint, as a share of the torque limit.
 const HIGHEST: f64 = 0.3;
-/// Largest difference between the integral and the load, as a share of the torque limit, at which the load follows
-/// the integral. A larger difference may come from a contact, so the load does not change.
+/// Largest difference between the torque of the integral and the learned load, as a share of the torque limit, at
+/// which the controller adapts the learned load. A larger difference may come from a contact, so the learned load
+/// does not change.
 const APART: f64 = 0.1;
-/// Largest change of the integral, as a share of the torque limit, at which the joint is still considered held steadily.
+/// Largest change of the integral torque of a joint that is held steadily, as a share of the torque limit.
 const STEADY: f64 = 0.03;
-/// Time of steady holding after which the controller takes the integral as the load, s.
+/// Time, s. After a joint was held steadily for this time, the controller takes the torque of the integral as the
+/// load.
 const STEADY_S: f64 = 10.0;
 
 /// Learned load of a joint.
@@ -49,7 +51,8 @@ impl Load {
         self.torque.into()
     }
 
-    /// Returns a torque (N·m), clipped to the range in which the controller accepts a load that it has not observed.
+    /// Limits a torque (N·m) to the highest load that the controller accepts without having observed it. Returns the
+    /// limited torque.
     pub(crate) fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
@@ -127,7 +130,8 @@ mod tests {
         assert!((load.torque(0.0) - 16.3).abs() < 0.1, "{}", load.torque(0.0));
         observe(&mut load, 16.3, 5.0);
         let known = load.torque(0.0);
-        // A larger difference between integral and load counts as a contact until the integral has been steady for ten seconds.
+        // A larger difference between integral and load counts as a contact, so the load does not change. After the
+        // integral has been steady for ten seconds, it is taken as the load.
         observe(&mut load, 40.0, 9.9);
         assert_eq!(load.torque(0.0), known);
         observe(&mut load, 40.0, 0.2);
@@ -144,8 +148,8 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// A load that was learned while a joint lowered it may be above the bound for a load. Further observations do
-    /// not reduce it to this bound.
+    /// If a load was learned while a joint lowered it, it can be above the bound for other loads. Later observations
+    /// do not reduce it to this bound.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();

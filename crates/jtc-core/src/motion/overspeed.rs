@@ -90,8 +90,9 @@ mod tests {
         }
     }
 
-    /// Four measurements above the threshold, one measurement below it, and four more above it are not five consecutive measurements. This
-    /// holds for a single fast joint, and for an arm whose joints are all fast.
+    /// Four measurements above the threshold, one below it and four above it do not cause an error, because five
+    /// consecutive measurements are needed. This applies to a single fast joint, and to an arm whose joints are all
+    /// fast.
     #[test]
     fn j35_a_measurement_within_the_threshold_restarts_the_time() {
         let config = Config::avena();

@@ -8,8 +8,8 @@ const WINDOW: usize = 5;
 /// Inverse of the length of the derivative window, 1/s.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
-/// Position error, in encoder steps, above which the integral of a joint at rest acts again. A joint that slips comes
-/// to rest within this distance.
+/// Position error, in encoder steps, above which the integral of a joint at rest changes again. A joint that slips
+/// moves less than this distance.
 const RELEASE_STEPS: f64 = 4.0;
 /// Rounding error of the positions on the bus, in encoder steps.
 const ROUNDING: f64 = 0.01;
@@ -53,9 +53,9 @@ impl Pid {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// Resets the state like [`reset`](Self::reset) with an error of 0, and sets the integral to `torque` (N·m). If
-    /// an earlier state held this torque, the torque continues without a step. If the integral gain is zero or the
-    /// integral reaches its bounds, the integral holds less torque.
+    /// Resets the state like [`reset`](Self::reset) with an error of 0, and sets the integral so that it produces
+    /// `torque` (N·m). The torque of the joint then continues without a step. With an integral gain of zero, or at
+    /// the integral bounds, the integral produces less torque.
     pub(crate) fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);
@@ -91,7 +91,7 @@ impl Pid {
         self.settled = encoder_step.is_some_and(|step| error.abs() <= settled_within * step);
         let grown = self.integral + error * DT;
         let integral = if saturated || self.settled { self.integral } else { grown };
-        // The bounds are also applied while the integral does not change, because new gains may have narrower bounds.
+        // The bounds are applied even while the integral does not change, because new gains can have narrower bounds.
         self.integral = integral.max(gains.int_min).min(gains.int_max);
         let [oldest, a, b, c, d] = self.errors;
         self.errors = [a, b, c, d, error];

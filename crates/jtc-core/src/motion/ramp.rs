@@ -1,4 +1,5 @@
-//! Bounds of a ramp of path time (J-33): the slopes at which the arm stays within its acceleration and torque limits.
+//! Bounds of a ramp of path time (J-33): the slopes of path time at which the arm stays within its acceleration and
+//! torque limits.
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
@@ -10,14 +11,16 @@ use crate::nodes::Nodes;
 use crate::trajectory::path::{Bounds, PathClock, SlopeBounds};
 use crate::{DT, JOINTS};
 
-/// Share of the acceleration limits that a pause, a stop or a resume may use. `RAMP_TORQUE` is the share of the
-/// torque limits. The remainder of each limit is for changes within a tick and for the position controller.
+/// Share of the acceleration limits that a pause, a stop or a resume uses at most. `RAMP_TORQUE` is the same share
+/// for the torque limits. The rest of each limit is a reserve for changes within a tick and for the position
+/// controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Share of the remaining torque that a stop may use after a hand has moved the arm. The position controller produces
-/// the torque of such a stop and overshoots, so the other part of the torque is a reserve.
+/// Share of the remaining torque that a stop uses at most after a hand has moved the arm. The rest is a reserve,
+/// because the position controller produces the torque of this stop and overshoots.
 const STOP_TORQUE: f64 = 0.5;
-/// Least share of the torque limit that a stop may use, even if the holding torque leaves hardly any torque.
+/// Least share of the torque limit that is available for a stop. It applies even if the holding torque leaves hardly
+/// any torque.
 const LEAST_LEFT: f64 = 0.1;
 
 /// Inertia of the arm at the start of a ramp.
@@ -38,7 +41,7 @@ impl PathRamp {
         }
     }
 
-    /// Creates a ramp that begins with this mass matrix of the arm, kg·m².
+    /// Creates a ramp of path time. `inertia` is the mass matrix of the arm at the start of the ramp, kg·m².
     #[cfg(test)]
     pub(crate) fn with_inertia_for_test(inertia: [[f64; JOINTS]; JOINTS]) -> Self {
         Self { inertia }
@@ -66,8 +69,8 @@ impl PathRamp {
         for j in 0..JOINTS {
             let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
             let (limit, held) = (config.joints[j].torque_max, law.torque[j].model + law.torque[j].load);
-            // In one direction of the motion, the holding torque helps to stop the joint. In the other direction, it
-            // reduces the torque that is available for the stop.
+            // Depending on the direction of the motion, the holding torque helps to stop the joint, or reduces the
+            // torque that is available for the stop.
             let left = (STOP_TORQUE * (limit + held * momentum.signum())).max(LEAST_LEFT * limit);
             longest = longest.max(STEEPEST_LED * momentum.abs() / (left * DT));
         }
@@ -165,9 +168,9 @@ mod tests {
     }
 
     proptest! {
-        /// A slope within the bounds keeps the acceleration and torque limits, and a slope outside the bounds
-        /// violates a limit. If a joint at rest is already above a limit, path time may at least keep its present
-        /// rate.
+        /// With a slope within the bounds, the arm stays within its acceleration and torque limits. With a slope
+        /// outside the bounds, it exceeds a limit. If a joint at rest already exceeds a limit, path time can at least
+        /// keep its present rate.
         #[test]
         fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
             velocity in velocities(),
@@ -252,8 +255,8 @@ mod tests {
         assert_eq!((ramp.coupling(0, 1), ramp.coupling(1, 0), ramp.coupling(1, 1)), (0.5, 0.25, 4.0));
     }
 
-    /// The peak torque of a stop is twice the momentum divided by the duration. A stop may use half of the torque
-    /// that the holding torque leaves of the limit of 64 N·m, and at least a tenth of the limit.
+    /// The peak torque of a stop is twice the momentum divided by the duration. The torque limit is 64 N·m. A stop
+    /// may use half of the torque that remains above the holding torque, and at least a tenth of the limit.
     #[test]
     fn j25_a_stop_after_teaching_takes_the_time_that_its_slowest_joint_needs() {
         let config = limited(64.0);
@@ -261,8 +264,8 @@ mod tests {
         // Joint 1 has the momentum 2·0.25 + 1·0.5 = 1 kg·m²/s. Joint 2 has no momentum.
         let coupled = [[2.0, 1.0], [0.0, 0.0]];
         for (inertia, velocity, torques, ms) in [
-            // The holding torque of 16 N·m helps. Half of 64 + 16 N·m is 40 N·m, so the stop takes 2·1 / 40 s = 50
-            // ms.
+            // The holding torque of 16 N·m helps to stop joint 1. Half of 64 + 16 N·m is 40 N·m, so the stop takes
+            // 2·1 / 40 s = 50 ms.
             (coupled, [0.25, 0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 50.0),
             // In the other direction, the holding torque reduces the available torque. Half of 64 − 16 N·m is 24 N·m,
             // so the stop takes 2·1 / 24 s.
@@ -276,7 +279,7 @@ mod tests {
             // stop takes 2·4 / 32 s = 250 ms. The other joint needs less time.
             ([[2.0, 0.0], [0.0, 4.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
             ([[8.0, 0.0], [0.0, 1.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
-            // The motions of both joints cause opposite momenta of joint 1, which cancel each other.
+            // The motion of joint 2 causes a momentum of joint 1 that cancels the own momentum of joint 1.
             (coupled, [0.25, -0.5], [torque(12.0, 4.0), torque(0.0, 0.0)], 0.0),
             (coupled, [0.0, 0.0], [torque(12.0, 4.0), torque(0.0, 0.0)], 0.0),
         ] {
@@ -297,7 +300,8 @@ mod tests {
         assert_eq!((clock.rate, clock.slope), (0.5, 0.0));
     }
 
-    /// The ramp takes a second, but a stop takes at most 250 ms. A change to another rate, which is not a stop, takes the whole ramp.
+    /// A ramp takes one second here, but a stop may take at most 250 ms. The stop is therefore finished after 250 ms.
+    /// A change of the rate that is not a stop takes the whole second.
     #[test]
     fn j33_a_stop_is_faster_than_a_ramp_that_takes_longer_than_a_stop_may() {
         let config = Config { ramp_ms: 1_000, stop_ms: 250, ..Config::avena() };
@@ -316,8 +320,8 @@ mod tests {
         assert!(after_250_ms(slows).rate > 0.5);
     }
 
-    /// Joint 1 needs 60 N·m, but its limit is 50 N·m. It has 2 kg·m² and moves at 1 rad/s at full speed, so a slope
-    /// of −5 1/s removes the excess. In one tick, the slope of path time changes by a tenth of the difference.
+    /// Joint 1 needs 60 N·m, 10 N·m above its limit of 50 N·m. It has 2 kg·m² and moves at 1 rad/s, so a slope of −5
+    /// 1/s removes these 10 N·m. In one tick, the slope of path time changes by a tenth of the difference to −5 1/s.
     #[test]
     fn j75_path_time_that_is_held_back_follows_the_slope_at_the_torque_limit() {
         let config = limited(50.0);
@@ -329,8 +333,8 @@ mod tests {
         assert!(close(clock.slope, -0.5) && close(clock.rate, 1.0 - 0.0005), "{clock:?}");
     }
 
-    /// Joint 2 yields, so it does not move along the path. Its coupling inertia does not load joint 1, and its own
-    /// limits do not bound the slope. Joint 1 has a torque of 40 N·m and an inertia of 2 kg·m².
+    /// Joint 1 has a torque of 40 N·m and an inertia of 2 kg·m². Joint 2 yields, so it does not move along the path.
+    /// Therefore its coupling inertia does not load joint 1, and its own limits do not bound the slope of path time.
     #[test]
     fn j68_a_joint_that_yields_does_not_bound_the_slope_of_path_time() {
         let config = limited(50.0);

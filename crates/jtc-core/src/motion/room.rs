@@ -11,11 +11,11 @@ use crate::motion::jog;
 /// Highest share of a torque limit that an approach uses. The remaining share is for the feedback torque, which needs
 /// up to a fifth of the limit in a fast approach.
 const APPROACH_TORQUE: f64 = 0.8;
-/// Highest share of a torque limit that a jog uses. The remaining share is for the feedback torque, and for the return from a position with
-/// a higher holding torque.
+/// Highest share of a torque limit that a jog uses. The rest is a reserve for the feedback torque, and for the return
+/// from a position with a higher holding torque.
 const JOG_TORQUE: f64 = 0.92;
-/// Share of the remaining torque that a jog may use. An approach also uses this share if the holding torque is so
-/// high that [`APPROACH_TORQUE`] would allow less.
+/// Share of the remaining torque that a jog may use. An approach also uses this share if it results in more torque
+/// than [`APPROACH_TORQUE`], which happens at high holding torques.
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
@@ -33,9 +33,10 @@ const CREEP: f64 = 0.02;
 const SLIDES: f64 = 0.1;
 /// Highest speed that counts as zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
-/// Least share of the torque limit that a motion to a lower holding torque may use.
+/// Least share of the torque limit that a joint may use for a motion to a position with a lower holding torque.
 const UNLOADING: f64 = 0.01;
-/// Least share of the tool speed limit for joints that become faster, so that a jog can always continue.
+/// Least share of the tool speed limit that the accelerating joints get together. A jog can therefore always
+/// continue.
 const LEAST_ROOM: f64 = 0.005;
 /// Lower bound for the acceleration of a jog, as a share of its highest acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
@@ -63,7 +64,7 @@ impl Motion {
             shortest = shortest.max(1_000.0 * sqrt(TOP_ACCELERATION * way.abs() / limits.acceleration_max));
         }
         let standing = [from, to].map(|q| self.standing(q, inputs));
-        // Returns a sufficient time for the approach, with the friction of an approach of `ms` milliseconds.
+        // Returns the time that an approach needs. The friction is that of an approach of `ms` milliseconds.
         let enough = |ms: f64| {
             let friction = compensation(inputs, &way.map(|way| 1_000.0 * TOP_SPEED * way / ms)).0;
             let times = (0..JOINTS).map(|j| {
@@ -85,8 +86,8 @@ impl Motion {
             times.fold(shortest, f64::max)
         };
         let longest = shortest + LONGER_MS;
-        // The friction of an approach is computed at its top speed. If the fastest approach leaves too little torque,
-        // the friction of the slowest permitted approach is used.
+        // The friction is computed at the top speed of the fastest approach. If this friction leaves too little
+        // torque, the computation is repeated with the slowest permitted approach.
         let time = enough(shortest);
         if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
     }
@@ -120,10 +121,12 @@ impl Motion {
         Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
     }
 
-    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The speed of the flange is bounded
-    /// by the sum of the absolute contributions of all joints. Contributions of opposite signs are not subtracted,
-    /// because the joints may accelerate differently. A joint that must not become faster slows down or keeps its
-    /// speed. The other joints share the remaining flange speed.
+    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The speed of the flange is at most
+    /// the sum of the contributions of all joints. Each contribution counts with its magnitude, because the joints
+    /// can accelerate differently.
+    ///
+    /// A joint that must not become faster slows down or keeps its speed. The other joints share the flange speed
+    /// that remains.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // Distance of the flange from the axis of each joint, m.
@@ -135,16 +138,16 @@ impl Motion {
         }
         let speed: f64 = (0..JOINTS).map(|j| reach[j] * wanted[j].abs()).sum();
         let share = if speed > most { most / speed } else { 1.0 };
-        // A joint with an acceleration still changes its speed until its acceleration is zero, and may reverse.
+        // An accelerating joint still changes its speed until its acceleration is zero, and it can reverse meanwhile.
         // `peak` is its highest speed in this time.
         let peak: [f64; JOINTS] = core::array::from_fn(|j| {
             let (v, a) = (set.velocity[j], set.acceleration[j]);
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
             v.abs().max(after.abs())
         });
-        // The speed of the joints that must not become faster is subtracted from the limit first. This reduces the
-        // share of the other joints. With a lower share, further joints may already be too fast, so the computation
-        // is repeated.
+        // Some joints must not become faster. Their speed is subtracted from the limit first, which reduces the share
+        // of the other joints. With this lower share, further joints can already be too fast, so the computation is
+        // repeated.
         let mut rising = share;
         for _ in 0..JOINTS {
             let (mut slower, mut faster) = (0.0, 0.0);
@@ -164,8 +167,8 @@ impl Motion {
         })
     }
 
-    /// Returns the highest share of the `wanted` velocities (rad/s) from which the joints can come to rest with the
-    /// torque that a jog may use.
+    /// Returns the highest share of the `wanted` velocities (rad/s) at which the joints can still be stopped with the
+    /// torque that is available to a jog.
     fn jog_speed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> f64 {
         let needed = |j: usize| {
             (0..JOINTS).map(|k| self.ramp.coupling(j, k).abs() * wanted[k].abs()).sum::<f64>() / REST_S
@@ -173,8 +176,8 @@ impl Motion {
         self.least_share(wanted, needed, inputs)
     }
 
-    /// Returns the share (0..1) of the torque `needed` by the joints (N·m) that is available for every joint. The available torque is the
-    /// share [`SHARE_OF_REST`] of the torque that remains during a jog at `velocity` (rad/s).
+    /// Returns the share (0..1) of the `needed` torques (N·m) that every joint can supply. For a jog at `velocity`
+    /// (rad/s), each joint can supply the share [`SHARE_OF_REST`] of its remaining torque.
     fn least_share(
         &self,
         velocity: &[f64; JOINTS],
@@ -208,8 +211,8 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that moves to a position with a lower holding torque may use a small torque, even if no torque
-            // remains. It must not have to lift its load beyond the torque limit.
+            // A joint may always use a small torque to move to a position with a lower holding torque. This does not
+            // apply if the joint would have to lift its load with more than the torque limit.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;

@@ -1,4 +1,5 @@
-//! Set values (J-40 to J-44) of the held arm, of joints that come to rest, of the approach, and of the path.
+//! Set-point computation (J-40 to J-44): for an arm that is held, for joints that come to rest, for the approach and
+//! for the path.
 use crate::bit_codec::bit_codec;
 use crate::commanded::Commanded;
 use crate::config::Config;
@@ -59,8 +60,8 @@ impl SetValues {
     /// Restarts all set values at rest at `position`, except the set values of the last ticks.
     fn restart(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
-        // J-63: a restart of the set values does not stop a joint. The prediction of missing answers must therefore
-        // not count it as a change of the velocity.
+        // J-63: a restart of the set values does not stop a joint. When the controller predicts missing answers, it
+        // must therefore ignore the jump of the commanded velocity at this restart.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
         self.led = false;
@@ -132,8 +133,8 @@ impl SetValues {
         self.jog.is_some() || self.deceleration.iter().any(Option::is_some)
     }
 
-    /// Begins to hold the arm at its measured position. An arm that still moves after hand guiding first comes to rest within `length_ms`.
-    /// The controller catches a moving arm like a falling load.
+    /// Begins to hold the arm at its measured position. An arm that still moves after hand guiding first comes to
+    /// rest within `length_ms`. During this time, each joint is in a catch, as if it carried a falling load.
     pub(crate) fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         if !velocity.iter().any(|&v| moves(v)) {
@@ -147,7 +148,7 @@ impl SetValues {
                 self.decelerate(j, led, config);
                 self.led = true;
             } else {
-                // A joint that is not held gets its set position when it is enabled later.
+                // This joint is not held. It gets its set position when it is enabled.
                 self.commanded.begin(j, from[j], 0.0, 0);
             }
         }

@@ -27,10 +27,11 @@ const FIRST: u8 = 9;
 /// Time between two comparisons of the load with the motion, ticks. `PERIOD` is the same time in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Thresholds for the torque of 1 kg at the flange on all joints together, as the root of the sum of squares
-/// (N·m/kg). Below the first threshold, the controller does not attribute any load to a mass. Above the second
-/// threshold, it uses the whole fitted mass. HoldPos cannot distinguish a load from static friction. In a pose in
-/// which a mass hardly loads the joints, a small friction torque would look like a large mass.
+/// Thresholds for the torque of 1 kg at the flange on all joints together (root of the sum of squares, N·m/kg). Below
+/// the first threshold, no load is attributed to a mass. Above the second threshold, the whole fitted mass is used.
+///
+/// The thresholds are necessary, because HoldPos cannot distinguish a load from static friction. In a pose in which a
+/// mass hardly loads the joints, a small friction torque would look like a large mass.
 const LOADS: (f64, f64) = (2.0, 6.0);
 /// Time for which a mass must have driven the arm without a hand before the controller begins to remove the mass, ms.
 /// `GOES_S` is the time constant of the removal, s.
@@ -40,8 +41,8 @@ const GOES_S: f64 = 1.5;
 /// ms. `COMES_BACK_S` is the time constant of this return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed above which the controller assumes that a hand moves a joint, rad/s. `WAY` is the distance of the fastest
-/// joint over which the torque that no mass explains falls to a third, rad.
+/// Speed above which the controller assumes that a hand moves a joint, rad/s. `WAY` is a distance, rad: while the
+/// fastest joint moves by this distance, the torque that no mass explains falls to 37 %.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 
@@ -50,7 +51,7 @@ const WAY: f64 = 0.3;
 enum Turn {
     /// First tick of Teaching, in which all learned loads act.
     Begin,
-    /// Computes the mass at the flange that explains the learned loads.
+    /// Computes the mass at the flange whose torques are closest to the learned loads.
     Mass,
     /// Computes nothing for Teaching. In this tick, the ramp computes the inertia of the whole arm.
     Ramp,
@@ -100,8 +101,8 @@ pub(crate) struct Taught {
     mass: f32,
     /// Torque of 1 kg at the flange on each joint, N·m.
     unit: [f32; JOINTS],
-    /// Time for which the mass alone has explained the motion, ms. `sinks_ms` is the time for which a joint has sunk
-    /// because the mass was removed, ms.
+    /// Time for which the torque of the mass has been the only cause of the motion, ms. `sinks_ms` is the time for
+    /// which a joint has sunk because the mass was removed, ms.
     driven_ms: u16,
     sinks_ms: u16,
     /// Excess of the flange speed over the tool speed limit, from 0 (no excess) to 1 (twice the limit).
@@ -143,8 +144,8 @@ impl Taught {
     }
 
     /// Reduces the estimated mass by `mass` (kg), because the model contains this mass at the flange from this tick
-    /// on (J-60). The estimated mass is reduced at most to zero. A larger `mass` was not yet on the arm when the
-    /// controller estimated the mass.
+    /// on (J-60). The estimate is reduced at most to zero. If `mass` is larger than the estimate, the payload was not
+    /// on the arm when its mass was estimated.
     pub(crate) fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
@@ -163,8 +164,8 @@ impl Taught {
         Turn::of(self.turn) == Turn::Begin
     }
 
-    /// Returns `true` in a tick in which Teaching computes nothing, so that the ramp has time to compute the inertia
-    /// of the whole arm.
+    /// Returns `true` in a tick in which Teaching computes nothing. In this tick, there is time to compute the
+    /// inertia of the whole arm for a ramp of path time.
     pub(crate) fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
@@ -176,8 +177,9 @@ impl Taught {
     }
 
     /// Computes at most one of the slowly changing values. Returns `true` if the tick then has no time left for the
-    /// torques of the joints. In the first tick of Teaching, only the load torque is set, so that the torque has no
-    /// step.
+    /// torques of the joints.
+    ///
+    /// In the first tick of Teaching, only the load torque is set, so that the torque has no step.
     #[inline(never)]
     pub(crate) fn look(
         &mut self,

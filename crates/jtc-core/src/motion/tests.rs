@@ -31,8 +31,8 @@ fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_posi
     assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
-/// An arm that is already at rest is held at once, without a ramp to rest. Otherwise the torque limits would not
-/// apply during this ramp, and no motion could begin.
+/// An arm that is already at rest is held at once, without a deceleration. During a deceleration, the torque limits
+/// would not apply and no new motion could begin.
 #[test]
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
@@ -83,8 +83,8 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching begins when the arm is held and the loads of its joints are known. If a contact may press on the arm,
-/// Teaching begins after 2 s even if the loads are unknown.
+/// Teaching begins when the arm is held and the loads of its joints are known. If an obstacle may press on the arm (a
+/// contact), Teaching begins after 2 s even if the loads are unknown.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     for (held, contact, waits_ms, known, may) in [
@@ -130,8 +130,8 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
     for (held, enabled, velocity, follows, catches, falls) in [
         (true, true, 0.0, false, false, false),
         (true, true, 0.5, false, false, false),
-        // Joint 4 was just enabled, so it is latched at its measured position. Its load may also move the other
-        // joints, so their catch begins again.
+        // Joint 4 was just enabled, so it is latched at its measured position. A moving load of joint 4 can also move
+        // the other joints, so their catch begins again.
         (false, true, 0.0, true, true, false),
         (false, true, 0.5, true, true, true),
         // Joint 4 is not enabled, so its set values follow its measured values, even if it was held before.

@@ -12,7 +12,7 @@ const FALL_MS: u16 = 10;
 /// Parts of the last torque that the next torque must continue without a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
-    /// All parts of the torque except the model torque, because only the model torque may step.
+    /// All parts of the torque except the model torque, which changes at once.
     Correction,
     /// All parts of the torque, including the model torque.
     Everything,
@@ -61,19 +61,20 @@ impl BitCodec for Continued {
 }
 
 impl Transfer {
-    /// Prepares a change of the control mode, at which only the torque of the model may step.
+    /// Prepares a change of the control mode. Only the model torque changes at once.
     pub(super) fn change_mode(&mut self) {
-        // A change of the model in the same tick has priority, because then no part of the torque may step.
+        // A change of the model in the same tick has priority, because it requires that the whole torque continues
+        // without a step.
         self.next.get_or_insert(Continued::Correction);
     }
 
-    /// Prepares a change of the model, at which no torque may step.
+    /// Prepares a change of the model. The whole torque continues without a step.
     pub(super) fn change_model(&mut self) {
         self.next = Some(Continued::Everything);
     }
 
-    /// Prepares the yield of a joint from the next tick on. Only the model torque may step. If the torque must become
-    /// lower, it falls to its new value within [`FALL_MS`] (J-68).
+    /// Prepares the yield of a joint from the next tick on. Only the model torque changes at once. If the new torque
+    /// is lower, the torque falls to it within [`FALL_MS`] (J-68).
     #[inline(always)]
     pub(super) fn begin_yield(&mut self, joint: usize) {
         self.next.get_or_insert(Continued::Correction);
@@ -175,8 +176,8 @@ mod tests {
         }
     }
 
-    /// The excess torque of a joint that begins to yield falls within 10 ms. The torque of the other joints is blended out as at any other
-    /// change of state. The torque of no joint has a step.
+    /// The torque of a joint that begins to yield must fall. The part above the new torque fades to zero within 10
+    /// ms. The torque of the other joints is blended out as at any other change of state. No joint has a torque step.
     #[test]
     fn j44_j68_the_torque_of_a_joint_that_begins_to_yield_falls_within_10_ms() {
         let mut transfer = Transfer::default();
@@ -205,9 +206,9 @@ mod tests {
         (0..10).map(|_| blended(transfer, 0.0)).last().unwrap_or_default()
     }
 
-    /// Another change of the torques comes `ms` after joint 3 has begun to yield. If the torque of joint 3 is still
-    /// falling, it reaches its new value within 10 ms. Otherwise its torque is blended out like that of the other
-    /// joints. After 10 of 100 ms, 1 - 3 · 0.1² + 2 · 0.1³ = 0.972 of the step is left.
+    /// The torques change again `ms` after joint 3 has begun to yield. If the torque of joint 3 is still falling at
+    /// this time, it reaches its new value within the next 10 ms. If it is no longer falling, it is blended out like
+    /// that of the other joints. After 10 of 100 ms, 1 - 3 · 0.1² + 2 · 0.1³ = 0.972 of the step is left.
     #[test]
     fn j44_j68_a_torque_that_falls_goes_on_falling_when_another_joint_yields() {
         for (ms, falls) in [(1, true), (5, true), (9, true), (10, false), (15, false)] {
@@ -247,8 +248,8 @@ mod tests {
         }
     }
 
-    /// The torque of a joint that was just enabled begins at the torque of the model, so the correction of 5 N·m is blended in. The torque
-    /// of the other joints does not change.
+    /// The torque of a joint that was just enabled begins at the torque of the model, and its other torques of 5 N·m
+    /// are blended in. The torques of the other joints are not affected.
     #[test]
     fn j16_j44_only_the_joint_that_was_just_enabled_begins_at_the_torque_of_the_model() {
         let mut transfer = Transfer::default();

@@ -23,13 +23,16 @@ const STRETCH: f64 = 0.02;
 /// Highest natural frequency of the spring together with the inertia of the joint, 1/s.
 pub(crate) const SPRING_RATE: f64 = 30.0;
 /// Highest rate at which the damper of a lowered load reduces a speed, 1/s. Several joints that lower loads share
-/// this rate. Held joints affect each other at frequencies at which a delayed speed measurement makes the loop
-/// unstable. At these frequencies, the effective inertia of a joint is only a third of its inertia with all other
-/// joints fixed.
+/// this rate.
+///
+/// The rate is low, because held joints affect each other, and a delayed speed measurement makes the loop unstable at
+/// the frequencies of this effect. At these frequencies, a joint has only a third of the inertia that it has while
+/// all other joints are fixed.
 const LOWERING_RATE: f64 = 40.0;
-/// Share of the remaining change by which the damping and the stiffness approach their final values in each tick.
+/// Share of the remaining change that the damping and the stiffness make in each tick, until they reach their final
+/// values.
 const SETTLES: f64 = 0.2;
-/// Share of the remaining change by which the brake approaches its full effect in each tick, like [`SETTLES`].
+/// Share of the remaining change that the brake makes in each tick, like [`SETTLES`].
 const BRAKE_SETTLES: f64 = 0.5;
 /// Highest rate at which a damper reduces the speed of a joint, 1/s. Measured speeds are about 8 ms old, because the
 /// drives average them. A single joint would oscillate above 200 1/s, and joints that affect each other oscillate at
@@ -46,20 +49,22 @@ const BRAKE_RATE: f64 = 250.0;
 const CALM: f64 = 0.05;
 /// Speed below which a lowered load is at rest, rad/s.
 const AT_REST: f64 = 0.02;
-/// Time for which a joint must be calm before the controller holds it again, ms. If the load seems to have driven the
-/// joint for `DRIVEN_CALM_MS`, the joint does not count as calm.
+/// Time for which a joint must be calm before the controller holds it again, ms. A joint is not calm if its load has
+/// seemed to drive it for `DRIVEN_CALM_MS`.
 const CALM_MS: u16 = 200;
 const DRIVEN_CALM_MS: u16 = 50;
-/// Lowest torque of gravity and load on a joint, as a share of the torque limit, at which a motion counts as sinking.
+/// Least torque of gravity and load at which a motion counts as sinking, as a share of the torque limit.
 const LOADED: f64 = 0.05;
 /// Distance (rad) and time (ms) of sinking after which the joint counts as overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
 /// Time constant for the torque of the damper to become part of the load, s.
 const LEARNS_S: f64 = 0.5;
 /// Range of the torque of spring and damper, as a share of the load, in which the load seems to drive its joint.
-/// Friction takes the remaining share. If this lasts for [`DRIVEN_MS`], the controller assumes that a person leaned
-/// on the arm while the load was learned. The load then fades with the time constant [`GOES_S`] (s). It returns with
-/// [`COMES_BACK_S`] (s) if the joint sinks without the load.
+/// Friction takes the rest.
+///
+/// If the load seems to drive its joint for [`DRIVEN_MS`], the controller assumes that a person leaned on the arm
+/// while the load was learned. The load then fades with the time constant [`GOES_S`] (s). If the joint sinks without
+/// the load, the load returns with [`COMES_BACK_S`] (s).
 const DRIVEN: (f64, f64) = (0.5, 1.2);
 /// Speed above which a load seems to drive its joint, rad/s.
 const CREEPS: f64 = 0.002;
@@ -99,8 +104,8 @@ pub(crate) struct Yield {
     braking: f64,
     grip: f64,
     swing: Swing,
-    /// `true` if the position controller can hold the load of the joint. `cleared` is `true` if the host requests
-    /// that it holds the load.
+    /// `true` if the position controller can hold the load of the joint. `cleared` is `true` if the host has cleared
+    /// the yield, so that the position controller may hold the joint again in any case.
     holdable: bool,
     cleared: bool,
     calm_ms: u16,
@@ -184,7 +189,8 @@ impl Yield {
         self.set
     }
 
-    /// Returns `true` if the joint has been calm for [`CALM_MS`]. The yield may nevertheless continue until the host clears the yield.
+    /// Returns `true` if the joint has been calm for [`CALM_MS`]. If the yield stays until the host clears it, it
+    /// does not end yet.
     pub(crate) fn is_calm(&self) -> bool {
         self.calm_ms >= CALM_MS
     }
@@ -216,10 +222,9 @@ impl Yield {
         self.lowers || self.load != self.least
     }
 
-    /// Returns the torque that the position controller must produce after the yield, N·m: the load plus the torque of
-    /// the `spring` (N·m). If the spring has opposed a part of the load, this part does not act after the yield. If
-    /// the spring has held a part of a reduced load, the position controller continues to hold this part. The result
-    /// is never larger than the load at the beginning.
+    /// Returns the torque that the position controller must produce after the yield, N·m. It is the load plus the
+    /// torque of the `spring` (N·m): a spring that opposes the load reduces it, and a spring that helps to hold the
+    /// joint increases it. The result is never larger than the load at the beginning of the yield.
     pub(crate) fn left(&self, spring: f64) -> f64 {
         if self.lowers {
             self.load
@@ -228,8 +233,8 @@ impl Yield {
         }
     }
 
-    /// Returns the load torque for Teaching, N·m. If the controller has reduced the load to less than half, the load
-    /// may not exist. Teaching then uses only the part that the `spring` (N·m) has not opposed.
+    /// Returns the load torque for Teaching, N·m. If the controller has reduced the load to less than half, it is
+    /// doubtful whether this load exists. Teaching then uses only the part that the `spring` (N·m) has not opposed.
     pub(crate) fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }
@@ -268,7 +273,8 @@ impl Yield {
         let end = soft_end::spring(soft_end::depth(joint.position, joint.range), most);
         let pull = stiffness * (self.set - joint.position) + end;
         let spring = self.grip * pull.max(-most).min(most);
-        // The sum of spring and damper exceeds the share only during a shove.
+        // The sum of spring and damper exceeds its permitted share of the torque limit only during a fast push,
+        // because of the damper.
         let p = if self.lowers { 0.0 } else { within(spring, d, most) };
 
         let carried = joint.model + if self.lowers { self.least } else { self.load };
@@ -319,8 +325,9 @@ impl Yield {
     }
 }
 
-/// Returns the torque of a brake against a fast motion of a joint with this `inertia` (kg·m²), N·m. The damper of a joint with little
-/// inertia cannot stop a shove, because the measured speed is too old.
+/// Returns the torque of the brake against a fast motion of a joint with this `inertia` (kg·m²), N·m. The brake is
+/// necessary for a joint with little inertia: its damper cannot stop a fast push, because the measured speed is too
+/// old.
 fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
     let JointConfig { torque_max, velocity_max, .. } = *joint.limits;
     let slope = (torque_max / ((to - from) * velocity_max)).min(BRAKE_RATE * inertia);

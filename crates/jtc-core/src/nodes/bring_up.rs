@@ -7,7 +7,7 @@ use crate::{JOINTS, NODES};
 
 /// Number of Moves between two frames that the controller sends instead of a Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
-/// Like [`MOVES_BETWEEN`], if the torque is on and only the gripper needs a frame other than Move.
+/// Like [`MOVES_BETWEEN`], while the torque is on and no node except the gripper needs such a frame.
 const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {

@@ -34,26 +34,28 @@ use lateness::Lateness;
 /// this speed in the time since the last usable answer. An answer is not usable if it is farther from its prediction
 /// (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Largest distance from the prediction at which an answer is used for the rate of the joint, as a share of the
-/// implausible distance. An answer farther away may show a jump of the encoder instead of a motion.
+/// Largest distance from the prediction, as a share of the implausible distance, at which an answer is used to
+/// compute the rate of the joint. A larger distance can come from a jump of the encoder.
 const UNEXPECTED: f64 = 0.1;
 /// Largest distance between a late answer and its prediction at which the answer is used directly, in encoder steps.
-/// A few steps are permitted, because positions and predicted rates have only the resolution of the encoder.
+/// The limit is more than one step, because positions and predicted rates have only the resolution of the encoder.
 const IN_ITS_PLACE: f64 = 2.0;
-/// Largest encoder step to which [`IN_ITS_PLACE`] is applied, rad. An answer that is used directly may cause a position step of this size.
+/// Largest encoder step for [`IN_ITS_PLACE`], rad. With a coarser encoder, an answer that is used directly could
+/// cause a larger position step than this.
 const COARSEST: f64 = 1e-4;
-/// Largest distance from the prediction at which an answer is used after an encoder jump was subtracted from it, as a
-/// share of the implausible distance.
+/// Largest distance from the prediction at which a corrected answer is used, as a share of the implausible distance.
+/// A corrected answer is an answer from which an encoder jump was subtracted.
 const NEAR: f64 = 0.5;
 /// Highest difference between the predicted rate of a joint and its reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
-/// Largest ratio of two deviations from the due velocity. The first is the deviation of the velocity over the last 5
-/// ms, and the second is the deviation of the reported mean over 10 ms. At a constant acceleration, the ratio is 2.
+/// Limit of the velocity over the last 5 ms, relative to the reported velocity, which is a mean over 10 ms. Both are
+/// compared with the due velocity. The first deviation may be at most this multiple of the second. At a constant
+/// acceleration, it is twice the second.
 const YOUNGER: f64 = 2.5;
 /// Highest rate of a joint in a prediction, as a multiple of the velocity limit.
 const FASTEST: f64 = 1.2;
-/// Double pole of the filter for a fading offset, multiplied by the configured time. After the configured time a fifth of the offset
-/// remains, and after twice this time a fiftieth.
+/// Product of the double pole of the filter for a fading offset and the configured time. With this value, a fifth of
+/// the offset remains after the configured time, and a fiftieth after twice this time.
 const FADING: f64 = 3.0;
 /// Magnitude below which an offset is set to zero, rad or rad/s.
 const FADED: f64 = 1e-9;
@@ -97,7 +99,7 @@ pub(crate) enum Outcome {
     Used,
     /// The answer is not usable or is missing, so the control law uses the prediction.
     Predicted,
-    /// The answer is usable and confirms that the encoder has jumped (J-35).
+    /// The answer is usable, and it shows that the encoder has jumped (J-35).
     Jumped,
 }
 
@@ -255,8 +257,10 @@ impl Measurement {
 
     /// Returns the velocity over the last 5 ms, rad/s, which is more recent than the reported velocity. Its
     /// difference from the `due` velocity (rad/s) is limited to [`YOUNGER`] times the difference between the reported
-    /// and the `due` velocity. If these two differences have opposite signs, the encoder has jumped while the joint
-    /// did not move, and the function returns the `due` velocity.
+    /// and the `due` velocity.
+    ///
+    /// If the two differences have opposite signs, the encoder has jumped while the joint did not move. The function
+    /// then returns the `due` velocity.
     pub(super) fn young_velocity(&self, due: f64) -> f64 {
         // The reported velocity includes the remainder of a fading offset, which is older than the measurement. This
         // remainder is subtracted.
@@ -275,8 +279,8 @@ impl Measurement {
         self.jumps.taken_off()
     }
 
-    /// Returns the disagreement of the two encoders of the joint since its drive was configured. The second element is the size of a jump
-    /// (rad) or the factor of a speed.
+    /// Returns the disagreement of the two encoders of the joint since its drive was configured. The second element
+    /// is the size of an encoder jump (rad), or the ratio of the speed from the positions to the reported speed.
     pub(super) fn misfit(&self) -> Option<(StopKind, f64)> {
         self.jumps.found()
     }
@@ -286,8 +290,8 @@ impl Measurement {
         self.jumps.find_factor(factor);
     }
 
-    /// Returns the distances of the joint within the window of its reported speed, according to its positions and according to this speed.
-    /// Returns `None` if the distances are not known.
+    /// Returns two distances of the joint over the window in which the drive averages its speed: one from the
+    /// positions, and one from the reported speed. Returns `None` if the distances are not known.
     pub(super) fn ways(&self, config: &Config) -> Option<Ways> {
         let window_ms = config.drive_speed_window_ms;
         let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
@@ -305,8 +309,8 @@ impl Measurement {
         self.commanded = commanded;
     }
 
-    /// Executes one tick of the measurement. The jump of the encoder has already been subtracted from the answer in `tick`. `past` returns
-    /// the motion that was commanded in the last ticks, for a number of ticks.
+    /// Executes one tick of the measurement. A known jump of the encoder has already been subtracted from the answer
+    /// in `tick`. For a number of ticks, `past` returns the motion that was commanded in these last ticks.
     pub(super) fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
@@ -325,22 +329,22 @@ impl Measurement {
         }
     }
 
-    /// Executes the remaining steps of a tick whose answer may be late. `tick` is passed by value, because a `tick` in memory would slow
-    /// down every tick.
+    /// Executes the remaining steps of a tick whose answer may be late. `tick` is passed by value. A reference would
+    /// keep the value in memory and slow down every call of the normal path.
     #[cold]
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
-        // An answer is always more recent than the last answer, which limits its lateness. The counted lateness may be wrong, because a
-        // repeated frame also counts as a late answer.
+        // An answer cannot be older than the answer before it, which limits its lateness. The counted lateness can be
+        // wrong, because a repeated frame also counts as a late answer.
         let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
         let ticks = if self.known { counted.min(since.min(u8::MAX.into()) as u8) } else { counted };
         let late = self.late(ticks, &tick, past, config);
         self.take(&tick, late, config)
     }
 
-    /// Uses the answer of a tick if it is usable. The function is inlined, because in a tick without a late answer the compiler can remove
-    /// half of its code.
+    /// Uses the answer of a tick if it is usable. The function is inlined: where no answer is late, the compiler can
+    /// then remove half of its code.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -378,14 +382,14 @@ impl Measurement {
             self.answer = Reading { position: answer.position + since(self.carried), ..answer };
             self.answered_ms = at_ms;
             self.commanded = late.map_or(tick.commanded, |late| late.commanded);
-            // After missing or late answers, this answer may differ from the prediction. The difference is bridged,
-            // so that it causes no step.
+            // After missing or late answers, this answer can differ from the prediction. The difference becomes an
+            // offset that fades, so that it causes no step.
             if known && (self.missing || late.is_some()) {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
-            // While a suspected jump is not confirmed, the joint is treated as if an answer were missing. The next
-            // answer is then bridged.
+            // While a suspected jump is not confirmed, the joint is treated as if an answer were missing. A
+            // difference between the next answer and the prediction then becomes a fading offset.
             self.missing = self.jumps.watching();
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
@@ -404,8 +408,8 @@ impl Measurement {
     #[inline(never)]
     fn unexpected(&mut self, unexpected: Unexpected, config: &Config) -> (Option<Reading>, Outcome) {
         let Unexpected { answer, off, reach, at_ms, looked_at, joint } = unexpected;
-        // The positions of a drive wrap around at ±π. After the jump of the encoder is subtracted, a position may be
-        // on the other side of this point.
+        // The positions of a drive wrap around at ±π. When the jump of the encoder is subtracted from a position, the
+        // result may be beyond this point, so a full turn is added or subtracted.
         let turn = if self.jumps.taken_off() == 0.0 || off.abs() <= PI { 0.0 } else { off.signum() * TAU };
         let (answer, off) = (Reading { position: answer.position + turn, ..answer }, off - turn);
         let seen = if off.abs() <= UNEXPECTED * reach || !looked_at {
@@ -415,8 +419,8 @@ impl Measurement {
             let twist = torque_max / config.gear_stiffness;
             self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
         };
-        // After the jump is subtracted, the position must be near the predicted position. Otherwise the reported
-        // speed is also wrong, so the jump is not confirmed.
+        // After the jump is subtracted, the position must be near the predicted position. If it is not, the reported
+        // speed is wrong too, and the jump is not confirmed.
         let near = |way: f64| (off + way).abs() <= NEAR * reach;
         let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
         match seen {
@@ -432,9 +436,11 @@ impl Measurement {
         }
     }
 
-    /// Bridges the difference between the answer of this tick and `predicted`, so that it does not cause a step. An
-    /// answer close to its prediction (`in_its_place`) causes no step. It reduces the remaining offset of earlier
-    /// differences, which would otherwise add up.
+    /// Turns the difference between the answer of this tick and `predicted` into an offset that fades, so that the
+    /// difference does not cause a step.
+    ///
+    /// An answer close to its prediction (`in_its_place`) causes no step, so it adds no offset. It reduces the
+    /// remaining offset of earlier differences, which would otherwise add up.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -460,8 +466,8 @@ impl Measurement {
         if !self.known || in_its_place(&counted) {
             return Some(counted);
         }
-        // If a lost answer was counted as a late answer, the counted lateness is too high. For a fast joint, the
-        // positions show this at once: they match the prediction for a lower lateness.
+        // A lost answer may have been counted as a late answer, so that the counted lateness is too high. For a fast
+        // joint, the positions show this at once, because they match the prediction for a lower lateness.
         let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
             return Some(counted);
         };
@@ -469,10 +475,11 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Computes the rate of the joint from this answer and the most recent answer that is old enough. Predictions are
-    /// not used. While every second answer is lost, a rate that is computed from predictions would confirm itself for
-    /// any motion of the joint. `as_predicted` is `true` if the answer was close to its prediction. The function is
-    /// inlined, so that ticks without a late answer need less code.
+    /// Computes the rate of the joint from this answer and the most recent answer that is old enough. `as_predicted`
+    /// is `true` if the answer was close to its prediction.
+    ///
+    /// Predictions are not used. While every second answer is lost, a rate from predictions would never be corrected.
+    /// The function is inlined, so that ticks without a late answer need less code.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;

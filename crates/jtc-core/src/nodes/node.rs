@@ -51,7 +51,7 @@ pub(crate) struct Node {
     pub(super) fresh: bool,
     /// `true` if the joint is marked as absent (J-53).
     pub(super) absent: bool,
-    /// State that the node reported although the controller ignores its answers.
+    /// State that the drive of an absent joint reported, although the controller ignores its answers.
     pub(super) unasked: Option<NodeState>,
     /// Number of answers since the last tick. All answers except the last one were late.
     pub(super) answers: u8,
@@ -209,8 +209,8 @@ impl Node {
 mod tests {
     use super::*;
 
-    /// If the short check returns `true` for an enabled node, the complete checks also request nothing from this
-    /// node.
+    /// For an enabled node, the quick check may return `true` only if the complete checks also request nothing from
+    /// the node.
     #[test]
     fn j12_j16_an_enabled_node_wants_nothing() {
         for bits in 0..16u8 {

@@ -14,8 +14,8 @@ use crate::config::limits::JointConfig;
 const PERIOD: u8 = 10;
 /// Number of consecutive checks of a joint that must show a difference in the same direction before the fault is reported.
 const LOOKS: u8 = 5;
-/// Lowest sum of the differences that counts as a fault, as a multiple of the largest gear twist. A hand or a wall may twist the gear by
-/// less than this angle.
+/// Lowest sum of the differences that counts as a fault, as a multiple of the largest gear twist. A twist of the gear
+/// by a hand or a wall stays below this sum.
 const TWISTS: f64 = 2.0;
 /// Ratio of the two distances above which the encoder with the shorter distance is considered to be at rest.
 const STANDS: f32 = 10.0;
@@ -81,7 +81,8 @@ impl Differs {
         limits: &JointConfig,
         config: &Config,
     ) -> bool {
-        // `twist` is the possible twist of the gear since the last check.
+        // `twist` is the angle by which the gear can have twisted since the last check, because the torque has
+        // changed.
         let twist = (node.report.torque - f64::from(before)).abs() / config.gear_stiffness;
         if ways.unexplained().abs() <= ways.tolerance(config) + twist {
             self.looks = 0;

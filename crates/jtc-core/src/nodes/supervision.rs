@@ -26,8 +26,8 @@ impl Nodes {
             }
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
-            // A frame that no node has acknowledged cannot have an answer, but the transmit timeout has not been raised yet. Therefore the
-            // controller still predicts the motion of the joint (J-63).
+            // A frame without an acknowledgement cannot have an answer. Until the transmit timeout is raised, the
+            // controller therefore predicts the motion of the joint (J-63).
             let predicted =
                 self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
@@ -45,13 +45,14 @@ impl Nodes {
             }
             let enabled_gripper = n == GRIPPER && node.report.state == NodeState::ENABLED;
             if node.silent == config.missed_moves_max && !enabled_gripper {
-                // In any state, a silent node may have lost its supply and therefore its configuration. When an enabled gripper answers
-                // again, its state shows whether it has lost its configuration. If the gripper is still enabled, it has kept its workpiece.
+                // A silent node in any state may have lost its supply and therefore its configuration. An enabled
+                // gripper is an exception: when it answers again, its state shows whether it has lost its
+                // configuration. If the gripper is still enabled, it holds its workpiece.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: the answers of the joint contain impossible positions, or too few Moves were acknowledged to
-                // know if the joint answers. After `missed_moves_max` ticks, the controller must not predict the
-                // motion of the joint any longer (J-63).
+                // J-35: the answers of the joint contain impossible positions, or missing acknowledgements hide
+                // whether the joint answers. The controller must not predict the motion of a joint for more than
+                // `missed_moves_max` ticks (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();
@@ -79,7 +80,8 @@ impl Nodes {
                 node.misbehaved = true;
             }
             node.enabled = false;
-            // J-16: the controller does not request OperationEnable while the arm falls, so the waiting time is not counted.
+            // J-16: while the arm falls, the controller does not request OperationEnable. This time does not count as
+            // waiting time.
             node.enable_wait = node.enable_wait.saturating_add(u32::from(may_enable));
             if node.enable_wait > config.enable_timeout_ms {
                 (node.misbehaved, node.enable_wait) = (true, 0);

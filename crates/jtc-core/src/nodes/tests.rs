@@ -57,7 +57,7 @@ fn j16_joints_may_be_enabled_when_they_were_slow_and_rested_for_long_enough() {
     }
 }
 
-/// The time during which the arm is almost at rest is counted only after the positions of all joints are known.
+/// The time for which the arm is almost at rest counts only while the positions of all joints are known.
 #[test]
 fn j16_an_arm_that_is_not_known_is_not_still() {
     let mut nodes = ready();
@@ -93,7 +93,8 @@ fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
     assert_eq!(watched(false, NodeState::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::READY, 0, 0, Goal::Enabled), (true, false, 0));
-    // If a joint has changed back to Init, the controller returns to Init (J-20). The check of J-16 does not report such a joint.
+    // If a joint has changed back to Init, the controller returns to Init (J-20). The check for joints that leave
+    // OperationEnable (J-16) must not also report this joint as an error.
     assert_eq!(watched(true, NodeState::INIT, 0, 0, Goal::Enabled), (false, false, 0));
     for goal in [Goal::Ready, Goal::Down] {
         assert_eq!(watched(true, NodeState::READY, 7, still, goal), (false, false, 0), "it was asked to");

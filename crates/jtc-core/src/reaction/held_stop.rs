@@ -22,7 +22,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Like [`Self::hold_stop`], for a stop whose cause is already known.
     pub(crate) fn hold_stop_for(&mut self, errors: &[u16; JOINTS], cause: StopCause) {
-        // A cause that occurs while the arm is already held is usually a consequence of the first cause.
+        // The controller stores only the first cause. A cause that occurs while the arm is already held is usually a
+        // consequence of the first cause.
         if !self.errors.held_stop() {
             self.keep_cause(cause);
         }
@@ -64,7 +65,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         for j in 0..JOINTS {
             let speed = f64::from(speeds[j]);
             let limit = too_fast(&self.config.joints[j], &self.config);
-            // The speed that the drive reports is older than the computed speed, but it shows whether the encoder has jumped.
+            // A jump of the encoder changes the computed speed, but not the speed that the drive reports. The
+            // reported speed is older, so it must exceed only half of the limit.
             if speed.abs() > limit && self.nodes.node(j).report.velocity * speed.signum() > 0.5 * limit {
                 self.teaching = false;
                 let cause = self.cause(StopKind::Shove, j, speed, limit);

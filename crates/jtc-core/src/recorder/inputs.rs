@@ -15,17 +15,19 @@ use crate::{JOINTS, NODES};
 
 /// Longest host frame whose bytes the log contains.
 pub(super) const HOST_BYTES: usize = 48;
-/// Allowance for the bytes of host frames in the log: the average per tick, and the highest number at one time.
+/// Allowance for the bytes of host frames in the log: the average number of bytes per tick, and the highest number of
+/// bytes at one time.
 const ALLOWANCE: (u16, u16) = (2, 500);
 /// Bytes that an event takes from the allowance, in addition to the bytes of its frame. Without its frame, an event
 /// takes 15 to 20 bits in the log.
 const EVENT_BYTES: u16 = 2;
 
-/// Values to which the encoding of the next inputs refers.
+/// Values of earlier ticks. The inputs of the next tick are encoded relative to these values.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
-    /// Lengths and words (from [`words`]) of the last answers to a Move. Velocity and torque belong to the last tick in which another word
-    /// of the answer had changed.
+    /// Lengths and words (from [`words`]) of the last answers to a Move. The log contains velocity and torque
+    /// completely in each tick. These two values are therefore updated here only in ticks in which other words of the
+    /// answers change.
     pub(super) len: [u8; NODES],
     pub(super) words: [Words; NODES],
     /// Number of nodes that are expected to answer.
@@ -278,8 +280,8 @@ impl Reference {
                 to.put(count.into(), 8);
             }
         }
-        // `looked_at` contains the completed events and the next event, which the controller has executed in part or not at all. The log
-        // contains at most as many of these events as the allowance permits.
+        // The controller has completed the first `done` events, and may have executed a part of the next event.
+        // `looked_at` contains all these events. The log contains as many of them as the allowance permits.
         let looked_at = inputs.host.get(..done + 1).unwrap_or(inputs.host);
         let left = looked_at.iter().take(EVENTS_MAX).position(|event| !self.allows(event));
         let count = left.unwrap_or(looked_at.len().min(EVENTS_MAX));

@@ -62,15 +62,16 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
 
     /// Returns the number of the newest block.
     fn newest(&self) -> Option<u32> {
-        // The loop reads only the heads of the blocks. The memory is slow, and the drives wait for the first frame
-        // after a reset.
+        // After a reset, the drives wait for the first frame until this loop has ended. The memory is slow, so the
+        // loop reads only the heads of the blocks.
         let mut below = None;
         for _ in 0..self.len() {
             let blocks = self.pieces.iter().flat_map(|piece| piece.as_ref());
             let numbers =
                 blocks.filter(|block| block[head::MAGIC] == MAGIC).map(|block| block[head::SEQUENCE]);
             let next = numbers.filter(|number| below.is_none_or(|below| *number < below)).max()?;
-            // The newest block must also be at the place of its number. Other blocks may remain from a log in a memory of another size.
+            // The newest block must be valid, and must be at the place that belongs to its number. Blocks at other
+            // places may remain from a log in a memory of another size.
             if self.whole(next).is_some() {
                 return Some(next);
             }

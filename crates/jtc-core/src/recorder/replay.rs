@@ -107,7 +107,7 @@ pub enum Outcome {
     Same,
     /// The replayed outputs and the log differ.
     Differs,
-    /// The replayed outputs may differ from the log until the next snapshot, for the contained reason.
+    /// The replayed outputs may differ from the log until the next snapshot. The value contains the reason.
     Unsure(Unsure),
 }
 
@@ -162,7 +162,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
             controller.hash_arm();
         }
         let arm = controller.extensions.hash;
-        // The replay accepts the requests that a device with a recorder has accepted.
+        // The device of the log has a recorder. With this state, the controller of the replay accepts the same
+        // requests for the log as the device.
         controller.extensions.log = LogState::Recording;
         let outcome = Outcome::Unsure(Unsure::NoSnapshot);
         Self { log, controller, boots: None, chain: 0, outcome, follows: false, arm, points_hash }
@@ -173,8 +174,9 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.points_hash == Some(points_hash)
     }
 
-    /// Returns the best outcome that the ticks after this snapshot can have. The outcome is unsure if the arm or the
-    /// required points differ from the recording.
+    /// Returns the outcome of the ticks after this snapshot if their outputs agree with the log. The outcome is
+    /// unsure if the arm of the replay differs from the recorded arm, or if the points that the snapshot requires are
+    /// not known.
     fn worth(&self, snapshot: &Snapshot) -> Outcome {
         let Origin { arm, points_hash, .. } = snapshot.origin;
         if arm != self.arm {
@@ -277,8 +279,8 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        // A missing input may have had no effect. The replay assumes this as long as its outputs are equal to the
-        // log.
+        // A missing input may have had no effect. The replay assumes that it had no effect as long as the outputs of
+        // the replay are equal to the log.
         self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
         let outcome = if self.follows { Outcome::Same } else { self.outcome };
         self.step(Some(*recorded), Some(outputs), outcome)

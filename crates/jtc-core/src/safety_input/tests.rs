@@ -35,21 +35,23 @@ fn yielding(mut arm: Arm) -> Arm {
     arm
 }
 
-/// Executes the safety input of one tick. Returns the time of the stop.
+/// Evaluates the safety input in one tick. Returns the time since the start of the stop (ms), or `None` if no stop is
+/// in progress.
 fn watched(arm: &mut Arm, safety_input: bool, missed_ticks: u16) -> Option<u16> {
     arm.watch_safety_input(&Inputs { safety_input, missed_ticks, ..Inputs::QUIET });
     arm.safety_stop_ms
 }
 
-/// A stop begins only if the arm comes to rest, is in Teaching or executes a motion, and only if no joint yields.
-/// Otherwise the controller switches the torque off at once. If the arm does not move in Teaching, it is at rest in
-/// the next tick.
+/// A stop begins only if no joint yields, and if the arm comes to rest, is in Teaching, or executes a motion.
+/// Otherwise the controller switches the torque off at once. A stop also begins if the arm does not move in Teaching,
+/// and the arm is then at rest in the next tick.
 #[test]
 fn j22_an_arm_in_teaching_or_in_execution_or_that_comes_to_rest_stops_first() {
     let operate = |phase: Phase| Arm { phase, ..arm(ControllerState::Operate, 0.0) };
     let cases: [(&dyn Fn() -> Arm, bool); 12] = [
         (&|| arm(ControllerState::HoldPos, 0.0), false),
-        // The arm moves, but neither a command nor a hand in Teaching moves it.
+        // The arm moves, but neither a command nor Teaching causes this motion. The controller therefore switches the
+        // torque off at once.
         (&|| arm(ControllerState::HoldPos, 0.5), false),
         (&coming_to_rest, true),
         (&|| yielding(coming_to_rest()), false),
@@ -92,7 +94,8 @@ fn j22_an_arm_stops_only_if_each_present_joint_has_torque() {
     }
 }
 
-/// The stop ends Teaching and takes the arm off its path. A path that is not executed does not change, so the host may resume it.
+/// The stop ends Teaching, and ends the execution of a path in the state Stop. A path that is not being executed
+/// keeps its state, so the host may resume a paused path.
 #[test]
 fn j22_a_stop_ends_teaching_and_the_execution_of_a_path() {
     for trajectory in [TrajectoryState::Null, TrajectoryState::Pause, TrajectoryState::Finish] {
@@ -108,7 +111,7 @@ fn j22_a_stop_ends_teaching_and_the_execution_of_a_path() {
     assert_eq!(arm.phase, Phase::Running { leave: Some(TrajectoryState::Stop) });
 }
 
-/// The stop ends when the time of the setting has passed. A missed tick counts as well.
+/// The stop ends after the time of the setting `safety_input_ramp_ms`. Missed ticks count as well.
 #[test]
 fn j22_the_stop_ends_after_the_time_of_the_setting() {
     for (before, missed_ticks, after) in [

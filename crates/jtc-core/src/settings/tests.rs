@@ -35,7 +35,7 @@ fn j53_numbers_and_names_are_unique_and_in_order() {
         assert_eq!(named(row.name).map(|found| found.number), Some(row.number));
         assert!(!row.meaning.is_empty() && row.low < row.high);
         assert_eq!(row.of_joint(), row.number < 32, "{}", row.name);
-        // Whole numbers are stored without rounding.
+        // Every value of a whole-number setting fits into 16 bits.
         assert!(!row.whole || (row.low >= 0.0 && row.high <= 65_535.0), "{}", row.name);
     }
 }
@@ -102,8 +102,8 @@ fn j53_the_message_of_an_error_names_the_joint_of_the_setting() {
     );
 }
 
-/// The largest principal moment of this payload (1 kg·m²) is above the sum of the others (0.2 kg·m²). The check of these moments takes too
-/// long for a change of another setting during a motion.
+/// One principal moment of this payload (1 kg·m²) exceeds the sum of the other two (0.2 kg·m²), so the payload is not
+/// valid. The check of the moments takes too long during a motion, so another setting must not cause this check.
 #[test]
 fn j07_j60_a_payload_is_checked_only_when_it_changes() {
     let payload = Payload { mass: 1.0, com: [0.0; 3], inertia: [1.0, 0.0, 0.0, 0.1, 0.0, 0.1] };
@@ -115,7 +115,8 @@ fn j07_j60_a_payload_is_checked_only_when_it_changes() {
 }
 
 proptest! {
-    /// If settings are accepted, the configuration passes its check, and the settings read back unchanged.
+    /// If the controller accepts settings, the resulting configuration is valid, and the settings read back
+    /// unchanged.
     #[test]
     fn j53_what_is_taken_reads_back(
         changes in prop::collection::vec((0usize..200, 0.0..1.0f64), 1..20),

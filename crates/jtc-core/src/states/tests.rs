@@ -44,7 +44,8 @@ fn all_conditions() -> impl Iterator<Item = Conditions> {
     })
 }
 
-/// Returns the conditions after the host has sent this frame in `state`. Before, the controller was in HoldPos and a trajectory was loaded.
+/// Returns the conditions after the host has sent this frame in `state`. Before that, a trajectory was loaded in
+/// HoldPos.
 fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditions {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
     controller.state = ControllerState::HoldPos;

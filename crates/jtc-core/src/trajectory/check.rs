@@ -37,9 +37,8 @@ const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
 /// Highest number of halvings in one interval, for all curves of all joints together. The check halves a curve until
-/// the distance of its hull from the curve is at most about a thousandth of the height of the curve. If six joints
-/// are at their limits in one interval, they may use up this number of halvings. After the last permitted halving,
-/// the check compares the hull with the limits.
+/// the hull is at most about a thousandth of the height of the curve away from it. Six joints at their limits in one
+/// interval can use up this number. After the last halving, the check compares the hull with the limits.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.
@@ -251,7 +250,8 @@ impl TrajectoryCheck {
             outside(Quantity::Acceleration, a, (-bounds.acceleration, bounds.acceleration))?;
             outside(Quantity::FrictionVelocity, v, bounds.friction)?;
             if self.points == 0 {
-                // When path time starts or stops, the velocity of each joint passes through zero.
+                // When path time starts or stops, the velocity of each joint passes through zero. The friction table
+                // must therefore contain the velocity 0.
                 outside(Quantity::FrictionVelocity, 0.0, bounds.friction)?;
             }
         }

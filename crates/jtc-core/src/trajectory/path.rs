@@ -43,13 +43,14 @@ pub(crate) struct SlopeBounds {
     pub full: Bounds,
 }
 
-/// Factor by which a slope may change faster than in a normal ramp. The factor applies to a slope in the wrong
-/// direction, for example at a pause during a resume, and to a hurried stop.
+/// Factor by which a slope can change faster than in a normal ramp. The factor applies to a slope in the wrong
+/// direction, for example if a pause begins during a resume. It also applies to a hurried stop.
 const REVERSAL: f64 = 8.0;
 /// Filter coefficient of the slope while a path is held back: change of the slope per tick, as a fraction of its
 /// difference to the target slope.
 const SETTLES: f64 = 0.1;
-/// Share of the configured time within which a stop must end. The remaining time is a reserve for the part of the path that is still ahead.
+/// Share of the configured time within which a stop must end. The remaining time is a reserve, in case the next part
+/// of the path permits only smaller slopes.
 const PUNCTUAL: f64 = 0.6;
 
 /// S-shaped ramp of the rate from 0 to 1. The ramp consists of a parabola, a line and a parabola, each with a third of its length.
@@ -91,8 +92,8 @@ impl PathClock {
         self.slope = 0.0;
     }
 
-    /// Changes the target rate of path time. If the target is standstill, the target does not change. Returns `true` if path time begins to
-    /// change its rate.
+    /// Sets the target rate of path time, except if path time is to stop (target rate 0). Returns `true` if the
+    /// target rate has changed.
     pub(crate) fn set_pace(&mut self, pace: f64) -> bool {
         let changes = self.target != 0.0 && self.target != pace;
         if changes {
@@ -148,9 +149,10 @@ impl PathClock {
         self.time = (self.time + self.rate).min(end);
     }
 
-    /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`. The rate changes more slowly if the slope would
-    /// otherwise leave `bounds`. If the target changes during a ramp, the slope changes as fast as permitted, without a step. Until the
-    /// slope has changed, the rate continues to change, but never beyond the previous target.
+    /// Changes the rate towards the target rate along an S-shaped ramp of `ramp_ms`, or more slowly if the slope
+    /// would leave `bounds`. If a slope has the wrong direction because the target has changed, the slope changes as
+    /// fast as permitted, but without a step. Until its sign changes, the rate moves on, but never beyond the
+    /// previous target.
     pub(crate) fn change_pace(&mut self, ramp_ms: f64, bounds: Bounds) {
         let ahead = self.target - self.rate;
         let sign = if ahead < 0.0 { -1.0 } else { 1.0 };
@@ -159,8 +161,8 @@ impl PathClock {
         let (low, high) = if sign < 0.0 { (-bounds.1, -bounds.0) } else { bounds };
         let ramp = Ramp::of(ramp_ms);
         let wanted = ramp.next(now, distance);
-        // If the bounds do not allow any slope, the rate stays constant in this tick. Bounds that allow only the opposite direction do not
-        // reverse the change of the rate.
+        // If the bounds contradict each other, or allow only slopes away from the target, the slope becomes zero. The
+        // rate does not reverse its direction.
         let (within, high) = if low <= high {
             (wanted.min(high).max(low.min(wanted)).max(wanted.min(0.0)), high.max(0.0))
         } else {
@@ -176,9 +178,9 @@ impl PathClock {
         }
     }
 
-    /// Keeps the present rate of path time, or reduces the rate if the slope would otherwise leave `bounds`. The rate
-    /// also stays constant in two other cases: the bounds of several joints contradict each other, or only a faster
-    /// path would reduce the torque of a joint.
+    /// Reduces the rate of path time if the upper bound of the slope requires this. In all other cases, the rate
+    /// stays constant, even if the bounds of several joints contradict each other, or if only a faster path would
+    /// reduce the torque of a joint.
     pub(crate) fn hold_back(&mut self, (low, high): Bounds) {
         let wanted = if low <= high { high.min(0.0) } else { 0.0 };
         // The bounds come from noisy torques, so the slope follows these bounds through a filter.
@@ -187,9 +189,10 @@ impl PathClock {
         self.slope = if self.rate > 0.0 { slope } else { 0.0 };
     }
 
-    /// Slows path time down to standstill, in at most `stop_ms` if the torque limits allow this. The clock follows an S-shaped ramp of
-    /// `ramp_ms` while that is possible within `bounds.easy`. If the S-shaped ramp would take too long, the clock uses `bounds.full`. With
-    /// `bounds.full`, the rate may also rise again, if the available torque cannot prevent the arm from gaining speed.
+    /// Slows path time down to standstill, in at most `stop_ms` if the torque limits allow this. The clock follows an
+    /// S-shaped ramp of `ramp_ms` within `bounds.easy`. If this ramp would take too long, the clock uses
+    /// `bounds.full`, and the rate may even rise for a time, if the available torque cannot prevent the arm from
+    /// gaining speed.
     pub(crate) fn slow_down(&mut self, ramp_ms: f64, stop_ms: f64, bounds: &SlopeBounds) {
         // In this function, slopes are decelerations, which are positive towards standstill.
         let (distance, now) = (self.rate, -self.slope);

@@ -24,11 +24,11 @@ pub(crate) struct Store<M> {
     plain: bool,
     /// `true` if a Stop has dropped the upload. The controller then refuses further segments of this upload until a segment 0 arrives.
     dropped: bool,
-    /// `true` if a Stop came during this upload and the host of this upload cannot handle a refused segment. The host can then complete the
-    /// upload, but the controller does not execute it.
+    /// `true` if a Stop came during an upload that began on a plain line. The host of such an upload cannot handle a
+    /// refused segment. The host can therefore complete the upload, but the controller does not execute it.
     stopped: bool,
-    /// Violation that the check has found in this upload. The host of this upload cannot handle a refused segment. The host can complete
-    /// this upload, but the controller does not execute it.
+    /// Violation that the check has found in an upload that began on a plain line. The host of such an upload cannot
+    /// handle a refused segment. The host can therefore complete the upload, but the controller does not execute it.
     refused: Option<Violation>,
     step: Step,
     /// State of the check after the accepted segments.
@@ -355,8 +355,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
     pub(crate) fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
         let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
         let step_ms = f64::from(self.step.ms);
-        // The product of time and `per_ms` may be rounded to a value just below the index of a point that the time has reached. The
-        // conversion with `as` saturates, so a negative time or a time of NaN results in point 0.
+        // Due to rounding, the product of time and `per_ms` can be just below the index of a point that the time has
+        // reached. The conversion with `as` saturates, so a negative time or a time of NaN results in point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
         // At a point and at the last point, the interpolation has no effect. It is computed nevertheless, because

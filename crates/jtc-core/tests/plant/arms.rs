@@ -57,8 +57,8 @@ impl ArmFile {
         shares_of(torque, &self.config)
     }
 
-    /// Returns a random pose inside the position ranges, rad, and the torque that holds this pose. With a payload at the flange (kg), this
-    /// torque is less than the share `most` of each limit.
+    /// Returns a random pose (rad) inside the position ranges, and the shares of the torque limits that hold the arm
+    /// in this pose with a payload of `mass` kg at the flange. Each share is less than `most`.
     pub(crate) fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
         let dynamics = Dynamics::new(&loaded(self.model, mass), self.config.gravity);
         loop {

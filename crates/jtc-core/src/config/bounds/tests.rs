@@ -58,8 +58,8 @@ fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
 
 #[test]
 fn j06_friction_is_bounded_by_where_it_is() {
-    // The check has three ranges of speeds: standstill, up to half of the velocity limit, and above half of this limit. A friction torque
-    // against the motion is positive in both directions.
+    // Each row contains a speed and the allowed range of the friction torque. The bounds differ at standstill, up to
+    // half of the velocity limit, and above it. A torque against the motion counts as positive in both directions.
     for (speed, low, high) in
         [(0.0, -25.0, 25.0), (0.125, -5.0, 100.0), (0.75, -5.0, 100.0), (0.875, -150.0, 150.0)]
     {
@@ -106,9 +106,9 @@ fn j06_a_polynomial_is_bounded_up_to_the_velocity_limit() {
             let c3 = most * 100.0 / (fastest * fastest * fastest);
             BOUNDS.check_polynomial(&[0.0, 0.0, 0.0, sign * c3, 0.0, 0.0], &joint()).map_err(|e| e.velocity)
         };
-        // A cubic friction torque is largest at the highest speed. Friction against the motion is first refused at
-        // this speed, by the bound for high speeds. Friction along the motion has a narrow bound only for slow
-        // speeds, so it is refused at half of the highest speed.
+        // The friction torque grows with the third power of the speed. Friction against the motion is first refused
+        // at the highest speed. Friction along the motion is first refused at half of the highest speed, because its
+        // bound is narrow up to this speed.
         let most = if sign > 0.0 { 1.5 } else { 0.05 * 8.0 };
         assert_eq!(cubic(0.999 * most), Ok(()));
         assert_eq!(cubic(1.001 * most), Err(Some(if sign > 0.0 { fastest } else { 0.5 * fastest })));
@@ -143,9 +143,9 @@ fn j06_what_is_refused_is_told_with_its_value() {
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
     for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
-        // The check divides a sixteenth of the velocity limit into sixteen steps. The friction torque reaches 100
-        // N·m, the bound for slow speeds, after `reached` steps. The check therefore refuses the next whole step,
-        // `found`.
+        // The check divides a sixteenth of the velocity limit into sixteen steps. The friction torque reaches its
+        // bound of 100 N·m after `reached` steps, which need not be a whole number. The check refuses the torque at
+        // the next whole step, `found`.
         let c1 = 100.0 / (sixteenth * reached / 16.0);
         let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
         assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");

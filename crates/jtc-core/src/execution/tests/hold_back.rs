@@ -20,7 +20,8 @@ fn slowed(rate: f64) -> PathClock {
     clock
 }
 
-/// Returns a controller on the path at half speed, which begins to hold back the path. The ramp contains no inertia yet.
+/// Returns a controller on the path at half speed, which has just begun to hold back the path. It has not computed
+/// the inertia of the arm yet.
 fn held_back() -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
     (controller.phase, controller.clock, controller.braking_ms) =
@@ -34,8 +35,9 @@ fn has_inertia(controller: &Controller<[RawPoint; 4]>) -> bool {
     controller.motion.ramp.inertia() != [0.0; JOINTS]
 }
 
-/// The path may be held back for 5 s in total. Joint 3 is at its torque limit for 50 ms in every 100 ms. This is too
-/// often to end the slow motion, but too short to stop the arm, so only the total time stops the arm.
+/// Joint 3 is at its torque limit for 50 ms in every 100 ms. The times without overload are too short for the path to
+/// return to its normal rate, and each overload is too short to stop the arm. The arm therefore stops when the path
+/// has been held back for 5 s in total.
 #[test]
 fn j75_a_path_that_is_held_back_for_too_long_is_a_stop_of_the_joint_at_its_limit() {
     for (before_ms, stops) in [(RUN_MS - 1, false), (RUN_MS, true)] {
@@ -138,8 +140,8 @@ fn j75_the_inertia_is_computed_when_the_path_returns_to_its_rate() {
     }
 }
 
-/// When the path begins to be held back, the controller computes the inertia of the arm, because the bounds of the
-/// rate need it at once. In the next tick, the inertia is known and is not computed again.
+/// When the controller begins to hold back the path, it computes the inertia of the arm, because the rate must change
+/// in the same tick. In the next tick, the inertia is known and is not computed again.
 #[test]
 fn j75_the_inertia_is_computed_when_the_path_begins_to_be_held_back() {
     let mut controller = held_back();
@@ -169,9 +171,9 @@ fn j57_the_inertia_is_computed_when_the_speed_changes_in_motion() {
     }
 }
 
-/// Joint 1 moves along the path with the inertia M at the velocity v. Its torque is a tenth above its limit, so the
-/// slope −0.1·limit/(M·v) of the rate would remove this excess. In one tick, the slope changes by a tenth of this
-/// value. At full speed without an overload, the rate does not change.
+/// Joint 1 moves with the inertia M at the velocity v, and its torque is 10 % above its limit. If the path is held
+/// back, the slope of its rate approaches −0.1·limit/(M·v), which removes this excess. In one tick, the slope changes
+/// by a tenth of this value. If the path is not held back, its rate does not change.
 #[test]
 fn j75_a_path_at_full_speed_slows_down_while_it_is_held_back() {
     for held in [false, true] {

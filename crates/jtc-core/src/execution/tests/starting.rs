@@ -31,7 +31,7 @@ fn j34_an_impossible_approach_refuses_execute_only_if_all_joints_are_held() {
     }
 }
 
-/// The target of an approach may be exactly at the end of the range of the path, but not outside.
+/// An approach to a target exactly at the end of a joint's range is accepted. A target outside the range is refused.
 #[test]
 fn j34_j36_an_approach_does_not_leave_the_range_of_a_joint() {
     for joint in [0, 5] {
@@ -87,7 +87,7 @@ fn j34_j69_a_cancelled_approach_is_the_cause_of_the_stop() {
 }
 
 /// If the payload changes while the arm waits for the start of its path, the learned loads are cleared. The integral
-/// still holds the torque of the payload, so it does not show a load.
+/// still contains the torque of the new payload, so no new load can be learned from it yet.
 #[test]
 fn j60_a_payload_that_is_added_before_the_path_clears_the_learned_loads() {
     for changes in [false, true] {
@@ -104,7 +104,7 @@ fn j60_a_payload_that_is_added_before_the_path_clears_the_learned_loads() {
     }
 }
 
-/// In the approach, the friction compensation begins. In the first tick, only the torque of the model may step, so
+/// The friction compensation begins with the approach. Only the model torque changes at once in the first tick, so
 /// the new friction torque is blended in.
 #[test]
 fn j44_the_friction_of_an_approach_begins_without_a_step() {

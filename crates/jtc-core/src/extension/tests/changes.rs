@@ -60,8 +60,8 @@ fn j52_j57_the_speed_does_not_change_the_hash_of_the_arm() {
     }
 }
 
-/// If the host changes the payload, the controller checks it at once against the torque limits. Other settings in
-/// Init, such as gravity, are checked when Init ends.
+/// If the host changes the payload in Init, the controller checks it at once against the torque limits. Other
+/// settings, such as gravity, are checked when Init ends.
 #[test]
 fn j60_only_a_payload_is_checked_against_the_torque_limits() {
     let mut bench = Bench::new();
@@ -76,7 +76,8 @@ fn j60_only_a_payload_is_checked_against_the_torque_limits() {
     next.gravity[0] = 9.81;
     assert!(!bench.controller.parameters.carries(Some(&[0.0; JOINTS]), &next), "the arm is too heavy");
     assert_eq!(set_all(&mut bench, &[sideways]), DataStatus::NoError);
-    // With this gravity, the controller refuses an additional payload at a distance of 1 m.
+    // Gravity acts sideways, so the torque limits cannot hold the additional payload at a distance of 1 m. The frame
+    // is refused.
     bench.controller.use_settings(config);
     let mut values = load(5.0, [0.0, 0.0, 1.0]);
     values.push(sideways);
@@ -134,8 +135,8 @@ fn j23_the_pump_stops_when_nodes_are_configured_again() {
     }
 }
 
-/// A Stop or a Pause on any line shows that a host is alive, even before the frames that arrived earlier have been
-/// processed.
+/// A Stop or a Pause on any line shows at once that a host is alive. The frames that arrived before it need not have
+/// been processed.
 #[test]
 fn j59_an_urgent_command_of_any_line_ends_the_silence() {
     for line in [None, Some(0), Some(1)] {
@@ -151,8 +152,8 @@ fn j59_an_urgent_command_of_any_line_ends_the_silence() {
     }
 }
 
-/// J-33: the silence of the hosts pauses a path that is executed. It does not turn a Stop into a Pause, and does not
-/// change a path that is not executed.
+/// J-33: if the hosts are silent, a path that is executed is paused. A path that is already stopping keeps its Stop,
+/// and a path that is not executed does not change.
 #[test]
 fn j59_silent_hosts_pause_only_a_path_that_is_executed_and_not_stopped() {
     let (pause, stop) = (Some(TrajectoryState::Pause), Some(TrajectoryState::Stop));

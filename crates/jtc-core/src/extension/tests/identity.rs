@@ -10,7 +10,7 @@ use crate::config::defaults;
 fn j52_the_capabilities_are_those_of_the_board() {
     let always = capability::SETTINGS | capability::SPEED | capability::JOG | capability::PAYLOAD;
     let always = always | capability::STOP_CAUSE;
-    // Bits 0, 2, 3, 4 and 6 are always set.
+    // Every board has the capabilities of bits 0, 2, 3, 4 and 6.
     assert_eq!(always, 1 + 4 + 8 + 16 + 64);
     for (store, log, more) in [
         (StoreState::Absent, LogState::Absent, 0),
@@ -108,8 +108,8 @@ fn j56_points_are_read_from_the_requested_point() {
     }
 }
 
-/// The stored arm is discarded only if the board reports that writing this arm has failed. A failure without earlier
-/// writing, or the successful end of writing, does not discard it.
+/// The stored arm is discarded only if the board reports that it could not write this arm. The arm is kept if the
+/// board reports a failure without having written anything, or a successful end of writing.
 #[test]
 fn j54_only_a_storage_that_failed_discards_the_stored_arm() {
     let (image, _) = other_arm();
@@ -129,8 +129,8 @@ fn j54_only_a_storage_that_failed_discards_the_stored_arm() {
     }
 }
 
-/// The image contains other settings, another name, a friction table and other gains. With a value that is not
-/// finite, the controller refuses the image and changes nothing.
+/// The image contains other settings, another name, a friction table and other gains. One value is not finite, so the
+/// controller refuses the image and changes nothing.
 #[test]
 fn j54_an_image_that_is_refused_changes_nothing() {
     let (image, _) = other_arm();
@@ -159,7 +159,8 @@ fn j54_the_values_of_a_loaded_arm_are_kept_for_the_request() {
     assert_eq!(bench.controller.parameters.missing(), 7);
 }
 
-/// Only the UseDefault frames refer to the stored arm.
+/// Parameters that a host sends in a frame are used even if an arm is stored. Only the UseDefault frames select the
+/// parameters of the stored arm.
 #[test]
 fn j54_parameters_in_a_frame_are_used_also_if_an_arm_is_stored() {
     let (image, _) = other_arm();

@@ -35,7 +35,7 @@ fn lead(bench: &mut Bench) {
     assert!(bench.controller.motion.set.is_led());
 }
 
-/// Change of a controller before a test.
+/// Name and function of a change to the controller. The test makes the change before it sends a Jog.
 type Change = (&'static str, fn(&mut Bench));
 
 #[test]
@@ -70,8 +70,8 @@ fn j58_each_condition_alone_refuses_a_jog() {
     }
 }
 
-/// In a held stop, a Jog with a velocity is refused, and the following Jogs are refused for 200 ms. A Jog without a
-/// velocity, or a Jog that is refused for another reason, does not start this time.
+/// In a held stop, a Jog with a velocity is refused. The following Jogs are then also refused for 200 ms. This time
+/// does not start if a Jog has no velocity, or if it is refused for another reason.
 #[test]
 fn j58_a_pressed_key_in_a_held_stop_is_refused_for_200_ms_more() {
     for (stop, velocity, refused_ms) in [

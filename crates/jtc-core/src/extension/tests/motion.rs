@@ -116,8 +116,8 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         for _ in 0..520 {
             hold(&mut bench.controller);
             position = bench.controller.motion.set.point.position;
-            // The joint may still become faster by up to 0.1 rad/s, because its acceleration cannot change its sign
-            // at once.
+            // After the Stop or Pause, the joint may become faster by up to 0.1 rad/s, because its acceleration needs
+            // some time to change its sign.
             assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");
         }
         assert!(!bench.controller.motion.set.jogging() && position[2] > 0.0);

@@ -28,7 +28,8 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
     assert_eq!((info.missing, info.arm.as_str(), info.defaults_stored), (7, "other", true));
     assert_eq!(bench.controller.config.gravity[1], 3.0);
     assert_ne!(info.hash, hash, "its parameters are not in use yet");
-    // The friction of the stored arm is a table. The controller uses this table for both kinds of default friction that a host may request.
+    // A host can request default friction as a polynomial or as a table. The friction of the stored arm is a table,
+    // and the controller uses it for both requests.
     bench.use_defaults();
     let info = bench.info(0);
     assert_eq!((info.hash, info.missing), (hash, 0));
@@ -42,7 +43,8 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     bench.info(0);
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "nobody gave parameters");
     bench.use_defaults();
-    // The parameters may have been withdrawn since then, for example by Disable.
+    // The parameters that the host has sent can be stored even after the controller has withdrawn them, for example
+    // because of Disable.
     bench.controller.parameters.withdraw_all();
     for state in [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching] {
         bench.controller.state = state;
@@ -93,8 +95,8 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
                     continue;
                 }
                 let info = bench.info(0);
-                // One bit may change the number of a setting to the number of another setting. If the replaced
-                // setting had its default value, the arm is unchanged.
+                // The flipped bit may replace the number of a setting by the number of another setting. If the
+                // replaced setting had its default value, the arm is unchanged.
                 let same = bench.controller.config() == &Config::avena();
                 assert!(info.hash != hash || at >= image.len() - 32 || same, "byte {at}");
                 assert!(bench.controller.config.check().is_ok());
@@ -116,7 +118,8 @@ fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     assert!(!bench.controller.load_arm(&image));
     let refused = |bench: &mut Bench| bench.send(0, &fixed::PID_PARAM_USE_DEFAULT);
     assert_eq!(refused(&mut bench), DataStatus::NotAllowed);
-    // If the board could not write the arm, the next start would use another arm.
+    // If the board reports that it could not write the arm, the UseDefault frames are refused. After the next start
+    // of the board, they would refer to another arm.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.info(0);

@@ -26,9 +26,9 @@ fn arm(host: u8) -> Vec<Vec<u8>> {
 }
 
 proptest! {
-    /// For each kind of parameter, the controller uses the last frame that it has accepted from either host. The controller never mixes the
-    /// values of two frames, although the processing of a frame may take many ticks. Each host receives the response records and answers to
-    /// its frames, in the order of these frames.
+    /// Two hosts send parameters at the same time. For each kind of parameter, the controller uses the last accepted
+    /// frame of either host. It never mixes the values of two frames, although it may need many ticks for a frame.
+    /// Each host receives the response records and answers to its own frames, in their order.
     #[test]
     fn j04_j53_two_hosts_with_different_arms_do_not_mix_within_a_frame(
         first in prop::collection::vec(any::<bool>(), 1..40),

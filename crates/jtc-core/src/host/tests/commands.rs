@@ -116,8 +116,8 @@ fn j52_commands_that_are_refused_do_not_clear_the_hash() {
     }
 }
 
-/// The learned load is 0 N·m, and the integral holds 4 N·m. While no load is learned, the integral counts as the
-/// load. A load of 4 N·m therefore shows that the learned load was cleared.
+/// The learned load is 0 N·m, and the integral holds 4 N·m. A load that is not learned yet counts as equal to the
+/// integral. If the load is 4 N·m after a command, this command has therefore cleared the learned load.
 #[test]
 fn j60_j66_only_an_accepted_model_under_torque_clears_the_learned_loads() {
     let unfinished = || SliceOutcome::Unfinished(SliceProgress::Begin);

@@ -1,4 +1,4 @@
-//! Tests of uploads that a Stop reaches, and of segments on a plain line (J-30, J-36, J-51).
+//! Tests of uploads that are interrupted by a Stop, and of segments on a plain line (J-30, J-36, J-51).
 use super::*;
 use crate::execution::phase::Phase;
 use crate::trajectory::check::{Quantity, Violation};
@@ -31,8 +31,9 @@ fn j30_segment_0_on_a_plain_line_stops_a_path() {
     }
 }
 
-/// A Stop arrives after segment 0. The controller refuses the upload. On a plain line, it accepts all segments
-/// instead and refuses Execute.
+/// A Stop arrives after the segments and takes effect before the controller processes them (`overtaken`). If the line
+/// is not plain, the controller refuses the segments and Execute. If the line is plain, it accepts the segments and
+/// refuses Execute.
 #[test]
 fn j30_a_stop_after_segment_0_refuses_the_upload_or_its_execution() {
     let not_allowed = Err(DataStatus::NotAllowed);
@@ -50,8 +51,8 @@ fn j30_a_stop_after_segment_0_refuses_the_upload_or_its_execution() {
     }
 }
 
-/// Segment 0 came on a plain line, so a Stop does not refuse the later segment, although the host has used an
-/// extension since then. The controller refuses Execute instead.
+/// Segment 0 came on a plain line. The host has used an extension since then, so the line is no longer plain. A Stop
+/// nevertheless does not refuse the later segment, but the controller refuses Execute.
 #[test]
 fn j30_j51_a_stop_does_not_refuse_a_later_segment_of_an_upload_that_began_plain() {
     let mut controller = holding();

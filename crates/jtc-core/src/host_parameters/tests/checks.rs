@@ -97,8 +97,8 @@ fn j71_settings_that_affect_the_inertia_make_the_controller_compute_it_again() {
     }
 }
 
-/// Without gravity, the joints need no torque before the change. After the change, each joint may need exactly its
-/// torque limit, but not more.
+/// Gravity is zero before the change, so the joints need no torque. After the change, the payload is accepted if each
+/// joint needs at most its torque limit.
 #[test]
 fn j60_a_payload_may_need_the_whole_torque_limit() {
     let at = [0.0; JOINTS];

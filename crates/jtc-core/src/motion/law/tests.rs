@@ -67,8 +67,8 @@ impl Arm {
 
 const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_max: 1.0 };
 
-/// In HoldPos, the commanded velocity and acceleration and the friction do not affect the torque, even if the set
-/// values move while a joint comes to rest.
+/// In HoldPos, friction and the commanded velocity and acceleration do not affect the torque. This is also true if
+/// the set values move while a joint comes to rest.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
     for mode in MODES {
@@ -133,8 +133,8 @@ fn j25_a_load_that_nobody_has_found_is_not_carried() {
     assert_eq!(arm.motion.law.torque.map(|torque| torque.load), [0.0; JOINTS]);
 }
 
-/// Teaching needs the load of every joint that is held. No load is known while the integral releases torque. Absent
-/// joints need no known load.
+/// Teaching can begin only if the load of every held joint is known. While the integral releases torque, no load is
+/// known. The load of an absent joint need not be known.
 #[test]
 fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     let mut arm = taught(&[1.0; JOINTS]);
@@ -142,8 +142,8 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     law.torque = Default::default();
     law.torque.iter_mut().for_each(|torque| torque.pid.i = 1.0);
     assert!(law.knows_loads(&[true; JOINTS], config, false));
-    // A person leans on joint 2, or its integral has not settled. The highest permitted feedback torque is 0.04 · 180
-    // N·m = 7.2 N·m.
+    // The torque of the position error may come from a person who leans on joint 2. The load counts as known up to a
+    // feedback torque of 0.04 · 180 N·m = 7.2 N·m. During a contact, this limit does not apply.
     for (p, known) in [(7.1, true), (-7.1, true), (7.3, false), (-7.3, false)] {
         law.torque[1].pid.p = p;
         assert_eq!(law.knows_loads(&[true; JOINTS], config, false), known, "{p} N·m");
@@ -196,8 +196,8 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     }
 }
 
-/// Gravity exceeds the torque limit of joint 2. This overload is not an error if the torque stops the joint. It is an
-/// error if the torque drives the joint.
+/// Gravity exceeds the torque limit of joint 2. While the torque stops the joint, this overload is not an error.
+/// While the torque drives the joint, it is an error.
 #[test]
 fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
     let along = Arm::held(NONE).dynamics.gravity_torque(&POSE)[1].signum();
@@ -215,7 +215,7 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         (ControlMode::Hold, true, false, false, DRIVEN, false),
         (ControlMode::Hold, true, false, true, 0.06, false),
     ] {
-        // Gains of zero and no position error: the set position does not sag during a catch.
+        // With gains of zero and no position error, the set position does not sag during a catch.
         let mut arm = Arm::held(NONE);
         arm.config.joints[1].torque_max = 10.0;
         let limits = arm.config.joints[1];
@@ -282,8 +282,8 @@ fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     }
 }
 
-/// The limits do not apply to a joint that is not enabled, which may have any position and speed. Its torque and its
-/// braking torque are zero, and it has no error.
+/// A joint that is not enabled can have any position and any speed. Its limits do not apply, so it has no error. Its
+/// torque and its braking torque are zero.
 #[test]
 fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
     let off = 3;

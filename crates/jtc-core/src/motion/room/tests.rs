@@ -173,7 +173,8 @@ fn three_seconds(ramp_ms: u16, left: f64) -> Bench {
 fn j34_the_approach_uses_the_torque_that_holding_and_friction_leave() {
     for (held, viscous, way, left) in [
         (0.0, 0.0, 1.0, 80.0),
-        // 80 N·m minus the friction of 32 · 0.9375 = 30 N·m leave 50 N·m, in both directions of the motion.
+        // The limit of 80 N·m minus the friction of 32 · 0.9375 = 30 N·m leaves 50 N·m. The result is the same in
+        // both directions of the motion.
         (0.0, 32.0, 1.0, 50.0),
         (0.0, 32.0, -1.0, 50.0),
         // 80 N·m minus the holding torque of 50 N·m leave 30 N·m. Half of the remaining 50 N·m would be only 25 N·m.

@@ -10,32 +10,32 @@ use crate::interpolation::smooth;
 use crate::motion::load::Load;
 use crate::motion::soft_end::SOFT_END;
 
-/// Speeds of a joint in the direction of its load torque, rad/s. At the first speed, the acting share of the load
-/// begins to fall. At the second speed, it is zero. `DRIVES` applies to a joint with little damping, which
-/// accelerates quickly before the controller measures its speed. If the damping balances the load, `DAMPED` is added.
+/// Speeds of a joint in the direction of its load torque, rad/s. The load acts fully up to the first speed, and not
+/// at all from the second speed on. `DRIVES` applies to a joint with little damping, which accelerates quickly before
+/// the controller measures its speed. If the damping balances the load, both speeds are higher by `DAMPED`.
 const DRIVES: (f64, f64) = (0.03, 0.15);
 const DAMPED: (f64, f64) = (0.17, 0.35);
-/// Time constants of the acting share of the load, s. The share falls with `FALLS_S` and returns with `RETURNS_S`. If
-/// the joint moves against its load torque, the share returns with `CATCHES_S`.
+/// Time constants of the acting share of the load, s. The share falls with `FALLS_S` and rises again with
+/// `RETURNS_S`. If the joint moves against its load torque, the share rises again with `CATCHES_S`.
 const FALLS_S: f64 = 0.006;
 const RETURNS_S: f64 = 0.3;
 const CATCHES_S: f64 = 0.05;
 /// Lowest speed at which the load may drive a joint, rad/s.
 const MOVES: f64 = 0.1;
 /// Range of the torque of damping and friction, as a share of the acting load torque. Within this range, the load
-/// torque alone explains the motion.
+/// torque is considered the only cause of the motion.
 const EXPLAINED: (f64, f64) = (0.8, 1.3);
-/// Least torque of a removed mass, as a share of the highest load torque of the joint, at which a sinking joint shows
-/// that this mass is missing.
+/// Least torque of a removed mass at which a sinking joint shows that this mass is missing. The value is a share of
+/// the highest load torque of the joint.
 const MISSED: f64 = 0.1;
 
 /// State of the load of a joint in Teaching.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Carried {
-    /// Torque that is not explained by a mass at the flange, N·m.
+    /// Part of the load torque that does not come from the estimated mass at the flange, N·m.
     pub rest: f32,
-    /// Highest load torque that may act in Teaching, N·m: the learned torque, or the highest torque that the
-    /// controller may learn if this is higher.
+    /// Highest load torque that can act in Teaching, N·m. It is the learned torque or the highest torque that the
+    /// controller can learn, whichever is higher.
     most: f32,
     /// Share of the load that does not act because the joint moves too fast in the direction of the load.
     left_out: f32,
@@ -103,13 +103,14 @@ impl Carried {
         missed && velocity * gone < -MOVES * gone.abs() && explains(gone, against)
     }
 
-    /// Multiplies the torque that no mass explains by `left`.
+    /// Multiplies the part of the load torque that does not come from the mass by `left`.
     pub(super) fn fade(&mut self, left: f64) {
         self.rest = (f64::from(self.rest) * left) as f32;
     }
 }
 
-/// Returns `true` if this load torque alone explains a motion. `against` is the torque of damping and friction against this motion, N·m.
+/// Returns `true` if this load torque can be the only cause of a motion. `against` is the torque of damping and
+/// friction against this motion, N·m.
 fn explains(torque: f64, against: f64) -> bool {
     against >= EXPLAINED.0 * torque.abs() && against <= EXPLAINED.1 * torque.abs()
 }

@@ -9,16 +9,19 @@ use crate::motion::yielding::SPRING_RATE;
 
 /// Speeds of a joint between which the damping increases, rad/s.
 const FAST: (f64, f64) = (0.4, 0.8);
-/// Highest rate at which the damping reduces the speed of a joint while the other joints are free to move, 1/s. Measured speeds are about 8
-/// ms old. Joints whose motions affect each other tolerate less damping than a single joint.
+/// Highest rate at which the damping reduces the speed of a joint while the other joints are free to move, 1/s. The
+/// rate is limited, because measured speeds are about 8 ms old, and because the motions of the joints affect each
+/// other.
 pub(super) const DAMPING_RATE: f64 = 90.0;
 /// Speed at which the damping of a joint balances its load, rad/s, if the inertia of the joint tolerates that damping.
 const SINKS: f64 = 0.5;
 /// Highest damping of a fast joint, divided by the torque limit, s/rad.
 const GROWN: f64 = 1.0;
-/// Speeds between which a braking torque is added to the damping, rad/s. `BRAKE` is the deceleration by this torque,
-/// rad/s². It is so low that a joint cannot reverse before the controller measures the reversal. Without the braking
-/// torque, a fast joint would reach the over-speed threshold, and the arm would be released.
+/// Speeds between which a braking torque is added to the damping, rad/s. Without this torque, a fast joint would
+/// reach the over-speed threshold, and the arm would be released.
+///
+/// `BRAKE` is the deceleration by the braking torque, rad/s². It is so low that a joint cannot reverse before the
+/// controller measures the reversal.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
 /// Speed above which Teaching ends and the controller brings the joint to rest, in rad/s and as a share of the over-speed threshold (J-35).
@@ -26,19 +29,21 @@ const BRAKE: f64 = 60.0;
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
 /// Time constant of the speed that is computed from positions, s. The speed that drives report is a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
-/// Share of the rotor inertia on which the controller relies, because the configured value may be an unmeasured
-/// proposal. If no rotor inertia is configured, the torque limit divided by `PROPOSED` (rad/s²) is used instead.
+/// Share of the rotor inertia that the controller uses, because the configured value may be an unmeasured proposal.
+/// If no rotor inertia is configured, the controller uses the same share of the torque limit divided by `PROPOSED`
+/// (rad/s²).
 const ROTOR: f64 = 0.2;
 const PROPOSED: f64 = 200.0;
-/// Share of the modelled friction that every joint is assumed to have at least.
+/// Share of the modelled friction that the controller expects in every joint. The real friction may be lower than
+/// modelled, but not below this share.
 const CERTAIN_FRICTION: f64 = 0.7;
 /// Highest share of the damping that the friction compensation may cancel, because the joint may have less friction than its model.
 const USED_UP: f64 = 0.5;
 /// Time constant of the dry friction when it fades in or out, s.
 const GRIP_S: f64 = 0.1;
-/// Speed below which a joint is considered at rest in every case, rad/s.
+/// Lowest speed at which the dry friction may begin to fade, rad/s.
 const STANDING: f64 = 0.01;
-/// Highest speed at which the full dry friction may act, rad/s.
+/// Highest speed at which the dry friction may begin to fade, rad/s.
 const SLOW: f64 = 0.3;
 /// Longest extension of the dry-friction spring that holds a joint at rest, rad.
 const STRETCH: f64 = 0.005;
@@ -51,9 +56,9 @@ const COMPENSATED: (f64, f64) = (0.3, 0.6);
 const MISSING: u8 = 2;
 const LETS_GO: u8 = 5;
 
-/// Returns the speed of a joint above which Teaching ends, rad/s. Teaching compares this limit with the speed that is
-/// computed from positions. If damping cannot stop the joint, the position controller can still stop it from this
-/// speed before over-speed releases the arm.
+/// Returns the speed of a joint above which Teaching ends, rad/s. The speed that is computed from positions is
+/// compared with it. From this speed, the position controller can still stop a joint before the over-speed error
+/// switches the torque off.
 pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
     TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
 }
@@ -140,8 +145,9 @@ impl TaughtJoint {
 
     /// Evaluates the answer of the joint in each tick of Teaching. `fresh` is `true` if the joint has answered with
     /// this `position`, rad. `late` is the delay of this tick in ms. Returns the speed computed from the joint
-    /// positions, rad/s, or 0 without an answer. Without answers, the known speed and the anchors of the springs
-    /// become too old.
+    /// positions, rad/s, or 0 without an answer.
+    ///
+    /// After several missing answers, the torques of Teaching fade, because speed and positions are too old.
     #[inline(always)]
     pub(super) fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
         // A late tick has the same effect as a missing answer.
@@ -155,7 +161,7 @@ impl TaughtJoint {
         }
         (self.missing, self.lost) = (0, self.lost.saturating_sub(1));
         let way = position as f32 - self.behind;
-        // If no answer is missing, these two values are constant.
+        // In the normal case, no answer is missing, and the two values are constants.
         let (time, part) = if missed == 0 {
             (SPEED_S, DT as f32 / SPEED_S)
         } else {
@@ -198,8 +204,8 @@ impl TaughtJoint {
         (damping, damping.max(most.min(GROWN * limits.torque_max)))
     }
 
-    /// Executes one tick of Teaching for a joint with this `load`, N·m. `haste` is the excess of the flange speed over the tool speed
-    /// limit, scaled to the range from 0 to 1.
+    /// Executes one tick of Teaching for a joint with this `load`, N·m. `haste` is 0 if the flange is not faster than
+    /// the tool speed limit, and rises to 1 at twice this limit.
     #[inline(always)]
     pub(super) fn step(
         &mut self,

@@ -51,8 +51,8 @@ fn j25_what_no_mass_explains_is_carried_until_the_arm_is_led() {
 
 #[test]
 fn j25_friction_never_becomes_a_great_mass() {
-    // If the arm is stretched vertically, a mass at its flange does not load any joint. Near this pose, only an enormous mass could explain
-    // the loads.
+    // If the arm is stretched vertically, a mass at its flange loads no joint. Near this pose, only an enormous mass
+    // would fit the loads, so hardly any mass is estimated.
     assert!(begun([8.0; JOINTS], &[0.0; JOINTS]).mass.abs() < 0.2);
     for k in 0..200 {
         let q = [0.0, 0.01 * f64::from(k), 0.0, 0.0, 0.0, 0.0];
@@ -77,9 +77,8 @@ proptest! {
         }
     }
 
-    /// The load may have been learned at rest, in motion, or while a joint lowered this load. At a position limit, the load does not push a
-    /// joint outwards, and the spring of the soft end is stronger. The load torque never exceeds the highest torque that was learned or
-    /// that may be learned.
+    /// A load can be learned at rest, in motion, or while a joint lowers it. At a position limit, no such load pushes
+    /// a joint outwards. The load torque never exceeds the highest torque that was learned or that can be learned.
     #[test]
     fn j25_at_a_position_limit_no_load_pushes_outwards(load in -180.0..180.0f64, by_mass in -180.0..180.0f64, velocity in -0.5..0.5f64) {
         let limits = Config::avena().joints[1];
@@ -145,8 +144,8 @@ impl Driven {
     }
 }
 
-/// A mass that alone explains the motion is removed within seconds, without a torque step. If the arm moves faster or
-/// more slowly than the mass would drive it, a hand moves the arm, and the mass stays.
+/// If a mass is the only cause of a motion, it is removed within seconds, without a torque step. If the arm moves
+/// faster or more slowly than the mass would drive it, a hand moves the arm, and the mass is kept.
 #[test]
 fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     let left = |against, velocity, ms| Driven::new().moves(against, velocity, ms);
@@ -184,8 +183,8 @@ fn j25_a_mass_that_is_missed_comes_back() {
     assert!(driven.taught.mass > 0.0 && driven.taught.found <= 0.51, "{} kg", driven.taught.found);
 }
 
-/// In each round, Teaching computes the inertia and the friction of every joint once. Teaching compares the load with the motion six times
-/// in each round, and leaves one tick for the ramp.
+/// In each round, Teaching computes the inertia and the friction of every joint once. It compares the load with the
+/// motion six times, and reserves one tick for the inertia of the whole arm.
 #[test]
 fn j25_each_round_computes_all_that_changes_slowly() {
     let of =
@@ -201,9 +200,11 @@ fn j25_each_round_computes_all_that_changes_slowly() {
     assert_eq!([0, 1, 2].map(Turn::of), [Turn::Begin, Turn::Mass, Turn::Ramp]);
 }
 
-/// The fitted mass explains a part of the load. The part depends on the torque of 1 kg on all joints together: it is
-/// zero up to 2 N·m and 1 from 6 N·m on. In between, it rises smoothly with the square of this torque, from 4 to 36:
-/// 5/32 at a quarter of this range, 1/2 at the half, and 27/32 at three quarters.
+/// Only a part of the load is attributed to the fitted mass. The part depends on the torque of 1 kg on all joints
+/// together: it is 0 up to 2 N·m and 1 from 6 N·m on.
+///
+/// In between, it rises smoothly with the square of this torque, from 4 to 36: 5/32 at a quarter of this range, 1/2
+/// at the half, and 27/32 at three quarters.
 #[test]
 fn j25_a_mass_that_hardly_loads_the_arm_explains_a_part_of_the_load() {
     let unit = dynamics().flange_torque(&Q).map(|u| u * u).iter().sum::<f64>().sqrt();
@@ -242,8 +243,8 @@ fn j25_one_tick_before_the_first_round_and_one_tick_of_each_round_belong_to_the_
     }
 }
 
-/// The excess is the flange speed above the limit divided by the limit, on a smooth ramp. With a limit of 0.5 m/s,
-/// the ramp begins at 0.5 m/s and reaches 1 at 1 m/s.
+/// The excess of the flange speed is (speed − limit) / limit, on a smooth ramp. With a limit of 0.5 m/s, the excess
+/// is 0 at 0.5 m/s and 1 at 1 m/s.
 #[test]
 fn j25_the_excess_of_the_tool_speed_is_a_share_of_its_limit() {
     let (dynamics, direction) = (dynamics(), [0.1, 0.2, -0.3, 0.1, 0.0, 0.2]);
@@ -314,8 +315,8 @@ fn j25_a_missed_mass_returns_by_its_missing_part() {
 /// is at 1,008 ms.
 #[test]
 fn j25_a_mass_that_drives_the_arm_goes_by_a_part_of_itself() {
-    // The mass of 2 kg causes 20 N·m. Damping and friction oppose the same torque at 0.3 rad/s, so the mass alone
-    // explains the motion.
+    // The mass of 2 kg causes 20 N·m. Damping and friction oppose the motion at 0.3 rad/s with the same torque, so
+    // the mass alone explains the motion.
     let mut taught = with_mass(2.0, 2.0, 20.0);
     let driven = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
     (0..83).for_each(|_| taught.judge(&driven));

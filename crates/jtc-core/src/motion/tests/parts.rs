@@ -38,7 +38,7 @@ fn j71_the_arm_is_held_when_every_present_joint_has_settled_and_none_yields() {
     }
 }
 
-/// All joints are held and their loads are known. Teaching nevertheless does not begin while joint 3 yields.
+/// All joints are held and their loads are known, but joint 3 yields. Teaching therefore does not begin.
 #[test]
 fn j25_teaching_does_not_begin_while_a_joint_yields() {
     let (config, mut motion) = (Config::avena(), holding([true; JOINTS]));
@@ -73,8 +73,8 @@ fn j25_j33_the_end_of_teaching_gives_a_heavy_arm_more_time_to_stop() {
     }
 }
 
-/// At the end of Teaching, a catch of all joints begins with the deceleration, and again when the arm has come to
-/// rest. In between, no catch begins.
+/// At the end of Teaching, a catch of all joints begins together with the deceleration. A second catch begins when
+/// the arm has come to rest. In between, no catch begins.
 #[test]
 fn j25_j43_a_catch_begins_with_the_deceleration_and_with_the_rest() {
     let config = Config::avena();

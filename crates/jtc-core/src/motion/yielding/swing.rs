@@ -1,5 +1,5 @@
-//! Detection of a swing of a joint with less inertia than in the arm file. The brake is too strong for such a joint, because measured
-//! speeds are delayed.
+//! Detection of oscillation in a joint that has less inertia than the arm file contains. Measured speeds are delayed,
+//! so the brake is too strong for such a joint and makes it swing.
 use crate::bit_codec::bit_codec;
 
 /// Longest duration of half a swing, ms. `HALF_SPEED` is the lowest peak speed of half a swing, rad/s.
@@ -99,8 +99,8 @@ mod tests {
         swing.soft
     }
 
-    /// The motion before the first reversal does not count as half a swing, because it may have begun long before the
-    /// yield. Two halves are complete at the third reversal, so the joint then becomes softer.
+    /// The motion before the first reversal may have begun long before the yield, so it does not count as half a
+    /// swing. At the third reversal, two half swings are complete. The joint then becomes softer.
     #[test]
     fn j68_a_joint_becomes_softer_at_the_third_reversal() {
         for v in [0.3, -0.3] {
@@ -137,7 +137,7 @@ mod tests {
         }
     }
 
-    /// Only the highest speed within a half swing counts. The joint may be slow before and after it.
+    /// Only the highest speed within a half swing matters. The joint can be slow before and after it.
     #[test]
     fn j68_the_highest_speed_of_a_half_swing_counts() {
         let mut swing = Swing::NONE;

@@ -235,7 +235,7 @@ fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
             yields.is_over()
         });
         assert_eq!(over, held, "{load} N·m");
-        // The joint is at rest, so the host may request that the controller holds it.
+        // The joint is at rest, so the controller holds it again if the host requests this.
         assert!(yields.is_calm());
         yields.clear();
         assert!(yields.is_over());

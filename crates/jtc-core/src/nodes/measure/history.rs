@@ -57,8 +57,8 @@ pub(super) struct History {
     answers: [Kept; SLOTS],
     /// Number of the slot for the next answer. The number is counted modulo 256.
     next: u8,
-    /// Number of answers before the newest answer that arrived without a gap, one in each millisecond. This number
-    /// may be higher than the number of stored answers.
+    /// Number of consecutive answers before the newest one, with one answer in each millisecond. The number can be
+    /// higher than the number of stored answers.
     in_turn: u8,
     /// Mask of the answers that were close to their predictions. Bit 0 of this mask stands for the newest answer.
     as_predicted: u8,
@@ -74,8 +74,8 @@ impl History {
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Stores an answer in the history. Returns the rate between the newest stored answer that is old enough, and this answer. Returns
-    /// `None` if no stored answer is old enough.
+    /// Stores an answer in the history. Returns the rate between the newest stored answer that is old enough, and
+    /// this answer. Returns `None` if every stored answer is too recent.
     #[inline(always)]
     pub(super) fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
@@ -110,8 +110,7 @@ impl History {
     }
 
     /// Returns the position `ms` milliseconds before the newest answer, rad. Returns `None` if an answer is missing
-    /// in this time. The newest answer may be up to one millisecond older than `now_ms`, because an answer may be
-    /// late or missing.
+    /// in this time. The newest answer must be at most one millisecond older than `now_ms`.
     pub(super) fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         (since_newest <= 1 && ms <= self.in_turn.min(SLOTS as u8 - 1)).then(|| self.nth(ms.into()).position)
@@ -190,8 +189,8 @@ mod tests {
         history
     }
 
-    /// The position at the start of a window is known if an answer arrived in each millisecond of the window. The window ends with the newest
-    /// answer, which may be 1 ms old.
+    /// The position at the start of a window is known only if an answer arrived in each millisecond of the window.
+    /// The window ends with the newest answer, which may be 1 ms old.
     #[test]
     fn j35_the_position_before_a_window_without_a_gap_is_known() {
         let history = in_turn(100, 110);

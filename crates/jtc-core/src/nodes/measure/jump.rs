@@ -15,12 +15,13 @@ use crate::config::Config;
 
 /// Number of answers in which a difference between the encoders must be constant before the difference counts as a jump.
 const CONSTANT: u8 = 5;
-/// Highest number of consecutive answers that may be treated as a possible jump, even if the size of the jump changes.
+/// Highest number of consecutive answers that the controller treats as a possible jump, even if the size of the jump
+/// changes.
 const LOOKS: u8 = 15;
 /// Highest number of changes of the size of a possible jump. If the size changes more often, the controller attributes the difference to a
 /// twisted gear.
 const CHANGES: u8 = 2;
-/// Longest time between two consecutive answers between which the controller can detect a jump, ms.
+/// Longest time between two consecutive answers that the controller can compare to detect a jump, ms.
 const WITHIN_MS: u32 = 3;
 /// Difference between the encoders that is tolerated, in encoder steps.
 const STEPS: f64 = 3.0;
@@ -31,8 +32,8 @@ const LEAST: f64 = 2e-5;
 /// reported speed.
 const SHARE: f64 = 0.1;
 /// Size that a jump must exceed, as a multiple of the tolerated difference. The clocks of a drive and of the
-/// controller drift against each other. An answer may therefore contain an encoder reading that is one drive tick too
-/// old. Two such answers must not count as a jump.
+/// controller drift against each other, so an answer may contain an encoder reading that is one drive tick too old.
+/// Two such answers must not count as a jump.
 const SLIPS: f64 = 2.0;
 /// Share of the full scale above which the controller does not use a reported speed.
 const SATURATED: f64 = 0.98;
@@ -44,8 +45,8 @@ pub(super) struct Jumps {
     taken_off: f64,
     /// Difference of the two encoders before the possible jump, rad.
     before: f32,
-    /// Size of the possible jump, rad. After a fault was found, this field contains the size of the jump, or the ratio of the position rate
-    /// to the reported speed.
+    /// Size of the possible jump, rad. After a fault was found, this field contains the value of the fault instead:
+    /// the size of the jump (rad), or the ratio of the position rate to the reported speed.
     value: f32,
     /// Number of answers with the possible jump.
     answers: u8,
@@ -71,7 +72,8 @@ pub(super) enum Seen {
     Jump(f64),
 }
 
-/// Two distances of a joint within the window of its reported speed: the measured distance, and the distance computed from the speed.
+/// Distances that a joint has moved within the window of its reported speed: the measured distance, and the distance
+/// computed from this speed.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nodes) struct Ways {
     /// Distance between the answered positions, rad.
@@ -163,7 +165,8 @@ impl Jumps {
             Ways::of(answer, from, config)
         };
         let Some(now) = ways(answer, at_ms) else {
-            // The answer at the start of the window was lost, so the possible jump remains undecided.
+            // The answer at the start of the window was lost. The present answer therefore neither confirms nor
+            // rejects the possible jump.
             self.answers = watched;
             return if watched > 0 { Seen::Perhaps(self.value.into()) } else { Seen::Motion };
         };

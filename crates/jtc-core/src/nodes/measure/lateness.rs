@@ -40,8 +40,8 @@ pub(super) struct Lateness {
 bit_codec!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
-    /// Returns `true` if no answer is considered late and the tick has at most one answer. Such a tick contains no
-    /// evidence of late answers, so the caller does not need to call [`Self::count`].
+    /// Returns `true` if no answer is considered late and the tick has at most one answer. A tick with one answer or
+    /// none contains no evidence of late answers, so the caller does not need to call [`Self::count`].
     pub(super) fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
@@ -61,7 +61,8 @@ impl Lateness {
         // shifted further in the next line.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
-        // If more answers arrive than Moves are outstanding, the controller has counted some of these answers as lost.
+        // If more answers arrive than Moves are outstanding, the controller has counted some of these answers as
+        // lost. The number of outstanding Moves is then zero.
         let outstanding = (self.outstanding + u8::from(asked)).saturating_sub(answers);
         self.outstanding = outstanding.min(self.most);
         self.fewest = self.fewest.min(self.outstanding);
@@ -142,7 +143,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// If no answer is lost, the counted lateness of every answer after the burst is correct.
+        /// If no answer is lost, the controller counts the correct lateness for every answer after the burst in the
+        /// function `sent`.
         #[test]
         fn j63_unanswered_moves_are_how_late_an_answer_is(sent in (1..=MOST).prop_flat_map(|most| sent(most, 0, 700))) {
             for (tick, (age, late)) in counted(&sent).into_iter().enumerate().skip(2 * usize::from(MOST)) {
@@ -150,11 +152,13 @@ mod tests {
             }
         }
 
-        /// After some answers were lost, every count is correct again when the windows with these losses are over.
+        /// The controller needs some windows to subtract lost answers. When these windows are over, every counted
+        /// lateness must be correct again.
         #[test]
         fn j63_what_was_lost_is_taken_off(
-            // If the highest possible number of answers is outstanding, the count cannot show a lost answer. In the
-            // second part of the test, the lateness is therefore at most `most - 1`.
+            // The number of outstanding Moves is never above `most`. If `most` answers are late, this number
+            // therefore cannot include a lost answer. In the second part of the test, the lateness is at most `most -
+            // 1`.
             some in (1..=MOST).prop_flat_map(|most| (sent(most, 20, 240), sent(most - 1, 0, 480))),
         ) {
             let (with, without) = some;
@@ -203,8 +207,9 @@ mod tests {
         assert!(lateness.stands(1));
     }
 
-    /// Before the first evidence, every Move counts as sent and as answered. If no Move was sent for the tick of the
-    /// first evidence, the newest answer belongs to the previous Move. The answer is then one tick late.
+    /// Until the first evidence of late answers, the controller assumes that every tick has a Move and its answer. If
+    /// no Move was sent for the tick of this evidence, the newest answer belongs to the previous Move and is one tick
+    /// late.
     #[test]
     fn j63_before_the_first_evidence_each_tick_counts_as_a_tick_with_a_move() {
         assert_eq!(Lateness::default().count(true, 2, 1), 0);
@@ -219,7 +224,8 @@ mod tests {
         for answers in [2, 4, 3, 8, 9, 2] {
             lateness.count(true, answers, 1);
             (0..10).for_each(|_| _ = lateness.count(true, 0, 1));
-            // All answers of the burst except the last one were late. The highest lateness that is counted is 7.
+            // In the tick with several answers, all answers except the last one were late. The highest lateness that
+            // the controller counts is 7.
             assert_eq!(lateness.count(true, 1, 1), (answers - 1).min(7), "{answers} answers");
             lateness.count(true, 1, u32::from(LASTS_MS));
             assert!(lateness.stands(1));
@@ -245,7 +251,8 @@ mod tests {
         }
     }
 
-    /// Only the Moves after the newest answered Move remain outstanding. `moves` marks the ticks with a Move.
+    /// If the newest answer is `late` ticks late, only the Moves that were sent after its Move remain outstanding.
+    /// Each set bit of `moves` marks a tick with a Move; bit 0 is the newest tick.
     #[test]
     fn j63_the_moves_before_a_later_answer_are_lost() {
         for (moves, late, outstanding) in [

@@ -8,7 +8,8 @@ mod readings;
 mod unexpected;
 
 const VELOCITY_MAX: f64 = 2.0;
-/// Error of a prediction (rad) or of a rate (rad/s), because the history has single precision.
+/// Tolerance for the rounding error of a prediction (rad) or of a rate (rad/s). The error occurs because the history
+/// has single precision.
 const ROUNDED: f64 = 1e-6;
 
 fn tick(answer: Option<f64>, velocity: f64) -> Tick {
@@ -143,8 +144,9 @@ fn j63_a_long_tick_is_predicted_for_its_length() {
     assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < ROUNDED);
 }
 
-/// Simulates a joint whose positions change at `rate` but that reports another velocity. Then an answer differs from the expected position
-/// by `off`, `since` more answers follow from the new position, and the next answer is missing. Returns the rate of the prediction.
+/// Simulates a joint whose positions change at `rate` (rad/s), but whose drive reports the velocity `reported`. Then
+/// an answer deviates by `off` (rad) from the expected position, `since` further answers have the same deviation, and
+/// the next answer is missing. Returns the predicted rate, rad/s.
 fn carried_after(rate: f64, reported: f64, off: f64, since: u8) -> f64 {
     let mut joint = Measurement::default();
     let answer = |k: f64, off: f64| Tick {
@@ -168,8 +170,8 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     for (rate, reported, off, since, carried) in [
         (0.4, 0.5, 0.0, 0, 0.4),
         (0.4, 0.3, 0.0, 0, 0.4),
-        // A deviation of a tenth of the implausible distance of 1 ms still counts as a motion. The rate over the last
-        // 5 ms then includes this deviation. After a larger deviation, the prediction uses the reported velocity.
+        // A deviation up to a tenth of the implausible distance (of 1 ms) still counts as a motion, so the rate over
+        // the last 5 ms includes this deviation. After a larger deviation, the prediction uses the reported velocity.
         (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
         (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
         (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
@@ -197,8 +199,8 @@ fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-9, "{:?}", joint.used());
 }
 
-/// After a missing or unusable answer, the difference between prediction and next answer fades. If no Move has
-/// requested an answer, the answer does not count as missing, and the next answer is used directly.
+/// After a missing or unusable answer, the difference between the prediction and the next answer fades. If no Move
+/// has requested an answer, no answer is missing, and the controller uses the next answer directly.
 #[test]
 fn j63_only_what_was_expected_or_came_can_be_missing() {
     for (lost, jumps) in [
@@ -243,7 +245,8 @@ fn j63_an_offset_fades_like_a_critically_damped_filter() {
     let mut little = Fading { left: 1e-6, slope: 0.0 };
     little.step(1, &config);
     assert!(little.left > 0.9e-6, "{little:?}");
-    // Without elapsed time, an offset does not fade. An offset is dropped only if its value and its slope are both below the bound.
+    // An offset does not fade if no time has elapsed. The controller sets an offset to zero only if its value and its
+    // slope are both below `FADED`.
     for (left, slope, dropped) in [
         (FADED, 0.0, false),
         (0.0, -FADED, false),

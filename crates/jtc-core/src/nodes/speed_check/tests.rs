@@ -83,7 +83,7 @@ fn j35_a_sum_of_exactly_twice_the_twist_is_not_a_fault() {
     }
 }
 
-/// A check with a permitted difference ends the sequence. A later sequence does not contain the earlier distances.
+/// A check with a permitted difference ends the sequence of differences. The sums of the next sequence start at zero.
 #[test]
 fn j35_a_sequence_of_differences_begins_without_the_earlier_distances() {
     let mut joint = Joint::default();
@@ -95,7 +95,7 @@ fn j35_a_sequence_of_differences_begins_without_the_earlier_distances() {
     assert_eq!(joint.node.measured.misfit(), Some((StopKind::SpeedScale, 2.0)));
 }
 
-/// A difference in the other direction begins a new sequence.
+/// If the difference changes its direction, a new sequence begins, without the earlier differences.
 #[test]
 fn j35_only_differences_in_one_direction_are_added() {
     for sign in [1.0, -1.0] {
@@ -106,8 +106,8 @@ fn j35_only_differences_in_one_direction_are_added() {
     }
 }
 
-/// If both encoders move, but over different distances, the reported speed has another scale than configured. If one
-/// distance is less than a tenth of the other, one encoder does not move, which is an error of the joint.
+/// If both encoders move over different distances, the scale of the reported speed is wrong. If one distance is less
+/// than a tenth of the other distance, its encoder does not move, which is an error of the joint.
 #[test]
 fn j35_an_encoder_with_less_than_a_tenth_of_the_distance_does_not_move() {
     for (measured, reported, factor) in [
@@ -130,8 +130,8 @@ fn j35_an_encoder_with_less_than_a_tenth_of_the_distance_does_not_move() {
     }
 }
 
-/// Returns the ticks in which the check reports joint 1, whose positions change at 1 rad/s while it reports 0.5 rad/s. `state` returns the
-/// state of the drive in a tick.
+/// Returns the ticks in which the check reports joint 1. The positions of the joint change at 1 rad/s, but its drive
+/// reports 0.5 rad/s. `state` returns the state of the drive in a tick.
 fn reported(ticks: u32, state: impl Fn(u32) -> NodeState) -> [Option<u32>; 3] {
     let config = Config { gear_stiffness: 1e6, ..Config::avena() };
     let mut nodes = [Node { valid: true, ..Node::default() }];

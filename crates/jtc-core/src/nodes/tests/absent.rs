@@ -29,8 +29,8 @@ fn j53_a_joint_is_absent_at_once_and_the_others_stay() {
     }
 }
 
-/// A joint that was absent before starts like every other joint. It is not configured, and may be silent while it
-/// starts.
+/// A joint that is no longer absent starts like every other joint: it must accept a configuration, and missing
+/// answers are not an error while it starts.
 #[test]
 fn j53_a_joint_that_is_no_longer_absent_is_brought_up() {
     let (config, before) = (Config::avena(), without_joint_3());
@@ -41,7 +41,7 @@ fn j53_a_joint_that_is_no_longer_absent_is_brought_up() {
     assert!(!node.absent() && !node.configured && !node.valid && !node.seen);
     assert_eq!(node.boot_left, config.node_boot_ms);
     assert!([0, 1, 3, 4, 5, GRIPPER].iter().all(|&n| nodes.node(n).valid && nodes.node(n).boot_left == 0));
-    // In the next tick, the joint is not replaced by an absent joint again.
+    // The next tick must not treat the joint as absent again.
     tick_with(&mut nodes, &[], &config);
     assert!(!nodes.node(2).absent() && !nodes.node(2).valid);
 }
@@ -65,8 +65,8 @@ fn j53_a_drive_of_an_absent_joint_that_answers_is_an_error_while_it_answers() {
     }
 }
 
-/// If a setting that the controller sends to the nodes changes, or the scale of their speed, the nodes must accept a
-/// new configuration. Other settings do not require this.
+/// The nodes must accept a new configuration if a setting changes that the controller sends to them, or if the full
+/// scale of their speed changes. Other settings do not require a new configuration.
 #[test]
 fn j53_only_settings_of_the_nodes_require_a_new_configuration() {
     type Change = fn(&mut Config);

@@ -129,7 +129,7 @@ fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     }
 }
 
-/// While the torque is on, a frame for the gripper alone is sent in one tick of twenty.
+/// While the torque is on, at most one of twenty ticks sends a frame that only the gripper needs.
 #[test]
 fn j23_a_gripper_is_brought_up_on_the_side() {
     let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
@@ -154,7 +154,7 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
         nodes.nodes[GRIPPER].silent = 5;
     };
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A frame that enables a joint does not wait for twenty ticks.
+    // A frame that enables a joint is sent at once, without a wait of twenty ticks.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
     assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
@@ -183,8 +183,8 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     }
 }
 
-/// If no other frame must be sent, one configuration frame may follow another. A node that must stay enabled does not delay a configuration
-/// frame for another node.
+/// If no change of state is due, one configuration frame can directly follow another. A node that must stay enabled
+/// does not delay the configuration of another node.
 #[test]
 fn j20_configurations_and_changes_of_state_take_turns() {
     let enabling = |nodes: &mut Nodes| {
@@ -209,8 +209,8 @@ fn j20_configurations_and_changes_of_state_take_turns() {
     }
 }
 
-/// Returns the state that the next frame requests from a gripper in this state, while the joints are in the state of
-/// the goal. Returns `NoChange` if the frame contains no such request.
+/// Returns the state that the next frame requests from the gripper. The gripper is in `state`, and the joints are in
+/// the state that belongs to `goal`. Returns `NoChange` if the frame contains no request for the gripper.
 fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool, clear: bool) -> Target {
     let mut nodes = ready();
     if goal == Goal::Enabled {
@@ -225,7 +225,8 @@ fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool
     }
 }
 
-/// A gripper that keeps its workpiece does not change its state while the arm has no torque, except if the gripper itself is cleared.
+/// A gripper that is configured to keep its workpiece (column `keeps`) does not change its state while the arm has no
+/// torque, unless the gripper itself is cleared.
 #[test]
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};

@@ -35,8 +35,8 @@ fn close(found: f64, ms: f64) -> bool {
     (found - SPEED * 1e-3 * ms).abs() < ROUNDED
 }
 
-/// Without an answer, the position of a joint is predicted for the whole length of the tick, even if ticks were
-/// missed. For the other joints, the controller uses the measured positions.
+/// If an answer of a joint is missing, the controller predicts the position of this joint for the whole length of the
+/// tick, including missed ticks. For the joints with an answer, it uses the measured positions.
 #[test]
 fn j63_a_joint_without_an_answer_moves_on_for_the_length_of_the_tick() {
     for missed_ticks in [0u16, 1, 3] {
@@ -71,15 +71,16 @@ fn j63_only_a_move_that_was_sent_and_acknowledged_is_outstanding() {
         tick(&mut nodes, &[], BusState { acknowledged, bus_off: false });
         nodes.sent_move = true;
         tick(&mut nodes, &answers(23), GOOD);
-        // A late answer is extrapolated by one millisecond, with a rate that is at most 0.2 rad/s above the reported velocity. In this
-        // time, the joint moves by 0.15 mrad.
+        // The controller extrapolates a late answer by one millisecond, in which the joint moves by 0.15 mrad. The
+        // rate of the extrapolation is at most 0.2 rad/s above the reported velocity.
         let way = (nodes.positions()[0] - SPEED * 23e-3) / (SPEED * 1e-3);
         assert!((way - if late { 1.0 } else { 0.0 }).abs() < 0.3, "{sent} {acknowledged}: {way} ms");
         assert!(nodes.positions().iter().all(|position| *position == nodes.positions()[0]));
     }
 }
 
-/// If the set values of some joints restart with another velocity, the prediction of these joints does not change.
+/// If the set values of a joint restart with another velocity, the true motion of the joint does not change. The
+/// prediction must therefore not change either.
 #[test]
 fn j63_a_restart_of_set_values_is_not_a_change_of_the_motion() {
     let mut nodes = moving(20);

@@ -45,8 +45,8 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
     for (unacknowledged, sent_move, valid, before, missed) in [
         (0, true, true, 0, 1),
         (3, true, true, 0, 1),
-        // In this tick, the controller raises the transmit timeout, which applies to all joints, and the joint's
-        // count starts again.
+        // In this tick, the controller raises the transmit timeout for all joints. The count of missing answers of
+        // the joint starts again at zero.
         (4, true, true, 0, 0),
         (4, true, true, 3, 0),
         (2, false, true, 3, 3),
@@ -59,16 +59,17 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
         let node = nodes.node(1);
         assert_eq!((node.missed, node.silent), (missed, 0), "{unacknowledged} {sent_move} {valid} {before}");
     }
-    // A gripper has no position that could be wrong, so only its missing frames are counted.
+    // A gripper has no position that could be wrong. Missing acknowledgements therefore never mark the gripper as
+    // misbehaved.
     let mut nodes = ready();
     (nodes.unacknowledged, nodes.nodes[GRIPPER].missed) = (1, 4);
     tick(&mut nodes, &[], lost);
     assert!(!nodes.node(GRIPPER).misbehaved);
 }
 
-/// If two answers arrive in one tick, the first answer was late. The distance between both answers is not a motion
-/// within this tick, so it must not cause a step. In the next tick, a single answer may again be on time. Its
-/// difference from the prediction must not cause a step either.
+/// If two answers of a joint arrive in one tick, the first answer was late. The controller must not treat the
+/// distance between the two answers as a motion within one tick. If a single answer arrives on time in the next tick,
+/// it must not cause a step either.
 #[test]
 fn j63_the_second_answer_of_a_tick_makes_no_step() {
     let mut nodes = ready();
@@ -81,7 +82,7 @@ fn j63_the_second_answer_of_a_tick_makes_no_step() {
     bus[2] = answer(0.001);
     tick(&mut nodes, &bus, GOOD);
     let before = nodes.positions()[2];
-    // The second answer of this tick is 1 mrad beyond the position of the joint.
+    // The second answer of this tick is 1 mrad away from the expected position of the joint.
     bus.push(answer(0.003));
     tick(&mut nodes, &bus, GOOD);
     let carried = nodes.positions()[2] - before;
@@ -93,7 +94,7 @@ fn j63_the_second_answer_of_a_tick_makes_no_step() {
     tick(&mut nodes, &bus, GOOD);
     let step = nodes.positions()[2] - before;
     assert!(step.abs() < 0.1e-3, "{step} rad");
-    // The offsets for both differences fade.
+    // The offsets fade, so the used position reaches the position in the answers.
     for _ in 0..250 {
         tick(&mut nodes, &bus, GOOD);
     }
@@ -147,8 +148,8 @@ fn j14_five_moves_are_a_timeout_of_a_joint_and_a_flag_of_the_gripper() {
     assert_eq!(absent.gripper_flags(&config), 0, "none is expected");
 }
 
-/// Any node may have lost its supply while it did not answer. Only the state of an enabled gripper shows later whether the node has lost
-/// its supply.
+/// A node that did not answer may have lost its supply, so its configuration counts as lost. Only an enabled gripper
+/// keeps its configuration, because its state shows later whether it has lost its supply.
 #[test]
 fn j14_a_node_that_was_silent_has_lost_its_configuration_unless_it_is_an_enabled_gripper() {
     for (n, state, kept) in [

@@ -96,7 +96,8 @@ fn j69_a_joint_index_out_of_range_is_the_last_joint() {
     }
 }
 
-/// An accepted Stop is not replaced by the Pause of a held stop.
+/// If a Stop was accepted before the held stop, the trajectory still ends in the state Stop. A held stop alone ends
+/// the execution in the state Pause.
 #[test]
 fn j33_j69_a_held_stop_does_not_change_the_end_of_a_stop() {
     let (pause, stop) = (Some(TrajectoryState::Pause), Some(TrajectoryState::Stop));
@@ -152,7 +153,8 @@ fn j25_teaching_ends_if_both_speeds_show_that_a_hand_moves_a_joint_too_fast() {
     }
 }
 
-/// The mask of the yielding joints has bit 0 for joint 1. The rate is the rate of the clock that drives the motion of the arm.
+/// In the mask of the yielding joints, bit 0 is joint 1. The rate is the rate of path time, or of the approach during
+/// an approach. Without an execution, the rate is 0.
 #[test]
 fn j69_the_reactions_show_the_joints_that_yield_and_the_rate_of_the_motion() {
     let (mut path, mut approach) = (PathClock::start(1.0), PathClock::start(1.0));

@@ -145,8 +145,8 @@ fn j56_only_segment_0_of_a_trajectory_begins_an_upload_in_a_replay() {
     }
 }
 
-/// The log contains the events that the controller has completed, and the next event, which the controller may have
-/// executed in part.
+/// The log contains all events that the controller has completed. It also contains the next event, because the
+/// controller may have executed a part of it.
 #[test]
 fn j56_the_events_that_the_controller_has_looked_at_are_recorded() {
     let frames: Vec<_> = (0..4).map(|_| frame(FrameType::GetInfo, &[0; 6])).collect();
@@ -180,7 +180,8 @@ fn j56_the_log_stores_at_most_500_bytes_from_hosts_at_once() {
     assert_eq!((read.host().len(), kinds(&read)[11]), (12, RecordedKind::Frame));
 }
 
-/// On average, the log stores two bytes per tick. A frame of 8 bytes takes ten bytes, so it fits five ticks after the log was full.
+/// On average, the log stores two bytes per tick. A frame of 8 bytes takes ten bytes. Five ticks after the log was
+/// full, the log therefore has space for this frame.
 #[test]
 fn j56_the_log_stores_two_bytes_from_hosts_per_tick() {
     let full = [frame(FrameType::SetSettings, &[0; 48]); 10];

@@ -65,7 +65,8 @@ fn j56_a_changed_temperature_takes_two_words_more() {
     assert_eq!(words(&[&first, &second, &third]), [8, 10, 8]);
 }
 
-/// An arm without a gripper has six nodes. After the first tick, its ticks also take eight words.
+/// A tick takes eight words for six nodes (an arm without a gripper) and for seven nodes. Only the first tick after a
+/// change of the number of nodes takes more words.
 #[test]
 fn j56_ticks_are_short_for_six_nodes_and_for_seven_nodes() {
     let ticks: Vec<_> = [6, 6, 7, 7, 6, 6].into_iter().zip(1..).map(|(nodes, n)| moving(nodes, n)).collect();
@@ -97,7 +98,8 @@ fn j56_frames_that_look_like_answers_of_missing_nodes_are_recorded() {
     }
 }
 
-/// A bus frame cannot have 9 bytes, so the reader treats these bits as damaged and does not return the tick.
+/// The log contains a bus frame with 9 bytes, which is impossible on the bus. The reader therefore treats the bits as
+/// damaged and does not return the tick.
 #[test]
 fn j56_a_frame_with_an_impossible_length_is_damage() {
     let mut bench = Bench::new();

@@ -27,8 +27,8 @@ fn j56_a_snapshot_follows_after_every_500_ticks() {
     assert_eq!(bench.ticks_after_snapshots(), [500, 500, 0]);
 }
 
-/// After an input that is not in the log, the next snapshot is due 250 ticks after the last snapshot. If more ticks
-/// have passed, the snapshot comes at once.
+/// After an input that is not in the log, the next snapshot follows 250 ticks after the last snapshot. If 250 ticks
+/// have already passed, the next snapshot follows at once.
 #[test]
 fn j56_the_next_snapshot_comes_early_after_a_frame_that_is_not_in_the_log() {
     for (omitted_at, expected) in [(10, [250, 500, 250]), (250, [250, 500, 250]), (300, [300, 500, 200])] {
@@ -149,8 +149,8 @@ fn j56_the_check_value_depends_on_every_output() {
         values.push(chain(before, &bench.controller, errors, &Outputs { bus, safety_output, ..OUTPUTS }));
     };
     add(0, 0, Init, Null, false, None);
-    // This earlier check value, rotated left by 5 bits, is 0x8000_0000. None of the words of states below has this
-    // value.
+    // Rotated left by 5 bits, this check value of the earlier ticks becomes 0x8000_0000. The combined words of the
+    // states below are all different from 0x8000_0000.
     add(0x0400_0000, 0, Init, Null, false, None);
     add(0, 1, Init, Null, false, None);
     add(0, 2, Init, Null, false, None);

@@ -102,7 +102,8 @@ fn j56_the_commit_counts_every_bit() {
     }
 }
 
-/// A block has 251 words after its head: 31 times eight words, and three more words.
+/// A block has 251 words after its head. The test fills these words exactly, with 31 times eight words and then three
+/// words.
 #[test]
 fn j56_words_that_fit_exactly_end_a_block() {
     let mut writer = writer();
@@ -144,7 +145,8 @@ fn j56_a_value_of_zero_takes_one_bit_and_other_values_take_65_bits() {
     assert_eq!((reader.take(32), reader.take(32)), (0x9ABC_DEF0, 0x1234_5678));
 }
 
-/// The value begins in one of the last four words of a block, at every bit of this word.
+/// A 64-bit value that begins near the end of a block continues in the next block. In this test, the value begins at
+/// every bit of the last four words of a block.
 #[test]
 fn j56_a_value_at_the_end_of_a_block_continues_in_the_next_block() {
     const VALUE: u64 = 0x8765_4321_0FED_CBA9;

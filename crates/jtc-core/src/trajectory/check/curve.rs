@@ -9,7 +9,7 @@ pub(super) struct Leaves {
     /// Position in the interval, 0..1.
     pub at: f64,
     /// Value of the curve at the position `at`. If all permitted halvings were used, this is the value of a control
-    /// point, which the curve may not reach.
+    /// point, and the curve itself possibly does not reach this value.
     pub value: f64,
     /// Bound that the curve leaves.
     pub bound: f64,
@@ -116,7 +116,8 @@ mod tests {
     /// and would miss a violation in this piece.
     #[test]
     fn j36_at_the_full_depth_the_hull_decides() {
-        // The curve is above 1 from 0 to 0.006, which is less than half of the smallest piece.
+        // The curve exceeds the bound 1 only from 0 to 0.006. This range is shorter than half of the smallest piece,
+        // which has the length 1/64.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 255).expect("it leaves its bounds");
         assert_eq!((found.at, found.bound), (1.0 / 128.0, 1.0));
         assert!(found.value > 1.0 && found.value < 1.0001, "{found:?}");

@@ -28,8 +28,9 @@ pub struct PathRange {
 }
 
 impl PathRange {
-    /// Returns the range of the joint with index `joint`, for a trajectory with `step_ms` between its points. The tolerance is one int16
-    /// step of the position (96 µrad), plus the effect of one step of the velocity on the quintic between two points.
+    /// Returns the range of the joint with index `joint`, for a trajectory with `step_ms` between its points. The
+    /// tolerance is one int16 step of the position (96 µrad), plus the change of the quintic between two points that
+    /// one step of the velocity causes.
     pub fn of(config: &Config, joint: usize, step_ms: u16) -> Self {
         let (low, high) = config.position_range(joint);
         let tolerance = POSITION_STEP + WAY_OF_VELOCITY * f64::from(step_ms) / 1000.0 * VELOCITY_STEP;

@@ -10,11 +10,12 @@ use super::{JointBounds, POSITION_STEP, VELOCITY_STEP};
 use crate::JOINTS;
 use crate::bit_codec::bit_codec;
 
-/// Margins for rounding in single precision, in position steps and as a share of the speed limit.
+/// Margin for rounding in single precision, in position steps. `SLACK_SHARE` is an additional margin, as a share of
+/// the speed limit.
 const SLACK: f64 = 0.1;
 const SLACK_SHARE: f64 = 2e-6;
-/// Largest difference between the quartic and the cubic polynomial, relative to the unexplained distance. This is the
-/// distance between two points, minus the integral of the cubic.
+/// Largest difference between the quartic and the cubic polynomial, divided by the unexplained distance. The
+/// unexplained distance is the distance between two points, minus the integral of the cubic.
 const BUMP: f32 = 1.875;
 
 /// Point of a trajectory in single precision, in steps of the wire format.
@@ -77,15 +78,15 @@ impl Screen {
         for j in 0..JOINTS {
             let (speed_a, speed_b) = (a.velocity[j].abs() * kv, b.velocity[j].abs() * kv);
             let (bend_a, bend_b) = (a.acceleration[j].abs() * ka, b.acceleration[j].abs() * ka);
-            // `around` is the largest distance of the control points around a trajectory point from the position of
-            // this point.
+            // `around` is the largest distance between the position of a trajectory point and the control points
+            // around it.
             let around = (0.4 * speed_a + 0.05 * bend_a).max(0.4 * speed_b + 0.05 * bend_b);
             let low = a.position[j].min(b.position[j]) - around;
             let high = a.position[j].max(b.position[j]) + around;
             // `speed` is the largest magnitude of the control points of the velocity.
             let speed = (speed_a + bend_a * (1.0 / 3.0)).max(speed_b + bend_b * (1.0 / 3.0));
-            // The unexplained distance is the difference between `way` and `explained`. Its magnitude is reduced by
-            // one step.
+            // The unexplained distance is `way - explained`. Its magnitude is reduced by one step, because the
+            // positions are rounded.
             let way = b.position[j] - a.position[j];
             let explained = 0.5 * kv * (a.velocity[j] + b.velocity[j])
                 + (1.0 / 12.0) * ka * (a.acceleration[j] - b.acceleration[j]);
@@ -157,7 +158,8 @@ mod tests {
                 // The margin covers eight rounding errors, and a tenth of a step for their effect on positions.
                 let share = 1.0 - 8.0 * f64::from(f32::EPSILON);
                 let [low, high] = [screen.position_low[0], screen.position_high[0]].map(f64::from);
-                // The position limits of the quick part include a tolerance of one step, minus the margin.
+                // The position limits of the quick part may exceed the configured limits by the tolerance of one
+                // step, minus the margin.
                 assert!(low >= -2.5 / POSITION_STEP - 0.91 && high <= 2.0 / POSITION_STEP + 0.91);
                 let way = f64::from(screen.speed[5]) * POSITION_STEP;
                 assert!(way <= slowest * step * share - 0.09 * POSITION_STEP, "{speed} {friction:?} {step}");

@@ -27,8 +27,9 @@ fn point(j: usize, q: f64, v: f64, a: f64) -> RawPoint {
     point
 }
 
-/// Returns the largest effect of rounding on a position. This effect is one position step, plus the change in the
-/// middle of the quintic if the velocities of both points are wrong by one step in opposite directions.
+/// Returns the largest effect of rounding on a position. This effect is one position step, plus a change in the
+/// middle of the quintic. For this change, the velocities of the two points are wrong by one step in opposite
+/// directions.
 fn tolerance(step_ms: u16) -> f64 {
     let moving = |v: f64| SetPoint { velocity: [v * 6.283185 / 32767.0; JOINTS], ..SetPoint::default() };
     let (a, b) = (moving(1.0), moving(-1.0));
@@ -109,13 +110,14 @@ fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// The check refuses every motion with a sample outside the limits, and accepts every motion with a margin of 0.01 to the limits.
+    /// The check must refuse every motion with a sample outside the limits. It must accept every motion whose samples
+    /// keep a margin of 0.01 to the limits.
     #[test]
     fn j36_the_verdict_is_that_of_dense_samples((step, a, b) in pair()) {
         let config = config();
         let ([low, high], velocity, speed) = sampled(0, step, &a, &b);
         let (verdict, more) = (between(&config, step, &a, &b), tolerance(step));
-        // Paths that begin outside the limits are tested separately.
+        // This test uses only paths that begin inside the limits. Other tests cover the other paths.
         let before = a.position_rad()[0];
         prop_assume!((-0.7 - more..=1.3 + more).contains(&before));
         let over = |margin: f64| {
@@ -140,8 +142,8 @@ proptest! {
         prop_assert!(!passed || check.judge(&b).is_ok(), "{:?}", check.judge(&b));
     }
 
-    /// An interval passes the quick part of the check if and only if its whole hull is within the limits. In half of the cases, the hull
-    /// ends within one step of a position limit.
+    /// An interval passes the quick part of the check if and only if its whole hull is within the limits. In half of
+    /// the cases, the test moves the points so that the hull ends within one step of a position limit.
     #[test]
     fn j36_the_screen_passes_what_has_its_hull_within_the_limits((step, a, b) in pair(), side in 0..4u8) {
         let (config, mut a, mut b) = (config(), a, b);
@@ -185,8 +187,8 @@ fn j36_each_limit_is_found_and_named() {
     assert_eq!(check(at(0.0, 1.49, 0.0), at(0.015, 1.51, 0.0), 10), (1, Velocity, 1.5, 0.0));
     assert_eq!(check(at(0.0, -1.49, 0.0), at(-0.015, -1.51, 0.0), 10), (1, Velocity, -1.5, 0.0));
     assert_eq!(check(at(0.0, 0.0, 0.0), at(0.0, 0.0, -8.1), 10), (1, Acceleration, -8.0, 0.0));
-    // The next violations lie between the points. The violations concern the upper position limit, and the velocity limit in the velocity
-    // curve and in the derivative of the position.
+    // The next violations lie between the points: a position above its upper limit, a velocity curve above the
+    // velocity limit, and a derivative of the position that exceeds the velocity limit.
     let (point, quantity, limit, fraction) = check(at(1.25, 1.0, 0.0), at(1.25, -1.0, 0.0), 400);
     assert_eq!((point, quantity, limit), (0, Position, 1.3));
     assert!((0.2..0.8).contains(&fraction), "{fraction}");
@@ -232,8 +234,8 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     assert_eq!(inside_tables(&inside.speeds, &tables), Ok(()));
     let refused = with(high + 0.001).map_err(|v: Violation| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(refused, Err((2, 3, Quantity::FrictionVelocity, high)));
-    // The trajectory is loaded while the controller uses no friction table. The later check of the trajectory against a table has the same
-    // result.
+    // The trajectory is loaded while the controller uses no friction table. The later check of the trajectory against
+    // a table must find the same violation.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, -0.4, low - 0.001, low - 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -241,7 +243,8 @@ fn j36_velocities_are_inside_the_friction_table_in_use() {
     let later =
         inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.point, v.joint, v.quantity, v.limit));
     assert_eq!(later, Err((2, 3, Quantity::FrictionVelocity, low)));
-    // If several points are equally fast, the check reports the first of them, in both directions.
+    // If several points are equally fast, the check must report the first of them. The test covers both directions of
+    // the motion.
     let mut check = TrajectoryCheck::new(&config(), 1000, None);
     for v in [0.0, 0.4, high + 0.001, high + 0.001, 0.0] {
         check.take(&point(3, 0.0, v, 0.0)).unwrap();
@@ -312,7 +315,8 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
     tables[5].velocity = core::array::from_fn(|i| 0.01 + 0.1 * i as f32);
     let moving = |q: f64| point(5, q, 0.2, 0.0);
     let check = TrajectoryCheck::new(&config(), 10, Some(&tables));
-    // The quick part of the check uses velocities of both signs and does not accept this interval, so the exact part decides.
+    // The quick part of the check assumes velocities of both signs. This interval therefore does not pass the quick
+    // part, and the exact part decides.
     let mut check = check.behind(1, moving(0.0), Passed::default());
     assert_eq!(check.take(&moving(0.002)), Ok(()));
     let later = inside_tables(&check.passed().speeds, &tables).map_err(|v| (v.joint, v.value));
@@ -321,7 +325,7 @@ fn j36_standstill_is_asked_at_the_first_point_and_when_the_path_is_executed() {
 
 #[test]
 fn j36_where_the_halvings_are_used_up_the_hull_decides() {
-    // The curve is a parabola with the maximum 0.5, but its hull reaches 1.
+    // The curve is a parabola with the maximum 0.5. Its control points, and therefore its hull, reach 1.
     let curve = [0.0, 1.0, 0.0];
     let mut many = HALVINGS;
     assert_eq!(leaves(curve, -1.0, 0.501, &mut many), None);
@@ -368,8 +372,8 @@ fn steps() -> impl Strategy<Value = (u16, u32)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 
-    /// A path passes if it is within its limits before it is rounded to the wire format. A path that passes may stay on a limit or end on a
-    /// limit.
+    /// A path that is within its limits before the rounding to the wire format must pass, even if the path stays on a
+    /// limit or ends on a limit.
     #[test]
     fn j36_a_path_that_ends_on_a_limit_passes(
         (step, count) in steps(), limit in -2.0..2.0f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -388,7 +392,8 @@ proptest! {
         prop_assert_eq!(verdict(&config, step, &points), Ok(()));
     }
 
-    /// A joint outside its position limits may move back inside at any speed within the velocity limit, or may stay at its position.
+    /// A path must pass if its joint begins outside its position limits and moves inwards within the velocity limit.
+    /// A joint that stays at its first position must pass as well.
     #[test]
     fn j36_a_path_that_begins_outside_and_goes_inwards_passes(
         (step, count) in steps(), out in 0.0..0.02f64, way in 0.0..0.5f64, up in any::<bool>(), joint in 0..JOINTS,
@@ -431,7 +436,8 @@ fn j36_the_tolerance_of_a_position_ends_with_its_step() {
                     .collect();
                 verdict(&config(), step, &[points[0], points[1], points[2]])
             };
-            // A path whose points are all at this position is outside by less than the start tolerance.
+            // All points of this path are at the same position outside the limit, by less than the start tolerance,
+            // so the path passes.
             assert_eq!(at(last), Ok(()), "{step} ms");
             let from_inside = |raw: f64| {
                 between(&config(), step, &point(2, limit, 0.0, 0.0), &point(2, raw * POSITION_STEP, 0.0, 0.0))
@@ -501,8 +507,8 @@ fn j36_a_path_that_has_come_inside_stays_there() {
     assert_eq!((violation.joint, violation.quantity), (3, Quantity::Position));
 }
 
-/// The two points are outside the limits, and the second point is closer to the limit. The check also covers the interval between the two
-/// points.
+/// The two points are outside the limits, and the second point is closer to the limit. The joint must not move
+/// further out between the two points either.
 #[test]
 fn j36_between_two_points_a_path_comes_no_further_out_either() {
     let after = |step, a: RawPoint, b: RawPoint| {
@@ -512,22 +518,24 @@ fn j36_between_two_points_a_path_comes_no_further_out_either() {
         check.take(&b)
     };
     for (v0, v1) in [(0.4, -0.4), (-0.4, 0.4)] {
-        // The interval takes half a second. In its middle, the joint is 62 mrad further out, or 62 mrad further in
-        // before it moves out again.
+        // The check must refuse both intervals of half a second. In the middle of the first interval, the joint is 62
+        // mrad further out. In the middle of the second interval, it is 62 mrad further in, but then it moves out
+        // again.
         let (a, b) = (point(1, 1.315, v0, 0.0), point(1, 1.31, v1, 0.0));
         let violation = after(500, a, b).unwrap_err();
         assert_eq!((violation.joint, violation.quantity, violation.limit), (1, Quantity::Position, 1.3));
         assert!(violation.value > 1.3 && violation.fraction > 0.0, "{violation:?}");
     }
-    // The two points are outside and the middle of the interval is inside the limits, so the joint moves out again.
+    // Both points are outside the limits, and the middle of the interval is inside. The joint therefore moves out
+    // again, which the check must refuse.
     let (a, b) = (point(1, 1.302, -0.05, 0.0), point(1, 1.301, 0.05, 0.0));
     assert!(after(400, a, b).is_err());
     let (a, b) = (point(1, 1.302, -0.005, 0.0), point(1, 1.301, 0.0, 0.0));
     assert_eq!(after(400, a, b), Ok(()));
 }
 
-/// The check of a path continues from segment to segment. After the first segment, the last point of this segment shows whether the joint
-/// is outside.
+/// The check of a path continues in the next segment. The last point of the previous segment shows whether the joint
+/// is still outside its limits.
 #[test]
 fn j36_a_path_from_outside_goes_on_in_the_next_segment() {
     let config = config();

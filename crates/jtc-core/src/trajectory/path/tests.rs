@@ -55,7 +55,8 @@ fn j33_a_ramp_takes_its_length() {
 
 #[test]
 fn j33_margins_give_way_before_a_stop_comes_late() {
-    // The bounds with margins allow no slope or only a small slope, but the torque limits allow a sufficient slope.
+    // The bounds with margins allow no slope, or a slope that is too small for the stop. The torque limits alone
+    // allow a sufficient slope, so the stop must still end in time.
     for easy in [(0.0, 0.0), (1.0, -1.0), (0.5, 1.0), (-0.3, FREE.1)] {
         for most in [2.6, 4.0, 10.0, f64::INFINITY] {
             let ticks = stop(|_, _| SlopeBounds { easy, full: (-most, most) });
@@ -81,7 +82,7 @@ fn j33_a_stop_uses_all_the_torque_but_no_more() {
         SlopeBounds { easy: (0.0, 0.0), full: (-most, most) }
     });
     assert!((905..960).contains(&ticks), "{ticks}: 1/1.1 s");
-    // For 100 ms, the arm gains speed even with all available torque.
+    // For 100 ms, the arm gains speed even with all available torque. The stop must still end in time.
     let mut fastest: f64 = 0.0;
     let ticks = stop(|ms, clock| {
         fastest = fastest.max(clock.rate);
@@ -150,8 +151,9 @@ fn j33_a_stop_sooner_than_the_ramp_shortens_the_ramp() {
 }
 
 proptest! {
-    /// The test pauses the path at any time, also during a resume. The rate stays within 0..1, does not move in the wrong direction for
-    /// long, and has no step. The slope is the derivative of the rate. Each pause ends before its time limit.
+    /// The test pauses the path at any time, also during a resume. The rate must stay within 0..1, must not fall
+    /// before the pause, and must have no step. The slope is the derivative of the rate. Each pause must end before
+    /// its time limit.
     #[test]
     fn j33_the_ramp_is_smooth(
         pauses in prop::collection::vec(1..400u32, 1..8),
@@ -302,7 +304,8 @@ proptest! {
     }
 }
 
-/// A new speed does not end a pause. A pause that begins at a lower speed does not take longer than a pause from full speed.
+/// A new speed must not end a pause. A pause that begins at a lower speed must not take longer than a pause from full
+/// speed.
 #[test]
 fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
     let mut clock = PathClock::start(0.5);

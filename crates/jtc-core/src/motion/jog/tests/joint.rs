@@ -40,8 +40,8 @@ fn j58_a_joint_approaches_its_velocity_with_bounded_acceleration_and_jerk() {
         // in one tick. The missing velocity of 0.5 rad/s is below 3 · 0.5 = 1.5 rad/s. The joint therefore reaches
         // its target in this tick.
         (0.0, 5.0, 8.0, 0.5, (0.5, 0.0)),
-        // The acceleration could fall only to 5.25 - 2 = 3.25 rad/s², more than 1.5 times 2 rad/s². The joint
-        // therefore does not reach its target in this tick.
+        // The acceleration can fall only to 5.25 - 2 = 3.25 rad/s², which is more than 1.5 times the largest change
+        // of 2 rad/s². The joint therefore does not reach its target in this tick.
         (0.0, 5.25, 8.0, 0.5, (1.625, 3.25)),
         // A joint can gain at most 1.5 rad/s in the tick in which it reaches its target. If 1.75 rad/s are missing,
         // it accelerates with 0 + 2 rad/s² instead.
@@ -60,8 +60,9 @@ fn j58_a_joint_approaches_its_velocity_with_bounded_acceleration_and_jerk() {
     }
 }
 
-/// A joint at 0.75 rad/s accelerates with 6 rad/s², which one tick reduces only to 4 rad/s². Without a limit, the joint would reach
-/// 0.75 + 4 · 0.5 = 2.75 rad/s. With a limit of 1 rad/s, its acceleration in this tick is (1 - 0.75) / 0.5 = 0.5 rad/s².
+/// A joint at 0.75 rad/s accelerates with 6 rad/s². One tick can reduce this acceleration only to 4 rad/s², so the
+/// joint would reach 0.75 + 4 · 0.5 = 2.75 rad/s. The velocity limit is 1 rad/s, so the acceleration in this tick is
+/// only (1 - 0.75) / 0.5 = 0.5 rad/s².
 #[test]
 fn j58_a_joint_that_still_accelerates_does_not_exceed_its_velocity_limit() {
     for sign in [1.0, -1.0] {
@@ -143,8 +144,8 @@ fn j58_a_joint_does_not_approach_its_commanded_velocity_after_the_jog_has_ended(
     assert_eq!(step(joint, 0.0, (-2.0, 2.0), true), (0.015625, 0.25, 2.0));
 }
 
-/// A joint at 1 rad/s stops in 1 / 2 + 2 / 20 = 0.6 s, after 0.3 rad. With the distance of this tick and the margins, the joint needs
-/// 0.125 + 1.01 · 0.3 + 0.004 + 0.000001 = 0.432001 rad.
+/// A joint at 1 rad/s stops in 1 / 2 + 2 / 20 = 0.6 s, after 0.3 rad. With the distance of this tick and the margins,
+/// it needs 0.125 + 1.01 · 0.3 + 0.004 + 0.000001 = 0.432001 rad. If less distance remains, the joint slows down.
 #[test]
 fn j58_a_joint_slows_down_as_soon_as_it_could_not_stop_within_its_range() {
     for sign in [1.0, -1.0] {
@@ -164,8 +165,8 @@ fn j58_a_joint_slows_down_as_soon_as_it_could_not_stop_within_its_range() {
 fn j58_a_joint_whose_stopping_distance_ends_exactly_at_the_end_of_its_range_slows_down() {
     for sign in [1.0, -1.0] {
         let joint = JointJog { wanted: sign, ..moving(sign, 0.0, 2.0) };
-        // At a constant velocity, the state after this tick is the present state, so the stopping distance is
-        // computed from the present state.
+        // A joint that keeps its velocity has the same state after this tick, so the stopping distance is computed
+        // from the present state.
         let needed = (0.125 + joint.stopping_way(20.0).abs()) * sign;
         let range = |end: f64| if sign > 0.0 { (-2.0, end) } else { (end, 2.0) };
         assert_eq!(step(joint, 0.0, range(needed), true).1, sign * 0.75);
@@ -173,8 +174,9 @@ fn j58_a_joint_whose_stopping_distance_ends_exactly_at_the_end_of_its_range_slow
     }
 }
 
-/// A joint beyond the end of its range moves back towards its range with 0.125 rad/s. The host commands a velocity
-/// away from the range. With 2 rad/s² the joint would reverse to 0.125 rad/s in one tick, but it stops instead.
+/// A joint is beyond the end of its range and moves back towards it with 0.125 rad/s. The host commands the opposite
+/// direction. With 2 rad/s², the joint would reverse to 0.125 rad/s away from its range in one tick. It stops
+/// instead.
 #[test]
 fn j58_a_joint_outside_its_range_does_not_reverse_away_from_its_range() {
     for sign in [1.0, -1.0] {
@@ -184,9 +186,9 @@ fn j58_a_joint_outside_its_range_does_not_reverse_away_from_its_range() {
     }
 }
 
-/// A joint reverses in one tick. Its motion in this tick and its stopping distance afterwards cancel exactly, so it
-/// would stop at its present position. Inside its range, the joint may reverse. At the upper end of its range no
-/// margin remains, so the joint comes to rest.
+/// A joint reverses in one tick. The distance that it moves in this tick and its stopping distance after the reversal
+/// are equal and opposite, so it would stop at its present position. Inside its range, the joint reverses. At the
+/// upper end of its range, no margin remains, so the joint comes to rest instead.
 #[test]
 fn j58_a_joint_reverses_to_its_present_position_only_inside_its_range() {
     let mut found = 0;

@@ -31,8 +31,9 @@ fn commanded(velocity: f64, most: f64, position: f64, range: (f64, f64)) -> Join
     jog.joints[0]
 }
 
-/// A joint at 1 rad/s stops with 1 rad/s² in 1 / 1 + 1 / 20 = 1.05 s, after 0.525 rad. With the margins, the joint needs
-/// 1.01 · 0.525 + 0.004 + 0.000001 = 0.534251 rad.
+/// A joint at 1 rad/s stops with 1 rad/s² in 1 / 1 + 1 / 20 = 1.05 s, after 0.525 rad. With the margins, it needs
+/// 1.01 · 0.525 + 0.004 + 0.000001 = 0.534251 rad. The lower acceleration limit of a command is used only if this
+/// distance remains.
 #[test]
 fn j58_a_command_lowers_the_acceleration_only_if_the_joint_can_still_stop_within_its_range() {
     let cases = [
@@ -45,7 +46,7 @@ fn j58_a_command_lowers_the_acceleration_only_if_the_joint_can_still_stop_within
         (1.0, 1.0, 0.5, (-0.5, 1.0), 2.0),
         (-1.0, 1.0, -0.5, (-1.1, 0.5), 1.0),
         (-1.0, 1.0, -0.5, (-1.0, 0.5), 2.0),
-        // A higher acceleration limit is valid, even if the joint cannot stop within its range.
+        // A higher acceleration limit is always used, even if the joint cannot stop within its range.
         (1.0, 3.0, 0.0, (-0.5, 0.1), 3.0),
         (-1.0, 3.0, 0.0, (-0.1, 0.5), 3.0),
     ];
@@ -127,7 +128,7 @@ fn j33_j58_the_set_values_follow_the_rate_and_the_slope_of_the_clock() {
             JointJog { wanted: sign * 1.5, most: 2.0, velocity: sign * 0.5, acceleration: sign * 2.0 };
         let (mut jog, mut point) = (jog_of(joint), SetPoint::still([0.0; JOINTS]));
         jog.step(&mut point, &ranged((-2.5, 2.5)), |at, clock| {
-            // The ramp receives the state at the start of the tick.
+            // The function that advances the clock receives the state at the start of the tick.
             assert_eq!((at.velocity[0], at.acceleration[0]), (sign * 0.5, sign * 2.0));
             (clock.rate, clock.slope) = (0.5, -2.0);
         });

@@ -3,7 +3,7 @@ use super::*;
 
 const WIDE: PidGains = PidGains { kp: 8_000.0, ki: 10.0, kd: 80.0, int_min: -100.0, int_max: 100.0 };
 
-/// State of joint 1 in a test of the observation of its load.
+/// State of joint 1 in a test that observes its load.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     speed: f64,
@@ -84,8 +84,8 @@ fn j25_loads_are_known_up_to_and_with_a_little_feedback_torque() {
 }
 
 /// In Teaching, no load changes, because the position controller does not act. In HoldPos, the controller observes
-/// one joint per tick, every joint once in 6 ms. The integral holds no torque, so with a time constant of 1 s a load
-/// of 2 N·m falls by a share of 0.006 in each observation.
+/// one joint per tick, so each joint is observed once in 6 ms. The integral holds no torque here, so a load of 2 N·m
+/// falls by 0.006 of its value in each observation (time constant 1 s).
 #[test]
 fn j25_teaching_learns_no_load_from_an_integral_that_does_not_act() {
     let mut arm = taught(&[2.0; JOINTS]);
@@ -117,8 +117,8 @@ fn j25_j44_a_transfer_during_teaching_keeps_the_load() {
 }
 
 /// At the end of Teaching, the torque consists of 64 N·m from the model, 16 N·m for the load and 8 N·m for braking.
-/// Usually the model torque steps and the other 24 N·m are blended out. After a change of the whole torque, all 88
-/// N·m continue without a step.
+/// At a change of the mode, the model torque changes at once and the other 24 N·m are blended out. At a change of the
+/// whole torque, all 88 N·m continue without a step.
 #[test]
 fn j25_j44_the_torques_of_teaching_are_blended_out() {
     let last = JointTorque { model: 64.0, load: 16.0, brake: 8.0, ..JointTorque::default() };
@@ -140,8 +140,8 @@ fn j25_j44_the_torques_of_teaching_are_blended_out() {
     }
 }
 
-/// After Teaching, the integral holds the same load torque, and the controller must learn the loads again. The
-/// tolerance covers the spring of the dry friction, whose anchor has single precision.
+/// After Teaching, the integral holds the load torque of Teaching, and the controller must learn the loads again. The
+/// tolerance is necessary, because the anchor of the dry-friction spring has single precision.
 #[test]
 fn j25_after_teaching_the_integral_holds_the_load() {
     let found = [3.0, -20.0, 12.0, 5.0, -2.0, 1.0];
@@ -169,8 +169,10 @@ fn j16_j25_the_braking_torque_of_an_enabled_joint_stays_within_its_limit() {
 }
 
 /// Joint 2 moves so that its damping of about 30 N·m acts in the direction of its holding torque. The torque limit
-/// leaves only 2 N·m above gravity, so the total torque is equal to the limit. A tick that computes a slowly changing
-/// value keeps the braking torque, even if gravity has increased. The next tick limits the braking torque again.
+/// leaves only 2 N·m above gravity, so the brake is limited and the total torque equals the torque limit.
+///
+/// In a tick that computes a slowly changing value, the braking torque is kept, even if gravity has increased. The
+/// next tick limits the braking torque again.
 #[test]
 fn j25_teaching_brakes_up_to_the_torque_limit_in_the_ticks_that_compute_torques() {
     let mut arm = taught(&[0.0; JOINTS]);

@@ -15,8 +15,8 @@ fn integral(mut pid: Pid, gains: &PidGains) -> f64 {
     pid.step(gains, 0.0, true, None).i
 }
 
-/// The computed torque of 250 N·m exceeds the limit of 180 N·m by 70 N·m. When the joint begins to yield, its blended
-/// torque removes these 70 N·m, so the sum begins at the commanded torque.
+/// The computed torque of 250 N·m is 70 N·m above the limit of 180 N·m. When the joint begins to yield, −70 N·m are
+/// added to its blended torque, so that the sum begins at the commanded torque of 180 N·m.
 #[test]
 fn j68_a_joint_that_begins_to_yield_starts_from_its_commanded_torque() {
     for (model, blend, commanded, blended) in [
@@ -69,9 +69,9 @@ fn j70_a_joint_that_yields_already_lowers_its_load_only_if_it_is_overloaded() {
     assert!((0..JOINTS).all(|j| law.yields(j) == (j == 1)));
 }
 
-/// Moves a yielding joint with a load of 40 N·m in the direction of its load for 1.3 s, and then holds it for 0.6 s.
-/// The load drives the joint against the spring, so the controller reduces the load, because a part of it may not
-/// exist.
+/// Returns a yield whose load has been reduced. The joint carries a load of 40 N·m, moves along this load for 1.3 s,
+/// and is then held for 0.6 s. During this motion, the load drives the joint against the spring. The controller
+/// therefore reduces the load, because a part of it may not exist.
 fn doubted() -> Yield {
     let (limits, mut position) = (limits(), 0.0);
     let mut yields = Yield::begin(false, false, 0.0, 5.0, 40.0);
@@ -94,8 +94,9 @@ fn doubted() -> Yield {
     yields
 }
 
-/// After a yield, the integral takes over the part of the load that the spring has not opposed. The controller stores
-/// the larger of this part and the present load as the learned load, because the opposed part may nevertheless exist.
+/// After a yield, the integral takes over the load plus the torque of the spring. If the spring opposes the load, the
+/// sum is smaller than the load. The larger of both values is stored as the learned load, because the opposed part of
+/// the load may exist.
 #[test]
 fn j68_the_load_after_a_yield_is_the_larger_of_what_acts_and_what_is_left() {
     let yields = doubted();
@@ -169,8 +170,8 @@ fn j70_joints_that_lower_their_loads_share_the_damping() {
     }
 }
 
-/// The integral of each joint holds 12 N·m with an integral gain of 10. After a change to a gain of 40, a held joint
-/// keeps 12 N·m. The position controller of a yielding joint does not act, so its integral is not adapted and would
+/// The integral of each joint holds 12 N·m with an integral gain of 10. The gain changes to 40. A held joint keeps
+/// its 12 N·m. In a yielding joint, the position controller does not act, so its integral is not adapted and would
 /// hold four times the torque.
 #[test]
 fn j71_new_gains_keep_the_torque_of_the_integral_of_held_joints() {

@@ -49,8 +49,8 @@ fn j58_half_of_the_remaining_torque_can_stop_the_jog_within_300_ms() {
         let found = bench.jog_first(wanted).unwrap();
         assert!(near(found, velocity), "{inertia} {held} {friction} {wanted}: {found}");
     }
-    // At the wanted velocities, the momentum of joint 1 is |27.6 · 0.8| + |−11.04 · 0.5| = 27.6 N·m·s. It can stop
-    // 0.15 · 92 = 13.8 N·m·s, so half of the velocities is allowed.
+    // At the wanted velocities, joint 1 has the momentum |27.6 · 0.8| + |−11.04 · 0.5| = 27.6 N·m·s. Its torque can
+    // stop only 0.15 · 92 = 13.8 N·m·s, so half of the velocities is allowed.
     let bench = Bench::new().inertia(&[(0, 0, 27.6), (0, 1, -11.04)]);
     let found = bench.jog(&two(0.8, 0.5)).unwrap();
     assert!(all_near(&found, &two(0.4, 0.25)), "{found:?}");
@@ -146,9 +146,9 @@ fn j58_a_jog_has_at_least_two_per_cent_of_its_highest_acceleration() {
     }
 }
 
-/// A mass of 9 kg needs 90 N·m at the horizontal position, and 45 N·m at π/3 before or after it. There, 92 − 45 = 47
-/// N·m remain. A jog may continue for 0.2 s + 0.15 s = 0.35 s. The higher holding torque of its start and its end
-/// counts.
+/// A mass of 9 kg needs 90 N·m at the horizontal position. At π/3 before or after it, it needs 45 N·m, which leaves
+/// 92 − 45 = 47 N·m. In the longest time that a jog can continue, 0.2 s + 0.15 s, it moves to another holding torque.
+/// The higher holding torque of start and end is subtracted.
 #[test]
 fn j58_the_torque_at_the_end_of_the_jog_also_remains() {
     let jog = |position: f64, range: (f64, f64), velocity: f64| {
@@ -189,8 +189,9 @@ fn j58_friction_reduces_the_remaining_torque_of_the_joints_that_move() {
     }
 }
 
-/// A mass of 9 kg needs 90 N·m at the horizontal position, and less torque everywhere else. A jog away from this
-/// position always has at least 1 N·m, unless the mass must be lifted with more than the torque limit.
+/// A mass of 9 kg needs 90 N·m at the horizontal position, and less torque everywhere else. Therefore at least 1 N·m
+/// is always available for a jog away from this position. The exception is a jog that would lift the mass with more
+/// than the torque limit.
 #[test]
 fn j58_a_joint_may_move_to_a_position_with_a_lower_holding_torque() {
     for (friction, velocity, left) in [
@@ -213,8 +214,8 @@ fn j58_a_joint_may_move_to_a_position_with_a_lower_holding_torque() {
 }
 
 /// A mass of 12 kg needs 120 N·m at the horizontal position, more than the limit of 100 N·m. Joints 1 and 2
-/// accelerate in opposite directions and have the same coupling inertia with joint 1. Joint 1 then needs no torque
-/// for the acceleration, so the jog does not lift the mass.
+/// accelerate in opposite directions, and their effects on joint 1 cancel. Joint 1 therefore needs no torque for the
+/// acceleration, and the jog does not lift the mass.
 #[test]
 fn j58_a_joint_whose_couplings_cancel_out_does_not_lift_its_load() {
     let heavy = |second: f64| {

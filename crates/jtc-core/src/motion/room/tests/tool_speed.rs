@@ -80,8 +80,8 @@ fn j58_joints_that_accelerate_share_the_tool_speed_that_the_other_joints_leave()
 fn j58_half_a_per_cent_of_the_tool_speed_limit_always_remains_for_joints_that_accelerate() {
     let slowed = Bench::with_tool_speed(2.0).moving([0.0, -3.0, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.0025, -1.0, 0.01]), "{slowed:?}");
-    // Joint 1 moves exactly at its share of the limit (0.5 · 0.5 rad/s), so it is not too fast. Joints 1 and 3 share
-    // the 0.01 m/s. Joint 1 may keep its present speed nevertheless.
+    // Joint 1 moves exactly at its share of the limit (0.5 · 0.5 rad/s), so it is not too fast. It shares the 0.01
+    // m/s with joint 3, but it may also keep its present speed.
     let slowed = Bench::with_tool_speed(2.0).moving([0.25, -3.0, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.25, -1.0, 0.01]), "{slowed:?}");
 }

@@ -1,8 +1,8 @@
 //! Tests of the load of one joint in Teaching, and of the share of this load that acts (J-25).
 use super::*;
 
-/// Returns the load of a joint that holds `rest` (N·m), which no mass explains. The share `left_out` of the load does not act. The highest
-/// load torque of the joint is 64 N·m.
+/// Returns the load of a joint that holds `rest` (N·m), without any torque of a mass. The share `left_out` of the
+/// load does not act. The highest load torque of the joint is 64 N·m.
 fn carried(rest: f32, left_out: f32) -> Carried {
     Carried { rest, most: 64.0, left_out, inside: 0.0 }
 }
@@ -82,8 +82,8 @@ fn j25_a_soft_end_reduces_only_a_load_torque_that_pushes_outwards() {
     assert_near(joint.step(0.0, 0.0, 0.0, 0.0), 32.0 * (1.0 - 0.49), "back outside of the soft end");
 }
 
-/// A joint without a load moves in its soft end. If a load appears later, the whole load acts. A load of zero counts
-/// as positive, so only a motion in the positive direction reduces the acting share.
+/// A joint without a load moves in its soft end. If a load appears later, the whole load acts. Without a load, the
+/// load torque counts as positive, so only a motion in the positive direction reduces the acting share.
 #[test]
 fn j25_without_a_load_a_soft_end_and_a_negative_motion_reduce_no_share() {
     for (velocity, depth, acts) in

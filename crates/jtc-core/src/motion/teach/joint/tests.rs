@@ -60,7 +60,8 @@ proptest! {
         let limits = JointConfig { teach_damping: damping, rotor_inertia: 0.05, ..limits() };
         let mut joint = begun(0.0, 0.0);
         joint.set_inertia(inertia);
-        // The test begins without dry friction. At 0.39 rad/s, the damping is not increased yet.
+        // The test sets the dry friction to zero, so that the damping acts almost alone. At 0.39 rad/s, the damping
+        // is not increased yet.
         joint.grip = 0.0;
         let torque = tick_of(&mut joint, &limits, 0.0, 0.39).brake;
         let expected = damping.min(90.0 * inertia) * 0.39;
@@ -209,7 +210,8 @@ fn j25_missing_answers_and_late_ticks_do_not_change_the_speed_from_positions() {
 }
 
 /// From the third missing answer on, the springs fade by a fifth in each tick. Then damping and friction compensation
-/// fade in the same way. When answers arrive again, the same shares return in reverse order.
+/// fade by a fifth in each tick. When answers arrive again, damping and friction compensation return first, and then
+/// the springs.
 #[test]
 fn j25_a_joint_without_answers_loses_its_springs_and_then_its_damping() {
     let shares =
@@ -383,13 +385,13 @@ fn j25_the_dry_friction_is_softer_for_a_joint_with_low_inertia() {
     }
 }
 
-/// The anchor of the spring moves with a joint that is too fast for dry friction. It also moves with a joint whose
-/// own friction is so high that it gets no dry friction. If the dry friction begins to act later, the torque
-/// therefore has no step.
+/// The anchor of the spring moves with a joint that is too fast for dry friction. It also moves with a joint that
+/// gets no dry friction, because its own friction is high. The torque therefore has no step when the dry friction
+/// begins to act later.
 #[test]
 fn j25_the_anchor_of_the_dry_friction_moves_with_a_fast_joint_and_without_dry_friction() {
-    // The joint is 0.02 rad away from its anchor. At 0.3 rad/s the spring does not act, and the torque is that of the
-    // damping of 90 N·m·s/rad.
+    // The joint is 0.02 rad away from its anchor. At 0.3 rad/s the spring does not act, so the torque is the damping
+    // torque with 90 N·m·s/rad.
     for sign in [1.0, -1.0] {
         let mut fast = begun(0.0, 0.0);
         assert_near(tick(&mut fast, sign * 0.02, sign * 0.3).brake, -sign * 27.0, "only damping");

@@ -1,4 +1,4 @@
-//! Tests of a learned load that may not exist, and of the load that remains after the yield.
+//! Tests of a learned load whose existence is doubtful, and of the load that remains after the yield.
 use super::*;
 
 /// Returns a yield that began with the load `least` (N·m) and now has the load `load` (N·m).
@@ -33,8 +33,8 @@ fn j68_a_load_drives_its_joint_only_along_the_load_and_against_a_similar_torque(
             assert_eq!(yields.driven_ms, expected, "{velocity} rad/s, {torque} N·m, sign {sign}");
             assert_eq!(yields.load, sign * 40.0);
         }
-        // 20 N·m of the first 40 N·m remain, so the range is 10 N·m to 24 N·m. The direction of the load is still
-        // that of the first load.
+        // The load has fallen from 40 N·m to 20 N·m. The load seems to drive its joint against 10 N·m to 24 N·m,
+        // which is 0.5 to 1.2 times 20 N·m.
         for (torque, expected) in [(-9.0, 9), (-11.0, 11), (-23.0, 11), (-25.0, 9)] {
             let mut yields = Yield { driven_ms: 10, ..faded(sign * 40.0, sign * 20.0) };
             yields.doubt(sign * 0.01, sign * torque);
@@ -43,7 +43,8 @@ fn j68_a_load_drives_its_joint_only_along_the_load_and_against_a_similar_torque(
     }
 }
 
-/// A load that has driven its joint for 300 ms is unchanged. Each further tick reduces this load by 1 ms / 1 s, a thousandth.
+/// A load that has driven its joint for exactly 300 ms is unchanged. After that, each tick reduces the load by a
+/// thousandth (1 ms of the time constant of 1 s).
 #[test]
 fn j68_a_load_fades_after_it_has_driven_its_joint_for_300_ms() {
     let mut yields = faded(40.0, 40.0);
@@ -80,8 +81,8 @@ fn j68_a_reduced_load_returns_only_while_the_joint_moves_against_the_load() {
     }
 }
 
-/// If less than half of the load remains, the load may not exist. Teaching then uses only the part that the spring
-/// has not opposed.
+/// If less than half of the load remains, it is doubtful whether the load exists. Teaching then uses only the part
+/// that the spring has not opposed.
 #[test]
 fn j68_j25_teaching_uses_a_doubted_load_less_the_torque_of_the_spring() {
     for sign in [1.0, -1.0] {
@@ -94,8 +95,8 @@ fn j68_j25_teaching_uses_a_doubted_load_less_the_torque_of_the_spring() {
             // The spring holds a further 4 N·m of the load, so Teaching uses 23 N·m.
             (40.0, 19.0, 4.0, 23.0),
             (40.0, 5.0, -30.0, 0.0),
-            // 0.2 N·m are less than half of 0.5 N·m, so the 0.1 N·m of the spring are subtracted. 0.3 N·m are more
-            // than half, so nothing is subtracted.
+            // 0.2 N·m are less than half of 0.5 N·m, so the 0.1 N·m with which the spring opposes the load are
+            // subtracted. 0.3 N·m are more than half, so nothing is subtracted.
             (0.5, 0.2, -0.1, 0.1),
             (0.5, 0.3, -0.1, 0.3),
             (0.0, 0.0, -30.0, 0.0),
@@ -109,7 +110,7 @@ fn j68_j25_teaching_uses_a_doubted_load_less_the_torque_of_the_spring() {
     }
 }
 
-/// The controller stores the load after the yield only if the load may have changed.
+/// After a yield, the controller stores the load only if it can have changed during the yield.
 #[test]
 fn j68_j70_a_load_is_learned_during_a_yield_if_it_has_changed_or_was_lowered() {
     assert!(!faded(40.0, 40.0).has_learned() && !faded(0.0, 0.0).has_learned());

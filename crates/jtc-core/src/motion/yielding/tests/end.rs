@@ -9,8 +9,8 @@ fn calm_after(mut yields: Yield, ticks: u16, joint: &Joint<'_>) -> bool {
     yields.is_calm()
 }
 
-/// A joint is not calm while its brake needs more than the share of the spring. At 1.6 rad/s, four fifths of the
-/// velocity limit, the brake uses the whole limit of 100 N·m.
+/// A joint is not calm while its brake needs more torque than the permitted share for a slow push. At 1.6 rad/s, four
+/// fifths of the velocity limit, the brake uses the whole limit of 100 N·m.
 #[test]
 fn j68_a_joint_is_not_calm_while_its_brake_has_more_than_the_share() {
     let limits = round_limits();
@@ -19,8 +19,8 @@ fn j68_a_joint_is_not_calm_while_its_brake_has_more_than_the_share() {
         calm_after(begun(), 300, &Joint { young_velocity, ..at(&limits, 0.0, 0.0, 0.0) })
     };
     assert!(calm(0.0) && !calm(1.6) && !calm(-1.6));
-    // At 0.7 rad/s, the brake has 83.3 N·m·s/rad · (0.7 − 0.4) rad/s = 25 N·m. This is less than the share of 30 N·m,
-    // so the joint is calm.
+    // At 0.7 rad/s, the torque of the brake is 83.3 N·m·s/rad · (0.7 − 0.4) rad/s = 25 N·m. This is less than the
+    // permitted share of 30 N·m, so the joint is calm.
     assert!(calm(0.7));
 }
 

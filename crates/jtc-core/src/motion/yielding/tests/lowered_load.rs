@@ -46,8 +46,8 @@ fn j70_a_joint_that_has_sunk_far_and_is_lifted_has_the_load_of_the_beginning() {
     assert_eq!(yields.load(), 0.0);
 }
 
-/// In this pose, gravity pulls the joint with only 2 N·m, less than 5 % of the limit. The joint has learned a load
-/// torque of 10 N·m in another pose. A motion by a hand does not change it.
+/// In this pose, gravity pulls the joint with only 2 N·m, less than 5 % of the limit. The load torque of 10 N·m was
+/// learned in another pose. If a hand moves the joint in this pose, the load torque does not change.
 #[test]
 fn j70_without_gravity_the_load_torque_does_not_follow_a_hand() {
     let limits = round_limits();

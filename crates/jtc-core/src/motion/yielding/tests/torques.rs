@@ -66,8 +66,9 @@ fn j68_without_answers_the_brake_fades() {
     }
 }
 
-/// The measured velocity and the velocity of the last 5 ms have opposite signs. Brake and damper both reach the limit
-/// of 100 N·m. The brake replaces the damper only if its torque is higher, so the damper acts.
+/// The measured velocity and the velocity of the last 5 ms have opposite signs. Brake and damper therefore reach the
+/// limit of 100 N·m in opposite directions. The brake replaces the damper only if its torque is higher, so the damper
+/// acts.
 #[test]
 fn j68_a_brake_with_the_torque_of_the_damper_does_not_replace_the_damper() {
     let limits = round_limits();

@@ -34,7 +34,7 @@ impl Joint {
         Self::drifting(0.0)
     }
 
-    /// Evaluates an answer at this time without a change of the history.
+    /// Evaluates an answer at this time, but does not add the answer to the history.
     fn look_at(&mut self, position: f64, at_ms: u32) -> Seen {
         let answer = Reading { position, velocity: 0.0 };
         self.jumps.look(&answer, 0.0, at_ms, TWIST, &self.history, &self.config)
@@ -122,8 +122,8 @@ fn j35_an_expected_answer_ends_a_possible_jump() {
     assert_eq!(joint.see(1.0), Seen::Jump(1.0));
 }
 
-/// A change of the size by at most the permitted difference does not restart the count. After a larger change, the
-/// controller counts five answers again.
+/// If the size of a possible jump changes by at most the permitted difference, the count of answers continues. After
+/// a larger change, the controller counts five answers again.
 #[test]
 fn j35_a_changed_size_counts_from_the_first_answer_with_this_size() {
     let mut joint = Joint::at_rest();
@@ -134,7 +134,8 @@ fn j35_a_changed_size_counts_from_the_first_answer_with_this_size() {
     assert_eq!(joint.see(2.5), Seen::Jump(2.5));
 }
 
-/// The size may change twice. After a third change the difference is a motion, even if it exceeds the twist of the gear.
+/// The size of a possible jump can change twice. After a third change, the answer counts as a motion, even if the
+/// size exceeds the twist of the gear.
 #[test]
 fn j35_the_size_of_a_possible_jump_may_change_twice() {
     for sign in [1.0, -1.0] {
@@ -147,7 +148,8 @@ fn j35_the_size_of_a_possible_jump_may_change_twice() {
     }
 }
 
-/// A jump whose size has changed must be larger than the twist of the gear. The first size may be smaller.
+/// If the size of a possible jump changes, the new size must exceed the twist of the gear. Otherwise the answer
+/// counts as a motion. The first size can be less than the twist.
 #[test]
 fn j35_a_changed_size_within_the_twist_of_the_gear_is_a_motion() {
     for (first, second, seen) in [
@@ -168,7 +170,8 @@ fn j35_a_changed_size_within_the_twist_of_the_gear_is_a_motion() {
 /// A difference of the encoders that existed before the jump is not counted as a part of the jump.
 #[test]
 fn j35_a_difference_before_the_jump_is_not_a_part_of_it() {
-    // The positions change by 10 · 0.25 rad in the window. The reported speed is zero.
+    // The positions change by 10 · 0.25 rad in the window, but the reported speed is zero. The encoders therefore
+    // already differ before the jump.
     let mut joint = Joint::drifting(0.25);
     assert_eq!(joint.see(0.25 * 101.0 + 4.0), Seen::Perhaps(4.0));
     assert_eq!(joint.see(0.25 * 102.0 + 4.0), Seen::Perhaps(4.0));
@@ -190,8 +193,8 @@ fn j35_a_jump_appears_between_two_answers_within_three_milliseconds() {
     }
 }
 
-/// While the answers at the start of the window are missing, a possible jump stays undecided for 15 answers in all.
-/// If no possible jump has begun before, such an answer is treated as a motion.
+/// While the answers at the start of the window are missing, a possible jump can stay undecided for at most 15
+/// answers. If no possible jump has begun before, such an answer counts as a motion.
 #[test]
 fn j35_a_possible_jump_stays_undecided_for_fifteen_answers() {
     let mut joint = Joint::at_rest();

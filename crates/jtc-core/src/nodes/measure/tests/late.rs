@@ -15,7 +15,7 @@ struct Motion {
     amplitude: f64,
     /// Angular frequency of the motion, 1/s.
     rate: f64,
-    /// Share of the motion that is commanded. The remaining motion has an external cause.
+    /// Share of the motion that the controller commands. An external force causes the rest of the motion.
     commanded: f64,
 }
 
@@ -105,8 +105,9 @@ fn most(off: &[Off]) -> f64 {
     off.iter().fold(0.0, |most, off| most.max(off.position.abs()))
 }
 
-/// Returns the lateness of each answer. The first twenty answers are on time, then a burst shows the highest lateness, and after the burst
-/// any lateness may occur. In every 24th tick, no answer is outstanding.
+/// Returns the lateness of each answer. The first answers are on time. Then several answers arrive in one tick (the
+/// burst), and the oldest of them is `most` ticks late. After the burst, any lateness up to `most` may occur. In
+/// every 24th tick, no answer is outstanding.
 fn lateness(most: u32) -> impl Strategy<Value = Vec<u32>> {
     let burst = (0..=20).map(|_| 0).chain((0..=most).rev());
     let burst: Vec<u32> = burst.collect();
@@ -127,22 +128,22 @@ fn motion() -> impl Strategy<Value = Motion> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// After the burst, the error of the used position consists only of encoder steps and the error of the predicted
-    /// rate. If the controller used a late answer like an answer on time, the error would be the lateness times the
-    /// speed, 3 mrad.
+    /// After the burst of late answers, the error of the used position consists only of encoder steps and of the
+    /// error of the predicted rate. If the controller treated a late answer like an answer on time, the error would
+    /// be the lateness times the speed, which is up to 5 mrad.
     #[test]
     fn j63_late_answers_are_used_as_of_the_time_at_which_they_were_due(
         motion in motion(),
         late in (1u32..=5).prop_flat_map(lateness),
     ) {
         let off = motion.off(&arrivals(&late, &[]));
-        // At the end of the burst, the used position has an offset from the answers. By this time, the offset has
+        // At the end of the burst, the used position has an offset from the answers. After 300 ticks, this offset has
         // faded.
         prop_assert!(most(&off[300..]) <= 4.0 * ENCODER, "{} rad", most(&off[300..]));
     }
 
-    /// If a joint follows its command, the used velocity is the velocity in the late answer, plus the change of the
-    /// commanded velocity since then.
+    /// If a joint follows its command, the controller uses the velocity in the late answer, plus the change of the
+    /// commanded velocity since the time of this answer.
     #[test]
     fn j63_late_velocities_are_taken_on_by_what_was_commanded(motion in motion(), late in lateness(3)) {
         let motion = Motion { commanded: 1.0, ..motion };
@@ -151,16 +152,17 @@ proptest! {
         }
     }
 
-    /// Any number of answers between late answers may be lost, but the position error has an upper bound. The bound
-    /// is twice the distance that the joint moves in the highest lateness. Half of the bound is the offset that the
-    /// controller adds when it detects the loss. After this offset has faded, no error remains.
+    /// Answers between late answers may be lost. The position error must nevertheless stay below twice the distance
+    /// that the joint moves in 4 ms. Half of this bound is the offset that the controller adds when it detects the
+    /// loss. After this offset has faded, no error remains.
     #[test]
     fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
         motion in motion(),
         late in lateness(3),
         lost in prop::collection::vec(30u32..300, 0..20),
     ) {
-        // No answer is late at the end of the test, but the controller detects lost answers also in this part.
+        // From answer 400 on, no answer is late. The controller may still detect earlier lost answers in this part of
+        // the test.
         let late: Vec<u32> = late.iter().enumerate().map(|(n, late)| if n < 400 { *late } else { 0 }).collect();
         let off = motion.off(&arrivals(&late, &lost));
         let way = 4.0 * motion.speed() * DT;
@@ -169,9 +171,9 @@ proptest! {
     }
 }
 
-/// After a lost answer, the next answer of a fast joint is at the predicted position. A late answer would lag by the
-/// distance that the joint moves in a millisecond. The controller therefore detects the lost answer before the window
-/// ends.
+/// After a lost answer, the next answer of a fast joint is at the predicted position. If this answer were late, it
+/// would lag by the distance that the joint moves in a millisecond. The controller therefore detects the loss at
+/// once, and not only at the end of the window.
 #[test]
 fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -181,8 +183,8 @@ fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
 }
 
-/// Late answers before the first evidence do not cause a step, because their difference from the prediction becomes
-/// an offset that fades.
+/// Before the first evidence of late answers, the controller treats a late answer like an answer on time. The
+/// difference from the prediction becomes an offset that fades, so the used position has no step.
 #[test]
 fn j63_the_first_late_answers_make_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -195,7 +197,8 @@ fn j63_the_first_late_answers_make_no_step() {
     }
 }
 
-/// After the burst, a change of the lateness does not cause a step, even with a coarse configured encoder step.
+/// After the controller has received several answers in one tick, a change of the lateness must not cause a step of
+/// the used position, for any configured `encoder_step`.
 #[test]
 fn j63_a_lateness_that_shifts_makes_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };

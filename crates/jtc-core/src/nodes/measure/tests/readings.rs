@@ -2,8 +2,8 @@
 use super::*;
 use crate::interpolation::SetPoint;
 
-/// Joint 2 was commanded to k² rad and 3·k rad/s in tick k, so the distance between any two ticks is different. The
-/// present tick is tick 9.
+/// The controller must find the command of the tick in which a late answer was due. The test commands joint 2 to k²
+/// rad and 3·k rad/s in tick k, so the distance between any two ticks is different. The present tick is tick 9.
 #[test]
 fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
     let mut commanded = Commanded::default();
@@ -35,9 +35,9 @@ fn j63_a_late_answer_belongs_to_the_commands_of_the_tick_in_which_it_was_due() {
     }
 }
 
-/// The young velocity is the rate of the positions over the last 5 ms (`rate`). Its difference from the commanded
-/// velocity (`due`) is at most 2.5 times the difference of the reported velocity from `due`, with the same sign. The
-/// reported velocity is `used` minus the fading `offset`.
+/// `young_velocity` returns the rate of the positions over the last 5 ms (`rate`), within bounds around the commanded
+/// velocity (`due`). The difference of the result from `due` has the sign of the difference between the reported
+/// velocity and `due`, and is at most 2.5 times as large. The reported velocity is `used` minus the fading `offset`.
 #[test]
 fn j66_the_velocity_from_positions_is_bounded_around_the_commanded_velocity() {
     for (rate, used, offset, due, young) in [
@@ -68,8 +68,9 @@ fn j66_the_velocity_from_positions_is_bounded_around_the_commanded_velocity() {
     }
 }
 
-/// In a window of 10 ms, a joint at 0.5 rad/s moves 5 mrad. If the answer of this tick is missing, the window ends with the last answer. The
-/// distance does not contain the prediction. Without a window, the distances are not known.
+/// A joint at 0.5 rad/s moves 5 mrad in a window of 10 ms. If the answer of this tick is missing, the window ends at
+/// the last answer, because the distance must not contain a prediction. Without a window, or if two answers are
+/// missing, the distances are not known.
 #[test]
 fn j35_the_distance_of_the_positions_contains_only_answers() {
     let velocity = 0.5;
@@ -91,9 +92,10 @@ fn j35_the_distance_of_the_positions_contains_only_answers() {
     }
 }
 
-/// An answer up to a tenth of the implausible distance from its prediction is used as it is. Such an answer does not
-/// show a jump or a wrap-around of the drive's positions, even if a jump is subtracted from each answer. After 10 s
-/// without an answer, the implausible distance is 60 rad, and a tenth of it is 6 rad.
+/// If the distance of an answer from its prediction is at most a tenth of the implausible distance, the controller
+/// uses the answer unchanged. Such an answer shows neither a jump nor a wrap-around of the drive's positions, even
+/// while an earlier jump is being subtracted. After 10 s without an answer, the implausible distance is 60 rad, and a
+/// tenth of it is 6 rad.
 #[test]
 fn j35_an_answer_near_its_prediction_is_used_as_it_is() {
     let bound = UNEXPECTED * (IMPLAUSIBLE * DT * VELOCITY_MAX * 10_000.0);
@@ -107,8 +109,8 @@ fn j35_an_answer_near_its_prediction_is_used_as_it_is() {
     }
 }
 
-/// The lateness of an answer is limited to the time since the last answer. Here the last answer arrived one tick ago.
-/// The bus has repeated a frame, so both answers belong to this tick.
+/// An answer cannot be older than the last answer, which arrived one tick ago. The second answer of this tick is only
+/// a frame that the bus has repeated, so the answer belongs to this tick.
 #[test]
 fn j63_an_answer_is_never_older_than_the_last_answer() {
     let mut joint = moving(0.1);
@@ -118,8 +120,8 @@ fn j63_an_answer_is_never_older_than_the_last_answer() {
     assert!((joint.used().position - 0.1 * DT).abs() < ROUNDED);
 }
 
-/// Before the first usable answer, no other answer limits the lateness. The answer was due one tick ago, and the joint has since moved by
-/// its commanded distance.
+/// Before the first usable answer, nothing limits the lateness of an answer. The answer of this test was due one tick
+/// ago, so the used position also contains the distance that was commanded since then.
 #[test]
 fn j63_the_first_answer_may_be_late() {
     let mut joint = Measurement::default();
@@ -141,10 +143,10 @@ fn j63_the_evidence_of_late_answers_survives_a_discarded_prediction() {
     assert!(!joint.lateness.stands(1));
 }
 
-/// A joint at rest answers at 4 mrad, which is more than a tenth of the implausible distance of 6 mrad. If the answer
-/// is on time, it may show a jump of the encoder, so the controller assumes that the joint has not moved. A late
-/// answer is not checked for a jump, because its speed belongs to another window. The encoder of a joint without
-/// torque is not checked either.
+/// A joint at rest answers at 4 mrad. The implausible distance is 6 mrad. An answer beyond a tenth of this distance
+/// may show a jump of the encoder, and the controller then assumes that the joint has not moved. A late answer is not
+/// checked for a jump, because its speed belongs to another window. The encoder of a joint without torque is not
+/// checked either.
 #[test]
 fn j35_only_an_answer_on_time_of_an_enabled_joint_may_show_a_jump() {
     for (enabled, late, watched) in

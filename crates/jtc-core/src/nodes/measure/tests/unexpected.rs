@@ -31,8 +31,8 @@ fn used(
     (answer.map(|answer| answer.position), outcome)
 }
 
-/// The positions of a drive wrap around at half a turn. After the jump of an encoder is subtracted, a position may be a whole turn away
-/// from its prediction.
+/// The positions of a drive wrap around at half a turn. After the jump of an encoder is subtracted, a position can
+/// therefore be a whole turn away from its prediction. The controller must correct this.
 #[test]
 fn j35_a_position_without_its_jump_may_have_wrapped_around() {
     for (jump, off, reach, turn, outcome) in [
@@ -42,7 +42,7 @@ fn j35_a_position_without_its_jump_may_have_wrapped_around() {
         // The remaining difference is 2π − 6 rad = 0.28 rad.
         (0.5, 6.0, 1.0, Some(TAU), Outcome::Used),
         (0.5, -6.0, 1.0, Some(-TAU), Outcome::Used),
-        // The difference is at most half a turn (π), so the position has not wrapped around.
+        // A difference of at most half a turn (π) is not a wrap-around.
         (0.5, 0.5, 1.0, Some(0.0), Outcome::Used),
         (0.5, -0.5, 1.0, Some(0.0), Outcome::Used),
         (0.5, PI, 4.0, Some(0.0), Outcome::Used),
@@ -143,8 +143,8 @@ fn j35_the_first_answer_has_no_rate_and_keeps_the_jump() {
     assert_eq!((joint.used().position, joint.speed(), joint.taken_off()), (-1.0, 0.0, 0.5));
 }
 
-/// The first answer is used directly, even if it is the second answer of its tick. No earlier position exists, so no
-/// step can occur.
+/// The controller uses the first answer directly, even if it is the second answer of its tick. Without an earlier
+/// position, the used position cannot have a step.
 #[test]
 fn j63_the_first_answer_is_not_bridged() {
     let mut joint = Measurement::default();
@@ -173,7 +173,8 @@ fn one_outstanding() -> Measurement {
     joint
 }
 
-/// Returns the motion commanded in the last ticks, with this velocity (rad/s) one tick ago and this distance (rad) since then.
+/// Returns a function with the motion that was commanded since a late answer was due: the velocity at that time
+/// (rad/s), and the distance since then (rad).
 fn past(commanded: f64, commanded_way: f64) -> impl Fn(u8) -> Late {
     move |ticks| match ticks {
         0 => Late { ms: 0, commanded: 0.0, commanded_way: 0.0 },
@@ -192,8 +193,8 @@ fn j63_a_late_answer_two_steps_from_its_prediction_is_in_its_place() {
         assert_eq!(joint.step(&tick(Some(0.0), 0.0), past(0.0, way), &config), Outcome::Used);
         assert_eq!(joint.used().position, way);
     }
-    // If this answer were late, it would be three steps from its prediction. If it is on time, it is at its
-    // prediction. The outstanding answer was therefore lost.
+    // If this answer were late, it would be three steps from its prediction. As an answer on time, it is exactly at
+    // its prediction. The controller therefore assumes that the outstanding answer was lost.
     let mut joint = one_outstanding();
     assert_eq!(joint.step(&tick(Some(0.0), 0.0), past(0.0, 1.5 * two), &config), Outcome::Used);
     assert_eq!(joint.used().position, 0.0);
@@ -209,8 +210,8 @@ fn j63_the_first_late_answer_has_the_counted_lateness() {
     assert_eq!(joint.used().position, 0.5);
 }
 
-/// A late answer that is not close to its prediction causes no step of the velocity. The change of the commanded velocity since the answer
-/// was due is a part of the used velocity.
+/// A late answer far from its prediction must not cause a step of the velocity. The used velocity contains the change
+/// of the commanded velocity since the answer was due.
 #[test]
 fn j63_a_late_velocity_makes_no_step() {
     let mut joint = one_outstanding();

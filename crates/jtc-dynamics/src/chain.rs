@@ -18,8 +18,8 @@ use crate::rotation::{
 };
 use crate::trig::{angle, sin_cos};
 
-/// Largest difference (rad) between an angle of a joint origin and a multiple of π/2 at which the multiple replaces the angle. Many arm
-/// models write π/2 with six digits, and the wire format uses f32.
+/// If an angle of a joint origin is within this distance (rad) of a multiple of π/2, it is replaced by this multiple.
+/// Many arm models write π/2 with six digits, and the wire format uses f32.
 const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
 /// Limit below which the sine or cosine of the angle between two axes is treated as 0. Products of rotations by right angles contain such
 /// small values because of rounding.
@@ -218,7 +218,7 @@ pub(crate) struct Chain {
     /// upward acceleration of the base.
     pub base_acceleration: [f64; 3],
     pub placements: [Placement; 7],
-    /// First moments (`hx`, `hy`) of a massless arm that carries 1 kg at the flange, kg·m.
+    /// First moments (`hx`, `hy`) of the chain with 1 kg at the flange and without any other mass, kg·m.
     pub flange: [[f64; 2]; JOINTS],
     pub shape: KnownShape,
 }

@@ -128,8 +128,8 @@ mod tests {
             prop_assert!((x - angle.cos()).abs() < 4e-16 && (y - angle.sin()).abs() < 4e-16, "{x} {y}");
         }
 
-        /// The principal moments do not change if the matrix is rotated, in any unit, even if they are equal, zero or
-        /// negative.
+        /// The rotation of a matrix does not change its principal moments. The test uses many units, and moments that
+        /// are equal, zero or negative.
         #[test]
         fn principal_moments_are_those_before_a_turn(
             moments in prop::array::uniform3(prop_oneof![Just(0.0), Just(1.0), Just(-1.0), -2.0..2.0f64, -1e-9..1e-9f64]),

@@ -232,8 +232,8 @@ proptest! {
     }
 }
 
-/// Compares the gravity torque of the existing device with values from another program. In that program the arm
-/// hangs, so gravity has the opposite direction, and joint 3 is 10 mm higher.
+/// Compares the gravity torque of the default arm with values from another program. In that program the arm hangs, so
+/// gravity has the opposite direction. The origin of joint 4 is also shifted by 10 mm along the z axis of link 3.
 #[test]
 fn j40_gravity_torque_of_the_default_arm_hanging() {
     let mut model = arms::avena();
@@ -400,8 +400,8 @@ fn j40_a_joint_without_inertia_stays_finite() {
 }
 
 proptest! {
-    /// The felt inertia is the largest inertia that can be subtracted from the joint. If more is subtracted, the arm
-    /// has a motion without positive kinetic energy.
+    /// The felt inertia is the largest inertia that can be subtracted from the joint in the mass matrix. If more is
+    /// subtracted, the kinetic energy of some motion is no longer positive.
     #[test]
     fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
         model in arms::model(),

@@ -148,8 +148,8 @@ fn j06_an_angle_at_the_limit_is_accepted() {
 fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
     let off = f64::from(f32::EPSILON);
     for unit in [1e-6, 1e-3, 1.0, 1e3] {
-        // For a rod, one principal moment is slightly below zero. For a plate, one principal moment is slightly above the sum of the other
-        // two.
+        // In each body, one principal moment violates its limit slightly. For the rod, a moment is below zero. For
+        // the plate, a moment is above the sum of the other two.
         for (shape, defect) in [([0.0, 1.0, 1.0], [-1.0, 0.0, 0.0]), ([1.0, 1.0, 2.0], [0.0, 0.0, 1.0])] {
             let check = |off: f64| {
                 let [a, b, c]: [f64; 3] = core::array::from_fn(|i| unit * (shape[i] + off * defect[i]));
@@ -197,8 +197,8 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The inertia of point masses is valid in every orientation. If more is subtracted from one moment than the
-    /// point masses contribute, the inertia is not valid.
+    /// The inertia of point masses is valid in every orientation. If the inertia about one axis is reduced by more
+    /// than the point masses can contribute, the inertia is not valid.
     #[test]
     fn j06_what_points_of_mass_make_is_accepted(
         points in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 1..6)

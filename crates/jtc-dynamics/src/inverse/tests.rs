@@ -32,7 +32,7 @@ fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     })
 }
 
-/// Checks that the recursion for a shape gives the same values as the general recursion. It may omit only
+/// Checks that the recursion for a shape gives the same values as the general recursion, although it omits
 /// multiplications by known zeros and ones.
 fn same<S: Shape>(model: &ArmModel, shape: KnownShape, q: &JointVec, qd: &JointVec, qdd: &JointVec) {
     let chain = Chain::new(model, [0.3, -0.2, -9.81], &Payload::default());

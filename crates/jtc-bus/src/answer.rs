@@ -106,8 +106,8 @@ impl Answer {
         }
     }
 
-    /// Decodes the frame of an answer. The controller uses this function. The function is inlined, because a PC
-    /// stalls if a report is written byte by byte and then copied in larger words.
+    /// Decodes the frame of an answer. The controller uses this function. The function is inlined, because otherwise
+    /// a PC writes the report byte by byte and copies it in larger words, which stalls its processor.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);
@@ -134,10 +134,11 @@ impl Answer {
         }
     }
 
-    /// Returns the frame of the answer. Nodes use this function. A joint report has 20 bytes if it contains a motor temperature, and
-    /// otherwise 16 bytes. Values saturate.
+    /// Returns the frame of the answer. Nodes use this function. A joint report has 20 bytes if it contains a motor
+    /// temperature, and 16 bytes otherwise. Values outside the range of their integer are limited to this range.
     ///
-    /// If the node number is invalid, the frame contains the node number 15. The controller ignores frames from node 15.
+    /// If the node number is invalid, the frame contains the node number 15. The controller ignores frames from node
+    /// 15.
     pub fn emit(&self, scale: Scale) -> Frame {
         match self {
             Self::Joint { node, report } => emit_joint(*node, report, scale),

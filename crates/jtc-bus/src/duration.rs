@@ -10,9 +10,9 @@ const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// Delimiter bit after the checksum. The bit rate becomes faster within the BRS bit and slower within this bit, both
-/// at the same fraction of the bit. The two bits together take as long as one nominal bit and one data bit, so the
-/// code counts them in this way.
+/// Delimiter bit after the checksum. The bit rate rises within the BRS bit and falls within the delimiter bit, at the
+/// same fraction of each bit. Both bits together therefore take as long as one nominal bit and one data bit. The code
+/// counts the BRS bit as nominal and the delimiter as a data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
 /// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). The

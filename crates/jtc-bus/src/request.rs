@@ -121,9 +121,8 @@ impl Request {
             id::MOVE => {
                 frame.need(field::MOVE_LEN as u8)?;
                 let torque = core::array::from_fn(|joint| {
-                    // The drives compute the torque with the same operations in the same order, so the result is
-                    // equal in every bit. The speed of this division does not matter, because the control tick does
-                    // not parse requests.
+                    // The drives compute the torque with the same operations in the same order, so both results are
+                    // equal in every bit. The division is slow, but the control tick does not parse requests.
                     let raw = i16::from_be_bytes(frame.get(field::TORQUE + 2 * joint));
                     f64::from(raw) * TORQUE_FULL_SCALE / f64::from(i16::MAX)
                 });

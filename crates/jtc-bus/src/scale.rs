@@ -40,8 +40,8 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
-/// Returns the physical value of a 16-bit integer. The factor in parentheses is computed separately, because it is
-/// the same for every answer of a tick. On the board, a division takes as long as seven multiplications.
+/// Returns the physical value of a 16-bit integer. The quotient in parentheses is the same for every answer of a
+/// tick, so it is computed only once per tick. On the board, a division takes as long as seven multiplications.
 #[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
@@ -52,9 +52,9 @@ pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
     f64::from(i32::from_be_bytes(bytes)) * (full_scale / f64::from(i32::MAX))
 }
 
-/// Returns `value` in units of the last bit, increased in magnitude by half a unit. With the added half unit, the truncating cast rounds to
-/// the nearest integer. The cast converts NaN to 0. An invalid full scale (0, NaN) results in the limit value or 0, but never in a value
-/// with the opposite sign.
+/// Returns `value` as a number of integer steps, with half a step added to its magnitude. The cast to an integer,
+/// which truncates, then rounds to the nearest integer and converts NaN to 0. With an invalid full scale (0, NaN),
+/// the result is the limit value or 0, but never has the opposite sign.
 fn nearest(value: f64, full_scale: f64, max: f64) -> f64 {
     let raw = value * (max / full_scale.abs());
     (raw + 0.5_f64.copysign(raw)).clamp(-max, max)
@@ -91,7 +91,7 @@ mod tests {
             assert_eq!((raw, long), (0, 0));
             return;
         }
-        // The sign must never change, but a value below half a unit may become 0.
+        // The sign never changes. Only a value below half a step becomes 0.
         assert!(f64::from(raw) * value >= 0.0, "{value} became {raw}");
         assert!(f64::from(long) * value >= 0.0, "{value} became {long}");
         if value.abs() >= TORQUE_FULL_SCALE {

@@ -13,7 +13,7 @@ pub use reference::{Event, events};
 pub use script::{stream_parser, stream_regions};
 pub use status::status_stream;
 
-/// Builds a frame of any type and body with a correct CRC. The length of the frame may be invalid for its type.
+/// Builds a frame of any type and body with a correct CRC. The length of the frame can be invalid for its type.
 pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
     let mut bytes = vec![crate::HEADER, kind];
     bytes.extend((body.len() as u16 + 6).to_be_bytes());

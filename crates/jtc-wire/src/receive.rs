@@ -167,7 +167,7 @@ fn scan(held: &[u8]) -> ScanResult {
     match held.get(field::LENGTH) {
         None => ScanResult::Needs(field::LENGTH.end),
         Some(n) => match usize::from(u16::from_be_bytes([n[0], n[1]])) {
-            // A frame of this type is never longer than the buffer.
+            // Statuses and answers are never longer than `ANSWER_MAX`, so `min` does not change the length.
             n if kind.can_have(n) => ScanResult::Needs(n.min(ANSWER_MAX)),
             _ => ScanResult::Nothing,
         },

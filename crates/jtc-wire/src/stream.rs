@@ -168,8 +168,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     /// continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
-            // If the list of gaps is full, this call has no effect. Then the last gap in the list is at the last
-            // byte, or the loop below removes gaps from the list.
+            // If the list of gaps is full, `mark` does not store this gap. The last gap in the list is then already
+            // at the last byte, or the loop below removes gaps from the list.
             self.gaps.mark(self.end);
         }
         self.busy = false;
@@ -249,9 +249,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Discards all held bytes and the event, because bytes were lost before the next byte, whose stream position is `position`. The parser
-    /// reports the loss as one run that was not completely received (J-04). The next bytes do not continue a frame. The next bytes belong
-    /// to the run of the loss until the next frame begins.
+    /// Discards all held bytes and the event after a loss of bytes. `position` is the stream position of the next
+    /// byte. The parser reports the loss as one run that was not completely received (J-04). The bytes before the
+    /// next frame belong to this run.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);

@@ -171,8 +171,9 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
         for tail in &mut self.lines {
             let own = !core::mem::take(&mut tail.commands).is_empty();
-            // The order in which the lines received bytes within a tick is unknown. All bytes received so far therefore count as older than
-            // the urgent command. If only one line received a command, the bytes after the command do not count as older.
+            // The order in which different lines received bytes within a tick is unknown. On the other lines, all
+            // bytes received so far therefore count as older than the urgent command. If only one line received a
+            // command, only the bytes up to this command count as older on this line.
             match lines_with {
                 0 => {}
                 1 if own => tail.overtaken = tail.hit,

@@ -29,8 +29,8 @@ fn j05_a_frame_needs_its_header_type_length_and_crc_at_once() {
     }
 }
 
-/// A list of floats that a receiver has not checked is a command only if its number of floats is permitted for its
-/// type.
+/// `Command::parse` must refuse a list of floats if its number of floats is not permitted for the frame type, even if
+/// no receiver has checked the frame before.
 #[test]
 fn j07_floats_of_another_count_are_no_command() {
     let bytes = vec![0; 10_580];

@@ -52,7 +52,8 @@ fn bits_in_words() {
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
 }
 
-/// The masks and the texts of a word come from the same table. The table of the code must equal the table of the protocol.
+/// One table in the code contains the masks and the texts of a word. This table must agree with the table of the
+/// protocol.
 #[test]
 fn masks_have_the_texts_of_their_bits() {
     let errors = error::EMERGENCY_INPUT | error::EXTERNAL | error::EXTERNAL_JOINTS;
@@ -169,7 +170,8 @@ fn j06_coefficients_are_called_by_their_index() {
     check::<6>();
 }
 
-/// A received frame never contains this command, but code can construct it. Its text must also be correct.
+/// A received FrictionPolynomial frame never contains too few numbers, but code can construct such a command. Its
+/// text must then show 0 coefficients.
 #[test]
 fn j07_a_polynomial_of_too_few_numbers_can_be_said() {
     let command = Command::FrictionPolynomial(Floats::new(&[0; 20]));

@@ -66,8 +66,9 @@ impl StopKind {
         }
     }
 
-    /// Returns the kind for the first joint error that is a limit of the path. The caller determines the kind for position errors and
-    /// torque errors.
+    /// Returns the kind for joint errors that show a violated limit of the path. If several limits are violated, the
+    /// order is position, velocity, acceleration, friction table. The caller determines the kind for position errors
+    /// and torque errors.
     pub const fn of_limit(joint_error: u16) -> Self {
         if joint_error & joint_error::POSITION != 0 {
             Self::Position
@@ -134,7 +135,8 @@ pub struct Reactions {
     /// Cause of the last held stop, and the time since the start of that stop, ms. `None` if no held stop has occurred since the start of
     /// the controller or the last ClearOccurredErrors.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints that yield to a push or lower their loads, one bit for each joint.
+    /// Joints that yield to a push, or slowly lower a load that their torque limit cannot hold, one bit for each
+    /// joint.
     pub yields: u8,
     /// Joints whose encoder has jumped since their drives were configured, one bit for each joint (J-35).
     pub jumped: u8,

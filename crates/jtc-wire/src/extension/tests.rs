@@ -82,7 +82,8 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
     assert_eq!(Info::parse(&later).unwrap().reactions, Some(Reactions { stop: None, ..reactions }));
 }
 
-/// The text of every cause must contain the joint or the event, and the value and the limit with their unit.
+/// The text of every cause must contain the number of the joint, except for the kind Approach. It must also contain
+/// the unit of the value, except for the kind Unstable.
 #[test]
 fn j69_every_cause_has_its_words() {
     for kind in StopKind::ALL {
@@ -172,7 +173,7 @@ fn j56_a_page_of_the_log_is_these_bytes() {
     ];
     assert_eq!(out[..n - 2], bytes);
     assert_eq!(Answer::parse(FrameRef::new_checked(&out[..n]).unwrap()), Some(Answer::Log(page)));
-    // The longest page must also be within the limit of J-56.
+    // The longest Log frame may have at most 256 bytes (J-56).
     let full = LogPage { bytes: &[7; LOG_PAGE], ..page };
     assert!(Answer::Log(full).emit(&mut out).unwrap() <= 256);
 }

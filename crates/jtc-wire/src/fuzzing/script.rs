@@ -53,7 +53,8 @@ impl<'a> Reader<'a> {
     }
     fn step(&mut self) -> Step {
         Step::Bytes(match self.byte() % 16 {
-            // A value of 0 gives a silence that is exactly as long as a gap, because 200 µs have already passed.
+            // 200 µs have already passed since the last byte. If the next input byte is 0, the whole silence is
+            // therefore exactly as long as a gap.
             0 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 200 + u64::from(self.byte()) * 100),
             1 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 201),
             2 => return Step::Hold(self.byte() % 40),
@@ -87,8 +88,8 @@ impl<'a> Reader<'a> {
             }
             12 => [HEADER].repeat(self.byte().into()),
             13 => {
-                // Returns a Trajectory frame whose body contains other frames. The CRC of the Trajectory frame may be
-                // wrong.
+                // Returns a Trajectory frame whose body contains other frames. The CRC of the Trajectory frame is
+                // wrong in some cases.
                 let mut body: Vec<u8> = (0..4).flat_map(|_| self.frame()).collect();
                 body.resize(8 + body.len().next_multiple_of(36), self.byte());
                 let mut frame = sealed(FrameType::Trajectory as u8, &body);

@@ -25,8 +25,8 @@ fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
     assert!(!receiver.poll(now + 10_000));
 }
 
-/// The test sends halves of frames, each after a gap. The parser must never join two halves, even if the test passes a half twice because
-/// the list of gaps was full.
+/// The test sends each half of a frame after a gap. If the list of gaps is full, the parser refuses a half, and the
+/// test sends this half again later. The parser must never join two halves.
 #[test]
 fn j05_gaps_are_never_forgotten() {
     for first in 0..2 {
@@ -69,7 +69,8 @@ fn j04_silence_behind_a_held_event_is_one_gap() {
     assert_eq!(receiver.push(1_000_000, &ON), 6);
 }
 
-/// The reader is delayed by more than a gap. The reader passes the remaining bytes of a piece late, but the frame must still be complete.
+/// The buffer accepts only a part of the bytes. The reader passes the remaining bytes after a delay that is longer
+/// than a gap, but the frame must still be complete.
 #[test]
 fn j03_a_slow_reader_is_no_gap() {
     let mut receiver = receiver();
@@ -141,8 +142,8 @@ fn a_short_buffer() {
     panic!("the frame was not found");
 }
 
-/// The last bytes of a frame arrive after lost bytes. The loss must get one record (J-04). The parser must not treat
-/// the last bytes as a frame, and must find the next frame at its true position.
+/// Bytes in the middle of a frame are lost. The parser must report the loss with one response record (J-04), and must
+/// not treat the last bytes of this frame as a frame. It must find the next frame at its true position.
 #[test]
 fn j04_lost_bytes_have_one_record_and_are_not_joined_across() {
     let mut receiver = receiver();

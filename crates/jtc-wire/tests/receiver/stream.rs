@@ -87,7 +87,8 @@ fn j03_several_frames_in_one_piece() {
 #[test]
 fn j02_the_longest_frame() {
     let mut line = Line::new();
-    // After the first frame, the end of the buffer has too little space for the longest frame.
+    // After this short frame, the rest of the buffer is too short for the longest frame. The parser must receive the
+    // longest frame nevertheless.
     assert_eq!(line.send(&ON), [GOOD_ON]);
     let frame = segment(1666);
     assert_eq!(line.send(&frame), [Good(FrameType::Trajectory, 59_990)]);
@@ -164,12 +165,12 @@ fn j05_gap() {
         line.send(piece);
     }
     assert_eq!(line.send(&ON), [GOOD_ON], "the frame was received in the loop");
-    // After this byte, the type of the frame is still unknown.
+    // Only the header byte arrives before the gap. The type of the frame is unknown, so the byte counts as noise.
     assert_eq!(line.send(&ON[..1]), []);
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
 
-/// The bytes after a gap may arrive before the next call of `poll`. The parser must still detect the gap.
+/// The parser must detect a gap even if the bytes after the gap arrive before the next call of `poll`.
 #[test]
 fn j05_gap_seen_with_the_next_bytes() {
     for (us, expected) in
@@ -213,7 +214,8 @@ fn j03_a_false_header_that_fills_up_costs_no_frame() {
     assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
-/// After a frame that lost a byte, the complete frame follows without a gap. Only the damaged frame may be lost.
+/// A frame has lost a byte, and the complete frame follows without a gap. The parser must reject only the damaged
+/// frame.
 #[test]
 fn j03_a_lost_byte_costs_only_its_frame() {
     let frame = segment(10);

@@ -45,7 +45,8 @@ impl Default for Invariants {
 }
 
 impl Invariants {
-    /// Creates a checker for a simulation that is already running. The current state and motion of the simulation count as permitted.
+    /// Creates a checker for a simulation that is already running. The checker accepts the current state and the
+    /// current motion, and checks only the changes that follow.
     pub fn joining(world: &World) -> Self {
         let t = world.telemetry();
         Self {
@@ -196,7 +197,7 @@ impl Invariants {
                 return Err(Broken::Torque { state, joint: Joint::ALL[joint], torque: torque[joint] });
             }
             let limit = moment.config.joints[joint].torque_max;
-            // Due to the resolution of the bus, the torque may be rounded up by one step.
+            // The bus has a limited resolution, so rounding may increase the torque by one step.
             if torque[joint].abs() > limit + 0.02 {
                 return Err(Broken::TorqueLimit { joint: Joint::ALL[joint], torque: torque[joint], limit });
             }

@@ -212,8 +212,8 @@ fn stopped_at(speed: f64) -> Script {
 
 #[test]
 fn j33_a_stop_that_takes_too_long_is_found() {
-    // First the set values do not come to rest, then the arm does not follow its set values. The checker must find
-    // both.
+    // In the first case, the set values do not come to rest. In the second case, the set values have stopped, but the
+    // arm does not. The checker must find both.
     for (state, trajectory) in [
         (ControllerState::Operate, TrajectoryState::Execute),
         (ControllerState::HoldPos, TrajectoryState::Stop),

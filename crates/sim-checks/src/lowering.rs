@@ -1,5 +1,5 @@
-//! Lowering of an arm through a pose in which its shoulder needs much of its torque limit. A command stops the arm in this pose (J-33).
-//! Tests and the tables of docs/safety.md use this module.
+//! Lowering of an arm through a pose in which the holding torque of the shoulder is near its torque limit. A command
+//! stops the arm in this pose (J-33). Tests and the tables of docs/safety.md use this module.
 use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
@@ -112,8 +112,8 @@ impl Lowering {
         }
     }
 
-    /// Returns the operator of a simulation that was just switched on. The arm rests on its stand or brakes in the
-    /// pose `from`, above the pose in which it will be stopped.
+    /// Returns the operator of a simulation that was just switched on. A stand or the holding brakes support the arm
+    /// in the pose `from`, which is above the pose in which the arm will be stopped.
     fn operator(&self, from: JointVec) -> Operator {
         let mut controller = Config::avena();
         controller.joints[LOADED].torque_max = self.torque_max;

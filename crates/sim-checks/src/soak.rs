@@ -103,7 +103,7 @@ impl Soak {
         config.baud = [Some(115_200), Some(921_600), Some(3_000_000), None][rng.usize(0..4)];
         config.support = if rng.u8(0..8) == 0 { Support::None } else { Support::Brakes };
         config.gripper = true;
-        // The alignment times are short, so that time remains for other events.
+        // In half of the runs, the motor alignment is short, so that more time remains for other events.
         let quick = rng.bool();
         let mut drive = if rng.u8(0..3) == 0 { DriveConfig::older() } else { DriveConfig::default() };
         drive.first_enable_ms = if quick { 300 } else { 4000 };

@@ -6,8 +6,8 @@ use jtc_wire::ExecCommand;
 use super::broken::Broken;
 use jtc_sim::{Moment, Worked};
 
-/// Additional time after the longest time of J-33, ms. In this time the arm comes to rest after the end of the
-/// commanded motion.
+/// Additional time after the longest time of J-33, ms. The commanded motion has ended by then, and the arm needs this
+/// time to come to rest.
 const REST_MS: u32 = 20;
 /// Speed below which a joint counts as being at rest, rad/s.
 const STANDS: f64 = 0.02;
@@ -19,7 +19,7 @@ const WINDOW: u32 = 100;
 pub(super) struct MotionWatch {
     /// Number of ticks since a Pause or Stop was commanded on the path. `None` if no stop is in progress.
     stopping: Option<u32>,
-    /// `true` if a push has driven a torque to its limit since the Pause or Stop.
+    /// `true` if, since the Pause or Stop, a push has been so strong that a torque reached its limit.
     overpowered: bool,
     /// Number of consecutive measurements above the speed limit, for each joint.
     fast: [u16; JOINTS],
@@ -55,7 +55,7 @@ impl MotionWatch {
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
-            // After `braking_ms_max`, the controller holds the arm against a push. The arm may then move, and only
+            // After `braking_ms_max`, the controller holds the arm against the push. The arm can still move, and only
             // the other invariants apply.
             Some(ticks)
                 if self.overpowered && t.trajectory != TrajectoryState::Execute && ticks >= braking =>

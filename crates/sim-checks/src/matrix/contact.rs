@@ -26,13 +26,14 @@ enum Meets {
     Wall(Joint),
     /// Plane across the path of the flange.
     Plane,
-    /// Load of this mass that the controller does not know, kg.
+    /// Load of this mass, kg. The arm model of the controller does not contain it.
     Load(f64),
-    /// Load of this mass that the controller does not know and that the arm drops after a second, kg.
+    /// Load of this mass, kg, which the arm drops after a second. The arm model of the controller does not contain
+    /// it.
     Drops(f64),
-    /// Friction of all joints, as a factor of the values that the controller knows.
+    /// Friction of all joints, as a multiple of the friction in the model of the controller.
     Friction(f64),
-    /// Masses of all links, as a factor of the values that the controller knows.
+    /// Masses of all links, as a multiple of the masses in the model of the controller.
     Masses(f64),
     /// Safety input that is low for 1 ms. The host clears the error this number of milliseconds later.
     Cleared(u64),
@@ -60,8 +61,8 @@ impl Meets {
         }
     }
 
-    /// Returns the deviation from the arm model that the influence needs. This deviation is present from the start of
-    /// the simulation.
+    /// Returns the deviation from the arm model that represents the influence. It exists from the start of the
+    /// simulation. For a push, a contact or a load, there is no deviation.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -139,7 +140,9 @@ struct Outcome {
     found: Option<u64>,
     /// `true` if the motion was finished.
     ended: bool,
-    /// Maximum deviations, rad: first of the affected joint (or of any joint), then of the other joints.
+    /// Maximum distances of joints from their positions before the influence, rad. The first value is for the
+    /// affected joint, or for all joints if the influence does not affect a single joint. The second value is for the
+    /// other joints.
     way: [f64; 2],
     /// Maximum speed of a joint, rad/s.
     speed: f64,

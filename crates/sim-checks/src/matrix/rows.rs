@@ -118,7 +118,7 @@ const fn fault(kind: FaultKind) -> Act {
     Act::Fault(kind, LASTING_MS)
 }
 
-/// Joint that is affected by the faults of a single joint.
+/// Joint on which the matrix injects the faults that affect a single joint.
 const MEANT: Joint = Joint::ALL[1];
 const SILENT: FaultKind = FaultKind::NodeSilent { node: MEANT.index() as u8 };
 const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };

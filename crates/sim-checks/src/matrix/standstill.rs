@@ -60,7 +60,8 @@ pub(super) fn stop_lines() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Checks J-33. The arm has an additional 20 ms to come to rest after the commanded motion.
+/// Checks that the arm comes to rest in the time of J-33. The arm has an additional 20 ms after the end of the
+/// commanded motion.
 pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
     match *motion {
         Motion::Stands { ms, .. } if ms <= 520 => Ok(()),

@@ -38,7 +38,7 @@ pub use task::{STOPPED, Task, stopped};
 const KEPT: usize = 256;
 /// Largest number of HTTP clients for which the agent keeps a connection to the serial line.
 const COMMANDERS_MAX: usize = 32;
-/// Time from the end of a silent client's lease until the agent removes the client.
+/// Time after which the agent removes a silent client whose lease has ended.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Shortest interval between two events for Stops and Pauses, so that repeated Stops do not remove other events from
 /// the journal. The event for the last Stop or Pause is always written.
@@ -146,8 +146,8 @@ impl Jobs {
         let http_session = HttpSession::new(&self.line, introduction);
         let mut kept = self.lock();
         if kept.http_sessions.len() >= COMMANDERS_MAX {
-            // A client that has no lease and no job is removed. Otherwise, a program that restarts repeatedly would
-            // fill the list of clients.
+            // If the list of clients is full, a client without a lease and without a job is removed. A program that
+            // restarts repeatedly therefore does not block other clients.
             let holder = self.line.with(|line, _| line.lease().map(|lease| lease.holder));
             let idle = kept
                 .http_sessions

@@ -49,7 +49,7 @@ const RETURN_TIME: Duration = Duration::from_millis(500);
 /// Hold-off after a Stop or a Pause of another client. During this time, motion requests are refused, because a
 /// client may have sent them before it learnt of the Stop.
 const CALM: Duration = Duration::from_secs(3);
-/// Shortest hold-off after a refused motion request.
+/// Shortest remaining hold-off after a refused motion frame or a refused jog request.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
 
 /// Written frame whose response record has not arrived yet.
@@ -371,8 +371,8 @@ impl SharedLine {
         self.asked_after(id).is_some_and(|number| number != self.halted.0)
     }
 
-    /// Returns the number of the last Stop or Pause before the client's last motion request, or before its connection
-    /// if the client has made no motion request.
+    /// Returns the number of the last Stop or Pause before the client's last motion request. If the client has made
+    /// no motion request, returns the number of the last Stop or Pause before it connected.
     pub fn asked_after(&self, id: ClientId) -> Option<u64> {
         self.clients.get(&id).map(|client| client.asked_after)
     }

@@ -24,8 +24,8 @@ pub use server::Server;
 
 use crate::access::TokenError;
 
-/// Returns a random first sequence number for a new agent. If a PLC repeats earlier writes, they are therefore
-/// unlikely to contain the next valid sequence number.
+/// Returns a random first sequence number for a new agent. If a PLC repeats writes of an earlier run, these writes
+/// are therefore unlikely to contain the next valid sequence number.
 ///
 /// # Errors
 ///

@@ -102,7 +102,7 @@ impl Line {
 
     /// Waits for a delivery to any client, at most for `timeout`.
     pub fn wait(&self, timeout: Duration) {
-        // The caller itself checks why the wait has ended.
+        // The result is not used, because the caller itself checks why the wait has ended.
         drop(self.0.delivered.wait_timeout(self.0.lock(), timeout));
     }
 

@@ -54,7 +54,7 @@ proptest! {
         board.run_ms(100);
         let at = board.frames.iter().find(|(_, t, _)| *t == Some(FrameType::TrajSetExecStatus)).expect("it came").0;
         prop_assert!(at - asked <= Duration::from_millis(40), "{:?}", at - asked);
-        // No further frame of the upload arrives, and the client of the upload receives the reason.
+        // After the Stop, no further frame of the upload arrives, and the client of the upload receives the reason.
         board.run_ms(6_000);
         let behind = board.frames.iter().filter(|(t, kind, _)| *t > at && kind.is_some()).count();
         prop_assert_eq!(behind, 0);
@@ -114,8 +114,8 @@ proptest! {
             board.send(clients[client], &frame);
             board.run_ms(seed_ms);
         }
-        // A request for a frame waits until the controller has sent the frame for the previous request. The simulated board never sends the
-        // requested frame.
+        // A request for a frame of the controller waits until the previous request is answered. The simulated board
+        // never sends the requested frames, so each request waits for its full timeout.
         board.run_ms(60 * 520 + 2000);
         for (client, sent) in clients.iter().zip(&sent) {
             let (records, denied) = board.take(*client);
@@ -721,14 +721,16 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         board.take(bob);
         let before = board.arrived(FrameType::GetInfo);
         let (mut asked, mut own) = (0, 0);
-        // The board never returns the requested frame. Each request waits for the requested frame, so the requests take longer than 3 s.
+        // The board never returns the requested frame, so each request waits for its full timeout. The requests
+        // therefore take longer than 3 s.
         for ms in (0..13_000).step_by(250) {
             if every_ms > 0 && ms % every_ms == 0 {
                 board.send(anna, &fixed::get_settings(0));
                 own += 1;
             }
-            // If the lease holder sends a frame every 2 s, the viewer's request is permitted shortly after this
-            // frame. The viewer therefore sends no request in the first 400 ms.
+            // If the lease holder sends a frame every 2 s, requests of the viewer are permitted for a short time
+            // after each of these frames. The test therefore sends no viewer's request in the first 400 ms after such
+            // a frame.
             if ms < 3000 && (every_ms != 2000 || ms % 2000 >= 400) {
                 board.send(bob, &fixed::GET_INFO);
                 asked += 1;

@@ -156,7 +156,8 @@ fn order(command: Command, sequence: u16) -> Vec<u8> {
 const PRESS: [u8; 5] = [5, 0, 0, 0xFF, 0];
 const LET_GO: [u8; 5] = [5, 0, 0, 0, 0];
 
-/// The Stop follows the start command immediately: in the same packet, as a coil that is briefly 1, or as the next command.
+/// The Stop follows the start command immediately: in the same packet, as a coil that is briefly 1, or as the next
+/// command. The arm does not move.
 #[test]
 fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     let cell = Cell::start(&[]);

@@ -31,7 +31,7 @@ pub(super) struct AbsentJoint {
     /// Number of the joint, 1 to 6 from the base.
     #[schema(minimum = 1, maximum = 6)]
     pub joint: u8,
-    /// Position of the joint in the model, rad.
+    /// Assumed position of the absent joint in the arm model, rad.
     #[schema(minimum = -6.2832, maximum = 6.2832)]
     pub position_rad: f64,
 }
@@ -89,7 +89,7 @@ impl AbsentObject {
     }
 }
 
-/// Returns the joints that are set absent, and their positions in the model.
+/// Returns the absent joints, and their assumed positions in the arm model.
 #[utoipa::path(
     get,
     path = "/api/absent",

@@ -26,7 +26,7 @@ use crate::owner::ClientPort;
 pub(super) struct ArmObject {
     /// Name of the arm.
     pub name: String,
-    /// Hash of all parameters that decide how the arm moves.
+    /// Hash of all parameters that determine how the arm moves.
     pub hash: String,
     /// Arm file in TOML, as `jtc arm pull` writes it.
     pub text: String,
@@ -38,8 +38,8 @@ pub(super) struct ArmObject {
 pub(super) struct ArmRequest {
     /// Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints.
     pub text: String,
-    /// `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
-    /// afterwards.
+    /// `true`: store the arm in non-volatile memory. While the controller stores the arm, the arm has no torque.
+    /// Afterwards, the controller stays in Init.
     #[serde(default)]
     pub store: bool,
 }
@@ -49,7 +49,7 @@ pub(super) struct ArmRequest {
 pub(super) struct GivenObject {
     /// Number of settings that have changed.
     pub settings: usize,
-    /// `true` if the controller has the name of the arm.
+    /// `true` if the controller has confirmed the name of the arm.
     pub named: bool,
     /// Friction, gains and model, as far as the controller confirmed them.
     pub parts: Vec<PartObject>,
@@ -68,7 +68,7 @@ pub(super) struct PartObject {
     pub parameter: String,
     /// Length of its frame, bytes.
     pub bytes: usize,
-    /// Number of intended transmissions; a friction table is sent twice.
+    /// Number of times that the frame must be sent: 2 for a friction table, otherwise 1.
     pub times: u32,
     /// Duration, s.
     pub time_s: f64,

@@ -22,7 +22,7 @@ pub(super) struct DoctorObject {
     pub healthy: bool,
     /// Listening time, s.
     pub listened_s: f64,
-    /// Number of statuses received in this time.
+    /// Number of statuses received during the listening time.
     pub statuses: u64,
     /// Findings, worst first.
     pub findings: Vec<FindingObject>,
@@ -30,8 +30,8 @@ pub(super) struct DoctorObject {
 
 /// Diagnoses link, joint bus and set-up.
 ///
-/// The diagnosis takes two seconds and changes nothing. For the link, it evaluates all bytes that the controller sends in
-/// this time. The agent does not try other rates, because the line is in use.
+/// The diagnosis takes two seconds and changes nothing. For the link, it evaluates all bytes that the controller
+/// sends in this time. The agent does not try other bit rates, because the serial line is in use.
 #[utoipa::path(
     get,
     path = "/api/doctor",
@@ -50,7 +50,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
         Some(status) => absent(&agent, status).await?,
         None => Vec::new(),
     };
-    // Held stops and encoder jumps exist only while joints have torque.
+    // Held stops and encoder jumps are possible only while joints have torque, so the agent requests the reactions
+    // only in this case.
     let reactions = match &status {
         Some(status) if labels::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
         _ => None,
@@ -73,8 +74,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 
-/// Returns the joints that the user has declared absent. The agent requests the list of absent joints from the
-/// controller. The status does not show an absent joint whose drive answers (J-53).
+/// Returns the joints that the user has declared absent. If the status shows an external joint error, requests the
+/// list from the controller, because the status does not show an absent joint whose drive answers (J-53).
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(labels::absent(status));

@@ -43,7 +43,7 @@ const MESSAGES_AT_ONCE: f64 = 500.0;
 const ANSWERS_MAX: usize = 64;
 /// Shortest interval between two messages with values.
 const PERIOD: Duration = Duration::from_millis(40);
-/// Longest interval between two text messages.
+/// Longest interval between two text messages with the status.
 const QUIET: Duration = Duration::from_millis(500);
 /// Interval at which the agent checks how much data a client has read.
 const PING_TIME: Duration = Duration::from_millis(200);
@@ -208,7 +208,7 @@ struct Sender<'a> {
     pinged_at: Instant,
 }
 
-/// Reason why the connection ends: the client has disconnected, or the agent disconnects the client.
+/// End of the connection: the client has disconnected, or the agent disconnects the client.
 struct Gone;
 
 impl Sender<'_> {
@@ -293,8 +293,8 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// Sends the values in a status to all subscriptions. For an old status, sends only the text message, without
-    /// values.
+    /// Sends the values in a status to all subscriptions. If these values were already sent (`new` is `false`), sends
+    /// only the text message with the status.
     async fn values(
         &mut self,
         writer: &mut MessageWriter,

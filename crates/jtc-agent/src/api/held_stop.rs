@@ -13,7 +13,7 @@ pub struct HeldStopObject {
     pub number: u8,
     /// Code of the held stop, for `GET /api/explain/{code}`.
     pub code: String,
-    /// First joint with the cause, counted from 1; missing: no particular joint.
+    /// First joint in which the cause occurred, counted from 1; missing if the cause does not concern a joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<u8>,
     /// Value that caused the stop; missing if the kind has no value.
@@ -44,16 +44,16 @@ impl From<HeldStop> for HeldStopObject {
 /// Reactions of a controller to disturbances.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct ReactionsObject {
-    /// Last held stop, also after its current errors were cleared. Missing if no held stop has occurred since the start of
-    /// the controller, or since the record of occurred errors was cleared.
+    /// Last held stop, even if the errors of this stop were cleared. Missing if no held stop has occurred since the
+    /// controller started, or since the list of occurred errors was last cleared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_held_stop: Option<HeldStopObject>,
-    /// Joints that yield to a push or lower a load, counted from 1.
+    /// Joints, counted from 1, that yield to a push (J-68) or lower their load because of an overload (J-70).
     pub yields: Vec<u8>,
     /// Joints with an encoder jump, counted from 1. The controller executes no trajectory until the drives of these
     /// joints are reset.
     pub encoder_jumped: Vec<u8>,
-    /// Rate of path time, path seconds per second; 0 if no trajectory is executed.
+    /// Speed along the path, in seconds of trajectory time per second of real time; 0 if no trajectory is executed.
     pub path_rate: f32,
     /// Total time for which the controller slowed this run down because a torque was at its limit, s.
     pub held_back_s: f64,

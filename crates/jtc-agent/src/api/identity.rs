@@ -37,8 +37,8 @@ impl Identity {
         Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }
     }
 
-    /// Returns the identity that the controller reports, or `None` if the known arm is not the arm that the
-    /// controller uses.
+    /// Returns the identity that the controller reports. Returns `None` if no identity is known, or if the arm that
+    /// the agent knows is not the arm that the controller uses.
     pub(super) fn of_controller(&self) -> Option<&Info> {
         self.info.as_ref().filter(|info| Some(info.hash) == self.hash)
     }

@@ -34,18 +34,18 @@ pub(super) struct JogRequest {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct KnownToJog {
-    /// Value of `last_halt` in the status that the client used. If a client, also this one, has requested another Stop
-    /// or Pause since then, the agent refuses this request, however late the request arrives. Without this parameter,
-    /// the agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the
-    /// request within 3 s after a Stop or Pause of another client.
+    /// Value of `last_halt` in the status that the client used. The agent refuses this request if any client,
+    /// including this one, has requested another Stop or Pause since then. Without this parameter, the agent uses the
+    /// number of the last Stop or Pause before the headers of this request arrived. In both cases, the agent also
+    /// refuses the request within 3 s after a Stop or Pause of another client.
     asked_after: Option<u64>,
-    /// Value of `at_ms` in the newest status that the user saw. If this request arrives more than 500 ms later, nothing
-    /// moves. Zeros, which end the jog, are always accepted.
+    /// Value of `at_ms` in the newest status that the user saw. If this request arrives more than 500 ms after that
+    /// time, nothing moves. Rates of zero, which end the jog, are always accepted.
     as_of_ms: Option<u64>,
 }
 
 /// Data that the client had when it sent the jog request. If the client does not send the number of the last Stop or
-/// Pause, the agent reads this number before the request body, which may arrive slowly.
+/// Pause, the agent reads this number before it reads the request body. The body may arrive slowly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JogAsked {
     after: AskedAfter,
@@ -114,8 +114,8 @@ pub(super) async fn jog(
     // head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
-        // After a Stop the user must release the jog key. While the user holds the key down, each late request also extends
-        // the hold-off.
+        // This request is too late and moves nothing. It shows, however, that the jog key is still pressed, so it
+        // extends the hold-off: after a Stop, the user must release the key.
         agent.line.with(|line, now| line.could_jog(http_session.client, now))?;
         return Err(late);
     }

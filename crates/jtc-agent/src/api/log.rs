@@ -40,7 +40,8 @@ pub(super) struct LogStatusObject {
 #[expect(dead_code, reason = "describes a body")]
 pub(super) struct LogFile(Vec<u8>);
 
-/// Values of the log in columns of the same length. A row is a tick: 1000 rows per second. An unknown value is null.
+/// Values of the log in columns of the same length. Each row is one tick of the controller, at 1000 rows per second.
+/// An unknown value is null.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub(super) struct LogValues {
     /// Time of each row, s; 0 at the last row.
@@ -130,8 +131,8 @@ pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusO
 ///
 /// The agent accepts one request for the log at a time.
 ///
-/// The log has up to 160 kB. Its transfer takes about 40 s at 115,200 Bd. Meanwhile, the flight recorder pauses, and the
-/// arm may move.
+/// The log has up to 160 kB, and its transfer takes about 40 s at 115,200 Bd. During the transfer, the flight
+/// recorder does not record, but the arm can move.
 #[utoipa::path(
     get,
     path = "/api/log",
@@ -182,7 +183,8 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the flight recorder log and converts it with `make`. Only operators may do this, one request at a time.
+/// Reads the flight recorder log and converts it with `make`. Only an operator may read the log, and only one request
+/// is served at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
@@ -195,7 +197,7 @@ async fn from_log<T: Send + 'static>(
         let next = "send the request again after some seconds";
         Problem::new("busy", "another client is reading the log of the flight recorder", next)
     })?;
-    // A separate client reads the log, so that other queries to the controller do not wait for it.
+    // A separate client of the serial line reads the log, so that other queries to the controller do not wait for it.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = HttpSession::new(&agent.line, introduction);

@@ -17,7 +17,7 @@ use super::commands::SpeedObject;
 use super::error::Denials;
 use crate::owner::ClientPort;
 
-/// Nodes whose errors to clear.
+/// Nodes whose errors are to be cleared.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ClearRequest {
@@ -64,10 +64,10 @@ fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     Ok(mask)
 }
 
-/// Clears the errors of the controller and of all drives, or of the named drives.
+/// Clears the errors of the controller and of all drives, or of selected nodes.
 ///
-/// For all drives this includes the errors that have occurred before. For named drives it covers their current errors
-/// and those of the controller itself.
+/// Without selected nodes, the agent also clears the list of occurred errors. With selected nodes, it clears only the
+/// current errors of these nodes and of the controller itself.
 #[utoipa::path(
     post,
     path = "/api/clear",

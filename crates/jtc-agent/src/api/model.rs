@@ -17,7 +17,7 @@ use super::identity::Identity;
 pub(super) enum ModelSource {
     /// Arm in use by the controller.
     Controller,
-    /// Arm of the agent: the controller cannot be asked for its own, or has not answered yet.
+    /// Arm of the agent, because the controller cannot return its own arm or has not answered yet.
     Agent,
 }
 
@@ -26,7 +26,7 @@ pub(super) enum ModelSource {
 pub(super) struct ModelObject {
     /// Name of the arm.
     pub name: String,
-    /// Hash of all parameters that decide how the arm moves; missing if the agent's arm lacks one of them.
+    /// Hash of all parameters that determine how the arm moves; missing if the agent's arm lacks one of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hash: Option<String>,
     /// Source of the arm.

@@ -24,7 +24,8 @@ pub struct StatusObject {
     /// Reason why the port was lost; missing while it is available.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost: Option<String>,
-    /// Age of the last status, ms; missing before the first one. Values of an old status are not current.
+    /// Age of the last status, ms; missing before the first status. At a high age, the values of the status are not
+    /// current.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_ms: Option<u64>,
     /// Content of the last status; missing before the first one.
@@ -56,7 +57,7 @@ pub struct ControllerObject {
     pub point: u32,
     /// Current errors.
     pub errors: Vec<String>,
-    /// Codes of these errors, in the same order, for `GET /api/explain/{code}`.
+    /// Codes of the current errors, in the order of `errors`, for `GET /api/explain/{code}`.
     pub error_codes: Vec<String>,
     /// Causes of the errors, the most specific first, each with its joint. The causes include the errors of the drives.
     /// `GET /api/explain/{code}` accepts these texts.
@@ -68,7 +69,7 @@ pub struct ControllerObject {
     /// trajectory until the drives of these joints are reset.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub encoder_jumped: Vec<u8>,
-    /// Errors that have occurred since they were last cleared.
+    /// Errors that have occurred since the list of occurred errors was last cleared.
     pub errors_occurred: Vec<String>,
     /// Commanded joint positions, rad, from the base. Missing unless the controller executes a trajectory that was sent
     /// through the agent.
@@ -103,7 +104,7 @@ pub struct JointObject {
     pub temperature_c: Option<u8>,
     /// Errors of this joint that the controller has detected.
     pub errors: Vec<String>,
-    /// Codes of these errors, in the same order, for `GET /api/explain/{code}`.
+    /// Codes of the errors of this joint, in the order of `errors`, for `GET /api/explain/{code}`.
     pub error_codes: Vec<String>,
 }
 

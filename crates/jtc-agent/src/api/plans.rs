@@ -38,16 +38,16 @@ pub(super) struct PlanRequest {
     /// `true` if the angles are in degrees.
     #[serde(default)]
     pub degrees: bool,
-    /// Largest distance from a waypoint for rounding its corner, rad. The joint that is furthest from the waypoint counts.
-    /// 0: the arm stops at each waypoint.
+    /// Size of a rounded corner, rad: the path leaves the straight legs only within this distance from the waypoint.
+    /// The distance is that of the joint that is furthest from the waypoint. 0: the arm stops at each waypoint.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_rad: f64,
     /// `true`: the flange moves on a straight line on each leg for which the waypoints do not specify the type of path.
     #[serde(default)]
     pub line: bool,
-    /// Largest distance from a waypoint for rounding the corner between two lines or arcs, m. 0: the arm stops at the
-    /// waypoint.
+    /// Size of a rounded corner between two lines or arcs, m: the largest distance of the flange from the waypoint in
+    /// the corner. 0: the arm stops at the waypoint.
     #[serde(default)]
     #[schema(minimum = 0)]
     pub blend_m: f64,
@@ -55,15 +55,15 @@ pub(super) struct PlanRequest {
     #[serde(default = "hundred")]
     #[schema(minimum = 1, maximum = 100)]
     pub speed_percent: f64,
-    /// `true`: the acceleration may change within 20 ms instead of 100 ms. The motion is faster, and harder on gears and
-    /// load.
+    /// `true`: the acceleration may change within 20 ms instead of 100 ms. The motion is faster, and stresses gears
+    /// and payload more.
     #[serde(default)]
     pub no_jerk_limit: bool,
     /// Torque margin for masses and friction that the model does not know, % of each limit.
     #[serde(default = "margin")]
     #[schema(minimum = 0, maximum = 50)]
     pub margin_percent: f64,
-    /// Lowest bearing temperature of a run, °C; cold bearings need more torque.
+    /// Lowest bearing temperature that is expected during a run, °C; cold bearings need more torque.
     #[serde(default = "cold")]
     #[schema(minimum = -40, maximum = 120)]
     pub temperature_c: f64,
@@ -82,7 +82,7 @@ pub(super) struct KeepRequest {
     /// Number of the trajectory; it replaces a trajectory with the same number.
     #[schema(minimum = 1, maximum = 99)]
     pub number: u16,
-    /// Name for people: the first 64 characters.
+    /// Name of the trajectory for users. The agent uses the first 64 characters.
     pub name: String,
     /// `true`: refuse the plan if the number is taken, and replace nothing.
     #[serde(default)]
@@ -122,13 +122,13 @@ pub(super) struct PlanObject {
     /// Smallest torque margin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin: Option<MarginObject>,
-    /// Changes and hints in words.
+    /// Notes for the user, for example about options that have no effect.
     pub notes: Vec<String>,
     /// Warnings, which do not prevent a run; a torque margin below 10 % is one of them.
     pub warnings: Vec<String>,
     /// Trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`.
     pub text: String,
-    /// Kept trajectory, if it was requested.
+    /// Trajectory that the agent has stored; missing if the request did not ask for this.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<TrajectoryObject>,
 }
@@ -161,7 +161,7 @@ pub(super) struct MarginObject {
     pub percent: f64,
     /// Number of the joint with the smallest margin, 1 to 6 from the base.
     pub joint: u8,
-    /// Time, s from the start.
+    /// Time of the smallest margin, s from the start.
     pub time_s: f64,
     /// Torque of the model at that time, N·m.
     pub torque_nm: f64,
@@ -191,7 +191,7 @@ pub(super) struct JointPlan {
     pub velocity_peak_rad_s: f64,
     /// Largest absolute acceleration, rad/s².
     pub acceleration_peak_rad_s2: f64,
-    /// Largest absolute torque by the model, N·m.
+    /// Largest absolute torque that the model predicts, N·m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_peak_nm: Option<f64>,
 }

@@ -25,7 +25,7 @@ pub(super) struct InfoObject {
     pub board: String,
     /// Name of the arm in use.
     pub arm: String,
-    /// Hash of all parameters that decide how the arm moves.
+    /// Hash of all parameters that determine how the arm moves.
     pub hash: String,
     /// Parameters that the controller has not received.
     pub missing: Vec<String>,

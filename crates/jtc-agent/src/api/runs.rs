@@ -29,7 +29,8 @@ pub(super) struct RunRequest {
     /// Number of the trajectory.
     #[schema(minimum = 1, maximum = 99)]
     pub trajectory: u16,
-    /// Digest of the trajectory that the client saw. The agent refuses the run if the number now has another trajectory.
+    /// Digest of the trajectory that the client saw. The agent refuses the run if another trajectory is now stored
+    /// under the number.
     #[serde(default)]
     pub digest: Option<String>,
     /// `true`: if the arm is not at the first point, move it there before the run. The speed of this approach is
@@ -53,7 +54,7 @@ pub(super) struct RunRequest {
     pub accept_device_limits: bool,
 }
 
-/// Move from the current position to one of the three targets.
+/// Move from the current position to one of three targets: joint positions, a named pose, or a pose of the flange.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MoveRequest {
@@ -102,7 +103,7 @@ fn one() -> u32 {
     1
 }
 
-/// Job: a request that continues after its answer.
+/// Job: work of the agent that continues after the answer to its request.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub(super) struct JobObject {
     /// Number of the job.
@@ -332,7 +333,8 @@ fn begin(
     let job = agent.jobs.begin(&http_session, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
-            // If the job failed and the arm may still move, the policy from the start of the motion stays valid.
+            // If the job failed and the arm may still move, the policy of this run stays valid. Otherwise, the
+            // client's own policy applies again.
             if error.is_none() || !line.may_move(now) {
                 line.set_policy(client, own);
             }

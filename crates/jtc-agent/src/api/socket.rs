@@ -70,8 +70,8 @@ pub enum Notice {
         /// Reason why the request was refused.
         why: String,
     },
-    /// Stop or Pause of the arm. Earlier requests of the client no longer move the arm, until the client sends a new
-    /// request: `{"asked_after": number}`.
+    /// Stop or Pause of the arm. The agent refuses earlier motion requests of the client. For a new motion, the
+    /// client first sends `{"asked_after": number}` with the number of this Stop or Pause.
     Halted {
         /// Number of this Stop or Pause.
         number: u64,
@@ -101,7 +101,7 @@ impl Notice {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Wish {
     Lease(LeaseWish),
-    /// Number of the last Stop or Pause that the client knew when it decided to send its next frames.
+    /// Number of the last Stop or Pause that the client knew when its user requested the next motion.
     AskedAfter(u64),
 }
 
@@ -179,8 +179,8 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
-    // After a delay of this computer, the agent does not make up for missed pings, so the delay does not count as
-    // silence of the client.
+    // If this computer was delayed, the agent does not send the missed pings later. The delay therefore does not
+    // count as silence of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut silent = 0;
     // The agent assumes that a new client knows all Stops and Pauses before its connection.

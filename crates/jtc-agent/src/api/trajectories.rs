@@ -27,7 +27,7 @@ const POINTS_MAX: usize = 2000;
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TrajectoryRequest {
-    /// Name for people: the first 64 characters.
+    /// Name of the trajectory for users. The agent uses the first 64 characters.
     pub name: String,
     /// Text of a file in a format that `jtc traj run` accepts: CSV with a time column and joints, JSON, or a ROS
     /// JointTrajectory. Recordings are not possible.
@@ -83,7 +83,7 @@ pub(super) struct PlaceRequest {
     new: bool,
 }
 
-/// Amount of points to show.
+/// Number of points to return.
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]

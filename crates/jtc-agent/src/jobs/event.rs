@@ -68,7 +68,7 @@ pub enum ArmEvent {
         job: u64,
         /// `approach` or `motion`.
         phase: String,
-        /// Number of segments that the controller has.
+        /// Number of segments that the controller has confirmed.
         segments_done: usize,
         /// Number of segments of the motion.
         segments: usize,
@@ -81,7 +81,7 @@ pub enum ArmEvent {
         phase: String,
         /// Duration of the upload, s.
         time_s: f64,
-        /// Number of bytes on the line.
+        /// Number of bytes of all segments.
         bytes: usize,
         /// Number of repeated segments.
         retries: u32,

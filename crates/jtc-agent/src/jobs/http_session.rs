@@ -150,7 +150,7 @@ impl HttpSession {
             // The session becomes free before the caller receives the result. The caller can therefore send its next
             // request at once.
             drop(turn);
-            // The function has run, even if the caller has disconnected.
+            // The function has already run. If the caller has disconnected, the result is dropped.
             let _ = done.send(came);
         });
         self.work.try_send(work).map_err(|_| Unable::Gone)?;
@@ -210,7 +210,7 @@ impl HttpSession {
     fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), Problem>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        // `motion_ended` takes this lock too, so a request for one motion never reaches the next motion.
+        // `motion_ended` takes the lock that is held here, so a request for one motion never reaches the next motion.
         let (_, wishes) = job.as_ref().filter(|_| self.is_moving())?;
         wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }

@@ -12,7 +12,7 @@ use crate::owner::ClientPort;
 pub struct Given {
     /// Number of controller settings that have changed.
     pub settings: usize,
-    /// `true` if the controller has stored the name of the arm.
+    /// `true` if the controller has confirmed the name of the arm.
     pub named: bool,
     /// Reports of the parameters (friction, gains, model) that the controller has confirmed.
     pub parts: Vec<PushReport>,

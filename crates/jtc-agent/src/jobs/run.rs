@@ -35,8 +35,8 @@ pub struct Order {
     pub speed_percent: Option<f64>,
     /// Number of runs of the trajectory.
     pub repeat: u32,
-    /// `true` if the user confirms that the limits of a controller without extensions are safe. These limits differ
-    /// from the limits of the agent's arm.
+    /// `true` if the user confirms that the limits of a controller without extensions are safe. Such a controller
+    /// cannot report its limits, so they may differ from the limits of the agent's arm.
     pub accept_device_limits: bool,
 }
 
@@ -148,7 +148,7 @@ struct RunJob<'a> {
     done: &'a mut Done,
     /// Statistics of the connection at the end of the previous motion.
     link: LinkStatistics,
-    /// Progress of the upload that the job last reported, in tenths.
+    /// Last reported progress of the upload, in tenths.
     upload_shown: usize,
     /// Start time of the motion, since 1970.
     began: Duration,
@@ -169,8 +169,8 @@ impl Observer<ClientPort> for RunJob<'_> {
         before_motion(self.task, &error)
     }
 
-    /// A Stop before the start of the motion also cancels the run, because the person who stops the arm expects it to
-    /// stay at rest.
+    /// A Stop before the start of the motion also cancels the run. The person who stops the arm expects that it stays
+    /// at rest.
     fn is_cancelled(&mut self) -> bool {
         self.task.is_halted()
     }

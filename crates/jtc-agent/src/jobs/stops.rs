@@ -115,7 +115,8 @@ mod tests {
         stops.told(next, second(3), Some(reactions));
         assert_eq!(stops.begins(&held), None, "its cause is known");
         assert_eq!(stops.cause(&held, second(4)), Some((cause, 1500)));
-        // `begins` has not processed this status yet. The status shows no held stop, so `cause` returns no cause.
+        // `begins` has not processed the new status yet, so the old cause is still stored. `cause` nevertheless
+        // returns no cause, because the status shows no held stop.
         assert_eq!(stops.cause(&free, second(4)), None);
         assert_eq!(stops.begins(&free), None);
         assert_eq!(stops.jumped(&free), 0b100, "it lasts beyond the held stop");

@@ -12,7 +12,8 @@ use super::{
 };
 
 impl SharedLine {
-    /// Returns the time of the next call of [`to_device`](Self::to_device), if no other event occurs before.
+    /// Returns the time at which [`to_device`](Self::to_device) must be called again, if no other event occurs
+    /// before.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         let waits = self.clients.values().any(|client| !client.waiting.is_empty());
         let line = match self.tx_queue.due(now) {
@@ -207,8 +208,8 @@ impl SharedLine {
     /// requested the Stop.
     fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
         let arrived = response.status == FrameStatus::NoError;
-        // Response records arrive in the order of the frames. If an earlier frame still has no response record, its
-        // record was therefore lost or damaged.
+        // Response records arrive in the order of the frames. The record for a later frame therefore shows that the
+        // missing records of earlier frames were lost or damaged.
         let at = self.sent.iter().position(|sent| {
             if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
         });

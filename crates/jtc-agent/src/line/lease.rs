@@ -38,8 +38,8 @@ pub enum Denied {
     /// The client is a viewer: it may only read and stop.
     #[error("this client can only read and stop: commands need the operator's token")]
     Viewer,
-    /// A client stopped or paused the arm after the request, or another client did so shortly before the request
-    /// (hold-off).
+    /// A client stopped or paused the arm after the request was made. The request is also refused during the hold-off
+    /// after a Stop or Pause of another client.
     #[error(
         "{by} has stopped the arm: earlier requests were discarded, and motion requests are refused for 3 s"
     )]

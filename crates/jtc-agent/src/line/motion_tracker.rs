@@ -1,5 +1,5 @@
-//! Motion tracker, which determines from frames and statuses whether the arm may move. The tracker also repeats the frame that ends
-//! Teaching until the controller confirms it.
+//! Motion tracker, which determines from frames and statuses whether the arm is possibly in motion. The tracker also
+//! repeats the frame that ends Teaching until the controller confirms it.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
@@ -7,19 +7,19 @@ use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
 use super::Moves;
 use super::frame_class::HostFrame;
 
-/// Time within which the statuses show that a frame has begun a motion. A status that is older than this time is
+/// Longest time until the statuses show that a frame has begun a motion. Statuses that are older than this time are
 /// ignored.
 const SHOWS: Duration = Duration::from_secs(1);
-/// Time after an upload within which a start of the uploaded motion is expected.
+/// Longest expected time from an upload to the start of the uploaded motion.
 const FOLLOWS: Duration = Duration::from_secs(5);
 /// Interval at which the frame that ends Teaching is repeated until the controller confirms it.
 const AGAIN: Duration = Duration::from_millis(250);
 
 #[derive(Debug, Default)]
 pub(super) struct MotionTracker {
-    /// Time of the last frame that may begin a motion.
+    /// Time at which a frame that may begin a motion was last sent.
     begun_at: Option<Duration>,
-    /// Time of the last segment of a trajectory.
+    /// Time at which a segment of a trajectory was last sent.
     uploaded_at: Option<Duration>,
     /// `true` after a client requested Teaching. Teaching can start seconds later, when position hold begins. Before Teaching
     /// starts, no status shows that Teaching was requested.
@@ -53,7 +53,8 @@ impl MotionTracker {
         self.teaches || self.begun_at.is_some_and(shown) || !rests
     }
 
-    /// Returns the cause of the present or next motion. If no recent status shows the cause, returns `before`.
+    /// Returns the cause of the present or next motion. If no recent status exists, the previous cause `before` stays
+    /// valid, unless it was an upload.
     pub(super) fn what(
         &self,
         status: Option<&(Duration, Status)>,

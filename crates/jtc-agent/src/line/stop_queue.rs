@@ -8,8 +8,8 @@ use jtc_wire::{ExecCommand, Response, STATUS_LEN, fixed};
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Time after which a Stop or Pause without a response record is sent again. The queue adds the time that three
-/// statuses need on the serial line.
+/// Time after which a Stop or Pause without a response record is sent again. The time that three statuses need on the
+/// serial line is added to this value.
 const AWAITED: Duration = Duration::from_millis(150);
 /// Number of times that a Stop or Pause is sent at the interval [`AWAITED`].
 const TRIES: u32 = 20;

@@ -11,15 +11,16 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::frame_class::HostFrame;
 
-/// Largest number of bytes that are queued in the operating system: the limit of 256 (J-05) minus a margin. Each delay
-/// of the operating system can make the serial line up to one byte later than estimated.
+/// Largest number of bytes that are queued in the operating system: the limit of 256 (J-05) minus a margin. Each
+/// delay of the operating system can shift the transmission by up to one byte time, so more bytes can be queued than
+/// estimated.
 const AHEAD: usize = 250;
 /// Silence after an aborted frame: 5 ms (J-03), plus a margin because USB adapters may shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
 /// Longest remainder of a frame that is still sent before a Stop, in bytes. Sending such a remainder takes at most as
 /// long as the gap.
 const SHORT: usize = 64;
-/// Smallest number of bytes of a longer frame that are written in one step.
+/// Length of the pieces in which a longer frame is written; a piece can be longer, but not shorter.
 const PIECE: usize = 64;
 
 /// Frame for the controller.
@@ -105,8 +106,8 @@ impl TxQueue {
             return Some(self.silent_until);
         }
         if let Some(urgent) = &self.urgent {
-            // An urgent frame can abort the current frame at the time when the queue could otherwise write the next
-            // piece of that frame.
+            // An urgent frame is due as soon as the queue has space for this frame and for the rest of the current
+            // frame. A long rest counts only as one piece, because the urgent frame then aborts the current frame.
             let needed =
                 urgent.frame.bytes.len() + self.rest().filter(|rest| *rest <= SHORT).unwrap_or(PIECE);
             let ahead = AHEAD.saturating_sub(needed);
@@ -134,8 +135,8 @@ impl TxQueue {
                 passed.extend(self.writing.take().map(|writing| Passed::Abandoned(writing.outgoing)));
                 return (bytes, passed);
             }
-            // The urgent frame is written as soon as it and the remainder of the current frame fit within the limit
-            // of queued bytes. It would not arrive sooner if it were written earlier.
+            // The urgent frame is written as soon as the rest of the current frame and the urgent frame together fit
+            // within the limit of queued bytes. The urgent frame would not arrive sooner if it were written earlier.
             let needed =
                 self.urgent.as_ref().map_or(0, |urgent| urgent.frame.bytes.len()) + rest.unwrap_or(0);
             if queued == 0 || needed <= room {
@@ -169,8 +170,8 @@ impl TxQueue {
         (bytes, passed)
     }
 
-    /// Records that the operating system accepted the bytes only now. A serial line that was idle therefore began to
-    /// send later than estimated, and will also be free later.
+    /// Records that the operating system accepted the bytes only now, later than the queue assumed. If the serial
+    /// line was idle, it also began to send later, so it becomes free later than estimated.
     pub(super) fn handed_over(&mut self, now: Duration) {
         if let Some(begins_at) = self.begins_at.take() {
             self.free_at += now.saturating_sub(begins_at);

@@ -96,8 +96,8 @@ impl SharedLine {
         }
     }
 
-    /// Returns the last will with the policy of the present or last lease holder. A stronger command that the
-    /// controller has not confirmed yet replaces this policy.
+    /// Returns the last will, with the policy of the present or last lease holder. If the controller has not yet
+    /// confirmed a Stop or Pause that is stronger than this policy, the last will contains that command instead.
     fn will_of(&self, what: Moves) -> Will {
         let holder = self.lease.as_ref().and_then(|lease| self.introduction(lease.holder));
         let (client, policy) =

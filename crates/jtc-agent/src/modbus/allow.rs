@@ -20,7 +20,8 @@ impl Network {
     pub fn contains(&self, address: IpAddr) -> bool {
         let (own, other) = (number(self.address), number(address.to_canonical()));
         let left = own.1 - u32::from(self.bits);
-        // If `left` is the full number of bits of an address, `checked_shr` returns `None`.
+        // If the network contains all addresses (`/0`), `left` is the full number of bits of an address, and
+        // `checked_shr` returns `None`.
         own.1 == other.1 && own.0.checked_shr(left).unwrap_or(0) == other.0.checked_shr(left).unwrap_or(0)
     }
 }

@@ -42,9 +42,11 @@ impl Device for Sixteen {
     }
 }
 
-/// Simulates a connection that sends the bytes `data`. Checks that each request receives one response with its
-/// transaction number and a permitted length, and that the response shows whether the device executed the request.
-/// Also checks that a refused request writes nothing, and that written values can be read back.
+/// Simulates a connection that sends the bytes `data`, and checks the responses:
+///
+/// - each request receives one response with its transaction number and a permitted length;
+/// - the response shows whether the device executed the request;
+/// - a refused request writes nothing, and written values can be read back.
 ///
 /// # Panics
 ///

@@ -83,20 +83,20 @@ impl View {
         self.status(f32::NAN, known).to_bits()
     }
 
-    /// Returns a number about the cause of the current held stop; 0 if no held stop is active, or if its cause is not
-    /// known.
+    /// Returns the number that `read` takes from the cause of the current held stop. Returns 0 if no held stop is
+    /// active, or if its cause is not known.
     fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
         self.stop.as_ref().map_or(0, |(cause, _)| read(cause))
     }
 
-    /// Returns the bits of a value or limit that belongs to the cause of a held stop. Returns NaN if the cause has no
-    /// value or limit.
+    /// Returns the bits of the value or limit that `read` selects from the cause of a held stop. Returns NaN if the
+    /// cause is not known, or has no value or limit.
     fn figure(&self, read: impl FnOnce((Option<f32>, Option<f32>)) -> Option<f32>) -> u32 {
         let known = self.stop.as_ref().and_then(|(cause, _)| read(held_stop::figures(cause)));
         known.unwrap_or(f32::NAN).to_bits()
     }
 
-    /// Returns a number about the last job; 0 before the first job.
+    /// Returns the number that `read` takes from the last job; 0 before the first job.
     fn job(&self, read: impl FnOnce(&Job) -> u32) -> u32 {
         self.job.as_ref().map_or(0, read)
     }

@@ -180,7 +180,8 @@ fn read_registers(
     Ok([function, (2 * values.len()) as u8].into_iter().chain(bytes).collect())
 }
 
-/// Returns the two words in the data of a request. Returns an error if the data has another length.
+/// Returns the two words in the data of a request. Returns an error if the data does not consist of exactly two
+/// words.
 fn two(rest: &[u8]) -> Result<(u16, u16), Exception> {
     let [a, b, c, d] = rest.try_into().map_err(|_| Exception::Value)?;
     Ok((u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])))
@@ -215,7 +216,8 @@ mod tests {
         answer(pdu, device).0
     }
 
-    /// Requests in the form of the examples in the Modbus standard (V1.1b3, 6.1 to 6.12).
+    /// The responses to the example requests in the Modbus standard (V1.1b3, 6.1 to 6.12) have the form that the
+    /// standard specifies.
     #[test]
     fn requests_are_answered_as_the_standard_has_it() {
         let mut device = Sixteen::default();

@@ -19,8 +19,8 @@ use super::plc::{Connection, Plc};
 
 /// Largest number of PLC connections.
 pub const CONNECTIONS_MAX: usize = 8;
-/// Duration of silence after which the server may close a connection to make room for a new connection. The server
-/// never closes a connection for this reason if it sends commands or its coil holds the arm at rest.
+/// Duration of silence after which the server may close a connection to make room for a new connection. To make room,
+/// the server never closes a connection that sends commands or whose coil holds the arm at rest.
 const GIVES_WAY: Duration = Duration::from_secs(2);
 /// Duration of silence after which the server closes any connection. The duration is longer than the longest watchdog
 /// time.
@@ -236,8 +236,8 @@ mod tests {
     fn whoever_asks_faster_than_it_may_waits() {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
-        // The simulated client sends each request after the answer to its previous request. The first requests form a
-        // burst; the later requests are sent at the limited rate.
+        // The simulated client sends each request as soon as its previous request was answered. The first requests do
+        // not have to wait; the later requests are limited to the permitted rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

@@ -1,4 +1,5 @@
-//! Finds the start and the end of recordings in the statuses. The motions of all clients are therefore recorded.
+//! Finds the start and the end of recordings in the statuses. The statuses show the motions of all clients, so the
+//! recordings contain all motions.
 use std::collections::VecDeque;
 use std::time::Duration;
 

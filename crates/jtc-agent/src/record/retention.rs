@@ -136,7 +136,8 @@ impl Retention {
         let end = self.list.seek(SeekFrom::End(0))?;
         let written = self.list.write_all(format!("{line}\n").as_bytes());
         if written.is_err() {
-            // Even if truncating the list file fails, the list file is still valid.
+            // If truncating the list file also fails, the list file is still valid, because an incomplete line is
+            // ignored when the file is read.
             let _ = self.list.set_len(end);
         }
         written

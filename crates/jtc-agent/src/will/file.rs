@@ -103,8 +103,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Writes the complete file of the last will in one step. From then on, the file is valid even if the agent is
-/// killed. When the disk has stored it, it also survives a loss of power.
+/// Writes the complete file of the last will in one step. After this call, the file is valid even if the agent is
+/// killed. After the disk has stored the file, the file also survives a loss of power.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };

@@ -1,4 +1,5 @@
-//! Keeper that writes and removes the file of a last will. The keeper updates the file as soon as the disk accepts the write.
+//! Keeper that writes and removes the file of a last will. The keeper repeats a failed write until the disk accepts
+//! it.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -258,7 +259,8 @@ mod tests {
         drop(keeper);
         let (keeper, found, _notices) = begin(dir.path());
         let Found::Left(stored) = &found else { panic!("{found:?}") };
-        // The file and its time stay unchanged until `settle` is called, even if the agent ends before that.
+        // The file, including the start time of the motion, stays unchanged until `settle` is called, even if the
+        // agent ends before that.
         drop(keeper);
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());
@@ -308,7 +310,8 @@ mod tests {
         keeper.settle(None, None);
         keeper.witness().see(&moves(Policy::Continue));
         until(dir.path(), "continue", left(Policy::Continue));
-        // After this call, no file can be created at this path. The directory at this path simulates a full disk.
+        // A directory at the path of the new file simulates a full disk: from now on, the keeper cannot create this
+        // file.
         let part = file::path(dir.path(), PORT).with_extension("part");
         std::fs::create_dir(&part).expect("a folder");
         keeper.witness().see(&moves(Policy::Stop));

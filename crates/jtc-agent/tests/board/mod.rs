@@ -38,7 +38,7 @@ pub(crate) struct Board {
     pub status: Status,
     /// Number of bytes that will arrive damaged, beginning with the next byte.
     pub damaged: usize,
-    /// Time until which the board sends no status.
+    /// Time until which the statuses of the board are lost.
     pub deaf_until: Duration,
     /// Type of the frames that the board refuses.
     pub refuses: Option<FrameType>,

@@ -66,7 +66,7 @@ pub(super) fn services() -> Vec<Service<'static>> {
     vec![service(STOP, "stop"), service(PAUSE, "pause")]
 }
 
-/// Channel of a subscription, and `true` if the constant data of this channel must still be sent.
+/// Subscription of a client. `latched` is `true` if the constant data of the channel must still be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Subscribed {
     channel: u32,

@@ -217,12 +217,13 @@ struct SentObject {
     halt: u64,
 }
 
-/// Stops the control loops of all boards ahead of all other frames, then their applications.
+/// Stops the control loops of all boards, then their applications. The frames of the Stop are sent before all other
+/// frames.
 ///
 /// No lease is needed.
 ///
-/// A running update continues, because a board with partly written flash would not work afterwards. All other requests
-/// end.
+/// A running update continues, because a board with partly written flash would not work afterwards. All other
+/// requests end.
 #[utoipa::path(
     post,
     path = "/api/stop",
@@ -234,7 +235,8 @@ struct SentObject {
     )
 )]
 async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
-    // The identity of the client affects only the later requests of this client.
+    // The identity of the client sets the name that is reported. It also determines the client to which the hold-off
+    // after this Stop does not apply.
     let client = match asker.caller.role {
         Role::Operator => agent.client(&asker).ok(),
         Role::Viewer => None,

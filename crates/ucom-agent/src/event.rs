@@ -23,11 +23,12 @@ pub enum ChainEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         holder: Option<String>,
     },
-    /// Stop of all boards: its frames are on the bus.
+    /// Request of a client to stop all boards. The frames of this Stop are sent before all other frames.
     Halt {
         /// Name of the client that requested it.
         by: String,
-        /// Number of Stops within 0.1 s up to this Stop; missing: a single Stop.
+        /// Number of Stops that this event reports together, because they followed within 0.1 s; missing: a single
+        /// Stop.
         #[serde(skip_serializing_if = "Option::is_none")]
         times: Option<u64>,
     },
@@ -35,7 +36,8 @@ pub enum ChainEvent {
     Stopped {
         /// Numbers of the boards that have confirmed the Stop.
         boards: Vec<u8>,
-        /// Boards that may still run, each with the reason. This includes boards that ran and do not answer now.
+        /// Boards that possibly still run, each with the reason. These include boards that ran before and do not
+        /// answer now.
         not_stopped: Vec<String>,
     },
     /// Change of a board's heartbeats.
@@ -112,11 +114,11 @@ pub enum ChainEvent {
         boards: Vec<u8>,
         /// Number of the attempt.
         attempt: u32,
-        /// Cycle; 1: checked, 2: written.
+        /// Cycle of the update. In cycle 1 the boards check the image; in cycle 2 they write it.
         cycle: u32,
-        /// Number of accepted bytes of both cycles.
+        /// Number of bytes, of both cycles, that the boards have confirmed in this attempt.
         bytes: u64,
-        /// Number of bytes of both cycles.
+        /// Number of bytes that the agent sends in both cycles.
         total: u64,
     },
     /// End of a job.

@@ -27,8 +27,8 @@ pub struct Config {
     pub signals: SignalTable,
     /// Cache for the signal names of the boards.
     pub cache: Cache,
-    /// List of the clean-up steps that would be missing if the process ended now. The code that ends the process
-    /// prints this list.
+    /// Clean-up steps that would remain undone if the process ended now. The code that ends the process prints these
+    /// steps.
     pub cleanup: CleanupList,
     /// Inventory file that contains records of the images that updates wrote. If `None`, the agent keeps records of written images
     /// only while it runs.

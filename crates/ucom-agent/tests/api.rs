@@ -451,7 +451,8 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
     served.run(&key, &[1]);
     let kept = || std::fs::read_dir(dir.path()).expect("a directory").flatten().next();
     until("the names of board 1 on the disk", || kept().is_some());
-    // The test replaces the names file of the other board by a pipe. Opening the pipe blocks.
+    // The test replaces the names file of board 2 by a pipe. Opening the pipe blocks, like a disk that does not
+    // respond.
     let name = kept().expect("a file").file_name().into_string().expect("a name");
     let date = name.split('-').nth(2).expect("a date");
     let board = served.board(2);

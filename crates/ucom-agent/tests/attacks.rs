@@ -164,7 +164,7 @@ fn images_are_read_of_who_commands_alone_and_two_at_once() {
     assert_eq!(third.join().expect("it is answered"), 422);
 }
 
-/// A client may send any number of Stops. Many Stops do not fill the bus or the event list.
+/// A client can send any number of Stops. Even many Stops do not fill the bus or the event list.
 #[test]
 fn stops_without_end_are_counted_and_sent_together() {
     let served = Served::start(1);

@@ -1,5 +1,5 @@
-//! Tests with clients that use up all connections of the agent. They are a separate program because they open as many
-//! connections as a process may open.
+//! Tests with clients that use up all connections of the agent. These tests are a separate program, because they open
+//! as many connections as a process may open.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

@@ -89,7 +89,8 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
         json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true }).to_string();
     let late = [("POST /api/run", &run), ("POST /api/updates", &update)]
         .map(|(request, body)| (begin(&served, request, &key, body), body));
-    // The agent also refuses a request after the client's own Stop, although this Stop causes no hold-off.
+    // The agent also refuses a request that is older than the client's own Stop, although this Stop causes no
+    // hold-off.
     stop(&served, Some(&key));
     let last = served.last_event();
     for (socket, body) in late {

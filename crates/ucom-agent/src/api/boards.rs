@@ -27,7 +27,7 @@ pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Proble
     }
 }
 
-/// Returns the boards as last seen.
+/// Returns the last known state of all boards.
 ///
 /// The agent asks the boards at its start, during a scan, and whenever a request involves them.
 #[utoipa::path(
@@ -40,7 +40,7 @@ pub(super) async fn boards(State(agent): State<Agent>) -> Json<Vec<BoardObject>>
     Json(BoardObject::all(&agent.shared.snapshot()))
 }
 
-/// Returns one board as last seen.
+/// Returns the last known state of one board.
 #[utoipa::path(
     get,
     path = "/api/boards/{number}",

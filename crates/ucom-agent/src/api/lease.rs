@@ -17,7 +17,7 @@ use crate::event::Policy;
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LeaseRequest {
-    /// Name of the client for people: the first 64 characters.
+    /// Name of the client for users. The agent uses the first 64 characters.
     name: String,
     /// Time without a request of this client after which the lease lapses, s.
     #[serde(default = "default_lasts_s")]
@@ -36,7 +36,7 @@ pub(super) struct LeaseRequest {
 pub(super) struct LeaseGrant {
     /// Secret key, which this client sends with each request in the header `Lease-Key`.
     key: String,
-    /// `true` if the client holds the lease; otherwise it waits until the holder releases it.
+    /// `true` if the client holds the lease; `false` if it waits until the lease holder releases the lease.
     held: bool,
     /// Time without a request after which the lease lapses, s.
     lasts_s: f64,

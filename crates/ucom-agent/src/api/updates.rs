@@ -66,9 +66,10 @@ pub(super) struct UpdateRequest {
     boards: Vec<TargetRequest>,
     /// Image, as base64.
     image: String,
-    /// Image of the other cycle, as base64, if the profile's plan sends two images.
+    /// Second image, as base64; needed only if the plan of the profile sends a different image in each cycle.
     second: Option<String>,
-    /// Format of the images; missing: detected from their content. Text and records are never read as raw bytes.
+    /// Format of the images; missing: detected from their content. A text or a file with records is never accepted as
+    /// raw bytes.
     format: Option<ImageFormat>,
     /// Unit of the addresses in the images; missing: detected from their records.
     addresses: Option<Unit>,

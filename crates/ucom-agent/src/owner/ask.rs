@@ -26,8 +26,8 @@ const QUESTIONS_MAX: usize = 8;
 pub(super) type Queue = host_kit::owner::Queue<Worker, Tag>;
 type Place<'a> = host_kit::owner::Place<'a, Worker, Tag>;
 
-/// Request of the lease holder. Before the owner executes the request, a client may send a Stop, or another client may take the
-/// lease.
+/// Request of the lease holder. The data show whether a Stop or another lease holder came before the execution of the
+/// request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Asked {
     pub client: ClientId,
@@ -83,8 +83,8 @@ impl Shared {
         worker: Result<&'a mut Worker, Refused>,
         asked: Option<Asked>,
     ) -> Result<&'a mut Worker, Problem> {
-        // If the request is refused here, this thread may already hold the lock of the leases. The lock is therefore
-        // taken only below, where `turn` runs in the owner's thread.
+        // In this case, the thread may already hold the lock of the leases. The lock is therefore taken only after
+        // this check, where `turn` runs in the owner's thread.
         let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),

@@ -1,5 +1,5 @@
-//! Functions that the bus session calls for the agent. They publish snapshots and events of the bus, even during a
-//! procedure.
+//! Functions that the bus session calls for the agent. These functions publish snapshots and events of the bus even
+//! while a procedure runs.
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -31,7 +31,8 @@ type Step = (u64, Vec<u8>, u32, u32);
 /// State of the owner's thread that is also accessible during a procedure.
 #[derive(Default)]
 pub(super) struct Local {
-    /// Boards that returned no names to a request without the lease, each with the time and the reason.
+    /// Boards that did not return the names of their values to a request without the lease. Each entry contains the
+    /// time and the reason.
     pub nameless: BTreeMap<u8, (Instant, Problem)>,
     pub states: BTreeMap<u8, &'static str>,
     /// Number of Stops whose frames were sent. `halted_us` is the time of the last of them.

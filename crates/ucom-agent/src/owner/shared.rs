@@ -136,8 +136,8 @@ impl Shared {
             }
         };
         let number = {
-            // The Stop counter and the requester change under one lock, so that a thread never reads the number of
-            // one Stop with the requester of another.
+            // The Stop counter and the requester change under one lock. A thread therefore never reads the number of
+            // one Stop together with the requester of another Stop.
             let mut halts = lock(&self.halts);
             halts.add(by, client);
             self.queue.stop_alike(Tag::default(), Box::new(act))
@@ -158,13 +158,13 @@ impl Shared {
         self.queue.has(|tag| tag.moves_for(client))
     }
 
-    /// Creates a request of this client. For a request that may move boards, `after` is the number of the last Stop that the client
-    /// knows.
+    /// Creates a request of this client. For a request that may move boards, `after` is the number of the last Stop
+    /// that the client knows.
     ///
     /// # Errors
     ///
-    /// The request may move boards, and a Stop later than `after` exists, or another client stopped the boards within the
-    /// last 3 s.
+    /// Only for a request that may move boards: a Stop later than `after` exists, or another client stopped the
+    /// boards within the last 3 s.
     pub(crate) fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
         let halts = lock(&self.halts);
         let count = self.queue.stops();

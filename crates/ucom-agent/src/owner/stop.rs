@@ -1,4 +1,4 @@
-//! Check after a Stop: when the stop frames were sent, the agent queries each board.
+//! Check after a Stop: after the frames of the Stop were sent, the agent queries each board.
 use std::collections::BTreeSet;
 
 use ucom::Status;
@@ -9,8 +9,8 @@ use super::Worker;
 use crate::event::ChainEvent;
 
 impl Worker {
-    /// After a Stop, queries each board and stops its application. The check includes all boards that answer,
-    /// and also boards that do not answer but may run.
+    /// After a Stop, queries each board and stops its application. The check includes all boards that answer, and
+    /// also boards that do not answer but possibly run.
     pub(super) fn see_to_stop(&mut self) {
         let was_master = self.driver.master.is_master();
         let mut wanted = self.may_run();
@@ -49,7 +49,7 @@ impl Worker {
         self.settle();
     }
 
-    /// Returns the boards that may run: boards that this agent has started, and boards whose last known state
+    /// Returns the boards that possibly run: boards that this agent has started, and boards whose last known state
     /// was started or running. A board does not run after a reboot.
     fn may_run(&mut self) -> BTreeSet<u8> {
         let (boards, now_us) = (self.driver.master.boards(), self.driver.now_us());

@@ -19,7 +19,8 @@ use crate::snapshot::Values;
 
 /// Longest wait for a frame in one cycle of the bus loop.
 const TURN: Duration = Duration::from_millis(5);
-/// Time for which the agent only listens before its first query. Another PC may be the master of the bus (D-08).
+/// Time for which the agent only listens before its first query, to find out whether another PC is the master of the
+/// bus (D-08).
 const LISTEN: Duration = Duration::from_millis(600);
 /// Time for which requests without the lease do not query a board again after the board returned no names.
 const LEFT_ALONE: Duration = Duration::from_secs(3);
@@ -78,7 +79,8 @@ impl Worker {
             {
                 self.serve_one(turn);
                 self.turn()?;
-                // `rest` must also be called between requests, because queries may arrive without a pause.
+                // `rest` is also called between requests. Otherwise, queries that arrive without a pause would
+                // prevent the end of the heartbeats.
                 self.rest();
             }
             self.rest();
@@ -121,7 +123,8 @@ impl Worker {
         self.local.borrow_mut().job = turn.tag.job;
         turn.run(self);
         self.local.borrow_mut().job = None;
-        // A request that was abandoned or did not begin has not called `settle`.
+        // If a request was abandoned or did not begin, `settle` was not called, so the request is marked as done
+        // here.
         self.shared.queue.done();
     }
 

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 use crate::snapshot::BusSnapshot;
 
-/// Board as last seen.
+/// Last known state of a board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub(crate) struct BoardObject {
     /// Number of the board.
@@ -26,7 +26,7 @@ pub(crate) struct BoardObject {
     pub heartbeat_age_s: Option<f64>,
     /// Names of the status bits that are set.
     pub status: Vec<String>,
-    /// `true` if its outputs were enabled in its last report.
+    /// `true` if the outputs of the board were enabled in its last report.
     pub active: bool,
     /// `true` if it has an application.
     pub application: bool,
@@ -41,7 +41,7 @@ pub(crate) struct BoardObject {
     /// Last error that it has reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_error: Option<String>,
-    /// Number of its frames in the last second.
+    /// Number of frames of this board in the last second.
     pub frames_per_s: u64,
     /// Names of its values; missing until they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -102,7 +102,7 @@ impl BoardObject {
     }
 }
 
-/// Board as it answered.
+/// Board that has answered during a scan or a numbering.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub(crate) struct FoundObject {
     /// Number of the board.
@@ -131,7 +131,7 @@ impl FoundObject {
     }
 }
 
-/// Board as it answered after a command.
+/// State of a board, as the board reports it after a command.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub(crate) struct AnswerObject {
     /// Number of the board.

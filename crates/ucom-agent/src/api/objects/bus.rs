@@ -29,10 +29,10 @@ pub(crate) struct StatusObject {
     pub sent: u64,
     /// Number of frames that do not belong to this protocol.
     pub foreign_frames: u64,
-    /// `true` if this agent sends heartbeats. The agent sends them after a command of the lease holder, and while boards
-    /// that the agent has started are not stopped.
+    /// `true` if this agent sends heartbeats. It sends them after a command of the lease holder, and as long as a
+    /// board that it has started is not stopped.
     pub is_master: bool,
-    /// `true` if another PC commands on this bus.
+    /// `true` if another PC sends commands on this bus.
     pub competing_master: bool,
     /// Board numbers that two boards share, in words.
     pub shared_numbers: Vec<String>,
@@ -69,11 +69,11 @@ pub(crate) struct LeaseObject {
 /// State of this computer's CAN controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub(crate) struct ControllerObject {
-    /// `true` if it is bus-off.
+    /// `true` if the CAN controller is bus-off.
     pub bus_off: bool,
     /// Number of bus-off events.
     pub times_bus_off: u64,
-    /// `true` if it is error passive.
+    /// `true` if the CAN controller is error passive.
     pub passive: bool,
     /// Transmit error counter.
     #[serde(skip_serializing_if = "Option::is_none")]

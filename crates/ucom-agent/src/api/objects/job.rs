@@ -27,8 +27,8 @@ pub(crate) struct UpdatedObject {
     /// Outcome: `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`,
     /// `verified` or `running`.
     pub outcome: String,
-    /// `true` if the board shows Program ID and date of the image, and exactly this image was written to this address, now
-    /// or before. The records of the agent or its inventory show this.
+    /// `true` if the result is verified: the board reports the Program ID and date of the image. In addition, the
+    /// records show that exactly this image was written to this address, in this update or in an earlier one.
     pub verified: bool,
     /// Program ID read back before the update.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,7 +56,7 @@ pub(crate) struct UpdateObject {
     /// Reason why the Program ID is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unverifiable: Option<String>,
-    /// Number of bytes of both cycles.
+    /// Number of bytes that the agent sends in both cycles of the update.
     pub bytes: u64,
     /// Results for each board.
     pub boards: Vec<UpdatedObject>,

@@ -30,7 +30,7 @@ pub enum Role {
 }
 
 /// Largest number of wrong tokens per minute from one address. `ALL_WRONG_MAX` is the limit for all addresses
-/// together. Above a limit, the agent answers a wrong token with "too many".
+/// together. Above a limit, a request with a wrong token is refused as [`Refusal::TooManyWrong`].
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -113,7 +113,7 @@ pub struct Access {
     hosts: Vec<String>,
     /// Origins whose pages have read-only access.
     origins: Vec<String>,
-    /// Address and time of each wrong token.
+    /// Client address and time of each request with a wrong token.
     wrong: Mutex<Vec<(IpAddr, Instant)>>,
 }
 
@@ -382,7 +382,8 @@ mod tests {
             (None, Some("0123456789abcdefghij")),
             (None, Some(operator.as_str())),
         ];
-        // The results stay the same after too many wrong tokens: a Stop from this computer is still accepted.
+        // Too many wrong tokens do not change the results: a Stop from this computer is accepted without a valid
+        // token, and all other requests are refused.
         for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
             for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
                 assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");

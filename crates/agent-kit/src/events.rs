@@ -24,7 +24,7 @@ const WAITING_MAX: usize = 64;
 /// Longest wait of a request for an event, in seconds, if [`WAITING_MAX`] requests are already waiting. This wait
 /// limits the load from clients that repeat their requests immediately.
 const NO_PLACE_S: f64 = 0.25;
-/// Shortest interval between two messages of a stream that are not events.
+/// Shortest interval between two stream messages that contain no events.
 const PERIOD: Duration = Duration::from_millis(40);
 
 /// Selection of events.
@@ -69,7 +69,7 @@ pub struct StreamRequest {
     after: Option<u64>,
 }
 
-/// Message of a stream that every agent sends.
+/// Message in the event stream of every kind of agent.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage<E> {
@@ -126,8 +126,8 @@ impl Events {
         }
     }
 
-    /// Sends events on a WebSocket as they occur, and the messages that `show` returns. `show` also returns the time at
-    /// which it must be called again. If `changes` announces a change, `show` is called earlier. Ends when the client
+    /// Sends events on a WebSocket as they occur, and also the messages that `show` returns. `show` also returns the
+    /// time of its next call; a change that `changes` announces causes an earlier call. Ends when the client
     /// disconnects, does not read, or sends an unexpected message.
     pub async fn stream<E: JournalEvent + Serialize, M: Serialize>(
         &self,

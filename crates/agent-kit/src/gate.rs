@@ -114,7 +114,7 @@ pub fn plain(name: &str) -> String {
 }
 
 impl Caller {
-    /// Checks that the client has the permission to send commands while it holds the lease.
+    /// Checks that the client has the role operator. An operator can send commands while it holds the lease.
     ///
     /// # Errors
     ///
@@ -199,7 +199,7 @@ fn line_of(request: &Request<Body>) -> String {
 }
 
 /// Middleware after [`let_in`]: refuses commands of clients without permission to send commands. The command is
-/// refused before its body is read, so that slow bodies do not occupy the agent.
+/// refused before its body is read, so that a client that sends its body slowly does not keep the agent busy.
 pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     let (method, path) = (request.method(), request.uri().path());
     let commands = !method.is_safe() && !halts(method.as_str(), path);
@@ -253,7 +253,8 @@ fn protocol_token(headers: &HeaderMap) -> Option<&str> {
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // A header that is not valid text is present, but its value becomes "?", which is never a valid value.
+    // If a header exists but is not valid text, its value is read as "?", which is never a valid value. The header is
+    // therefore not treated as missing.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

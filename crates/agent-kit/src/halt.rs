@@ -18,15 +18,15 @@ pub trait Halts {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct KnownHalt {
-    /// Value of `last_halt` in the status that the client used. If a client, also this one, has requested another Stop
-    /// or Pause since then, the agent refuses this request, however late the request arrives. Without this parameter,
-    /// the agent uses the last Stop or Pause before the headers of this request arrived. The agent also refuses the
-    /// request within 3 s after a Stop or Pause of another client.
+    /// Value of `last_halt` in the status that the client used. The agent refuses this request if any client,
+    /// including this one, has requested another Stop or Pause since then. Without this parameter, the agent uses the
+    /// number of the last Stop or Pause before the headers of this request arrived. In both cases, the agent also
+    /// refuses the request within 3 s after a Stop or Pause of another client.
     pub asked_after: Option<u64>,
 }
 
 /// Number of the last Stop or Pause before a motion request. If the client sends no number, the agent uses the number
-/// at the time when the head of the request arrived, because the body may arrive slowly.
+/// at the time when the head of the request arrived. The body may arrive much later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 

@@ -20,7 +20,7 @@ const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
 const LASTS_DEFAULT_S: f64 = 10.0;
 /// Largest number of clients that the agent registers at the same time.
 const CLIENTS_MAX: usize = 32;
-/// Time from the end of the lease of a silent client until the agent removes the client.
+/// Time after which the agent removes a silent client whose lease has ended.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
 /// Returns the default time until a lease without a request lapses, in seconds.
@@ -85,7 +85,7 @@ pub struct Client<P> {
     seen: Duration,
 }
 
-/// Reason why a client may not command.
+/// Reason why a client is not permitted to send commands.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
     /// Another client holds the lease.
@@ -149,7 +149,7 @@ impl From<Denied> for Problem {
 /// Clients of an agent. At most one client holds the lease. All times are measured by the agent's clock.
 pub struct Leases<P> {
     clients: BTreeMap<String, Client<P>>,
-    /// Lease; the key of each client identifies the client.
+    /// Present lease. A client is identified by its key.
     held: Option<Lease<String>>,
     last: u64,
 }
@@ -337,7 +337,8 @@ mod tests {
         );
         assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
         assert!(leases.holds(ClientId(2), s(13)));
-        // A command renews the lease. Without a further command, the lease lapses once.
+        // A command renews the lease. If no further command arrives, `lapse` reports the end of the lease exactly
+        // once.
         assert!(leases.command(Some("bob"), s(13)).is_ok());
         assert_eq!(leases.lapse(s(22)), None);
         assert_eq!(leases.lapse(s(23)).map(|client| client.name), Some("bob".into()));
@@ -366,8 +367,8 @@ mod tests {
         assert!(leases.lapse(s(68)).is_some() && leases.lease().is_none());
     }
 
-    /// If Bob receives the lease from Anna and this lease lapses, `lapse` returns Bob exactly once. This holds for
-    /// all times of Anna's release and of the call of `lapse`.
+    /// If Bob receives the lease from Anna and then his lease lapses, `lapse` returns Bob exactly once. The result
+    /// does not depend on when Anna releases the lease and when `lapse` is called.
     #[test]
     fn who_was_given_the_lease_is_not_forgotten_while_it_has_it() {
         for let_go in 1..=70 {
@@ -385,7 +386,8 @@ mod tests {
                 assert_eq!(leases.lease().map(|lease| lease.holder), had.then(|| "bob".into()), "{let_go}");
                 let lapsed = leases.lapse(s(looked)).map(|client| client.name);
                 assert_eq!(lapsed, had.then(|| "bob".into()), "{let_go}");
-                // The former lease holder may take the lease again, like every other client.
+                // As long as the former lease holder is registered, it can take the lease again like every other
+                // client.
                 let known = leases.clients.contains_key("b");
                 assert!(looked > let_go + 5 || known || !had, "{let_go}");
                 assert_eq!(leases.command(Some("b"), s(looked)).is_ok(), known, "{let_go}");

@@ -40,8 +40,8 @@ pub struct CommandLog {
     repeats: Repeats,
 }
 
-/// Kinds of log lines about motions, Stops and leases. Other kinds use at most half of the queue, so lines of these
-/// kinds are written even when other lines are dropped.
+/// Kinds of log lines about motions, Stops and leases. Lines of all other kinds use at most half of the queue. Lines
+/// of the kinds in this list are therefore written even when other lines are dropped.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
@@ -283,8 +283,8 @@ mod tests {
             };
             (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
             done(&log);
-            // The writer's thread may still process the last of the five lines when the disk gets space again. The
-            // three further lines are written after that line.
+            // The writer's thread may still process the last of the first five lines when the disk gets space again.
+            // The three lines that follow are written after that line.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
             log.lines = None;

@@ -33,7 +33,7 @@ const LASTING: &str = "assets/";
 /// File name extensions of formats that are already compressed.
 const COMPRESSED: [&str; 3] = ["png", "woff2", "ico"];
 
-/// HTTP header that lists the sites that may use a file.
+/// HTTP header that states which sites may use a file.
 const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
 /// Dashboard file, ready to be sent.

@@ -61,7 +61,7 @@ impl Problem {
         Self { failure: self.failure.next(next), ..self }
     }
 
-    /// Sets the facts of the problem.
+    /// Sets the details of the problem: joint, board or point, value and limit.
     pub fn with(self, facts: Facts) -> Self {
         Self { failure: self.failure.with(facts), ..self }
     }
@@ -102,7 +102,8 @@ impl Serialize for Problem {
 struct ErrorObject<'a> {
     /// Short name of the error, for programs.
     code: &'a str,
-    /// Message for people: request, joint, board or point, value and limit.
+    /// Message for people. As far as they apply, it contains the request, the joint, board or point, the value and
+    /// the limit.
     message: &'a str,
     /// Number of a board of a chain.
     #[serde(skip_serializing_if = "Option::is_none")]

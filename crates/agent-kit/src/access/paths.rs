@@ -18,8 +18,8 @@ pub fn halts(method: &str, path: &str) -> bool {
 }
 
 /// Returns `true` if a request with this method and path is served even when only the reserved connections are free.
-/// Such requests are Stop, Pause, and each command that ends an operation of a board or a job. The WebSocket that
-/// `jtc traj stop` uses for its Stop is also such a request.
+/// Such requests are Stop and Pause, and the requests that stop a board, set its outputs or cancel a job. The
+/// WebSocket that `jtc traj stop` uses for its Stop is also served.
 pub fn stops(method: &str, path: &str) -> bool {
     let number = |part: &str| part.parse::<u64>().is_ok();
     let board = path.strip_prefix("/api/boards/").and_then(|rest| rest.split_once('/'));

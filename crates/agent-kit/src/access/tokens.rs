@@ -43,7 +43,7 @@ pub enum TokenError {
         /// Problem in the contents of the token file.
         what: String,
     },
-    /// Failure of the operating system to provide random numbers.
+    /// The operating system provided no random numbers.
     #[error("the operating system provides no random numbers: {0}")]
     Random(getrandom::Error),
 }

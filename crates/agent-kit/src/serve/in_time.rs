@@ -11,9 +11,9 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// Longest time for which a client may read nothing while unread bytes wait. All waits of a connection together may
-/// take this time plus one second for each `TAKES_PER_S` bytes that the client has read. Quick reading does not
-/// extend the time for which a client may read nothing.
+/// Longest time for which a client may leave data unread without reading any byte. All such waits of a connection
+/// together may take this time plus one second for each `TAKES_PER_S` bytes that the client has read. Even for a
+/// client that reads fast, a single wait may not be longer.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 
@@ -78,7 +78,8 @@ impl<S> Taken<S> {
         Self { stream, released, since: None, waited: Duration::ZERO, bytes: 0, timer }
     }
 
-    /// Returns the total waiting time that the client may use for the number of bytes that it has read.
+    /// Returns the longest total waiting time of this connection, which increases with the number of bytes that the
+    /// client has read.
     fn patience(&self) -> Duration {
         TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
     }
@@ -225,7 +226,7 @@ mod tests {
         });
     }
 
-    /// A WebSocket may be silent for any time.
+    /// The server does not close a WebSocket that is silent for a long time.
     #[test]
     fn a_connection_that_has_become_a_socket_is_not_closed() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();

@@ -14,10 +14,11 @@ pub(super) const CONNECTIONS_MAX: usize = 256;
 /// must send its request at once.
 const FEW: usize = CONNECTIONS_MAX / 2;
 /// Number of further connections from this computer that serve only Stop, Pause and the other requests of
-/// [`stops`](crate::access::stops). `KEPT_ELSEWHERE` is the number for other computers. If all reserved connections
-/// are in use, a new connection replaces the oldest connection that has not requested a Stop. Idle connections
-/// therefore never prevent a Stop. All connections together stay below 1024, which is the number of files that a
-/// program may open.
+/// [`stops`](crate::access::stops). `KEPT_ELSEWHERE` is the number for other computers. If all these connections are
+/// in use, a new connection replaces the oldest one that has not requested a Stop, so idle connections never prevent
+/// a Stop.
+///
+/// All connections together stay below 1024, which is the number of files that a program may open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
 /// Shortest time that a local connection has for sending its request. During this time, a new connection waits
@@ -88,7 +89,8 @@ impl Places {
             tokio::spawn(connection(place));
             return;
         }
-        // The wait gives the server's threads time to read requests that arrived earlier.
+        // During the wait, the server's threads can read requests that arrived earlier. A connection that has already
+        // sent a Stop is therefore not replaced.
         let oldest = self.oldest().map(|open| open + self.asks_within);
         if let Some(due) = oldest.filter(|due| *due > Instant::now()) {
             tokio::time::sleep_until(due).await;

@@ -1,7 +1,8 @@
 //! List of the agents of this user on this computer. With this list, a command finds the agent that owns its port.
 //!
-//! Each agent has a locked file in a folder to which no other user can write. If an agent is killed, its file is
-//! unlocked. The lock is checked because another program may then listen at the address of this agent.
+//! Each agent has a locked file in a folder to which no other user can write. If an agent is killed, its file
+//! remains, but is unlocked. A command therefore checks the lock, because another program may now listen at the
+//! address of that agent.
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};

@@ -253,7 +253,8 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
         let (status, denied) = anna.ask(request, Some(body));
         assert_eq!((status, denied["code"].as_str()), (409, Some("denied")), "{request}: {denied}");
     }
-    // The hold-off also applies after a reconnect. Of all repeated requests, only jog requests extend the hold-off.
+    // The hold-off also applies after a reconnect. Repeated jog requests extend the hold-off; other repeated requests
+    // do not.
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     let anna = Program::new(&served, "anna", 30.0, "continue");
     let asked = Instant::now();
@@ -327,7 +328,7 @@ fn a_program_that_is_begun_again_and_again_keeps_nobody_out() {
         if n == 0 {
             assert_eq!((status, grant["held"].as_bool()), (200, Some(false)), "{grant}");
         } else {
-            // The first client is still waiting for the lease.
+            // The first client is still waiting for the lease, so the agent refuses this request.
             assert_eq!((status, grant["code"].as_str()), (409, Some("denied")), "{grant}");
             assert!(
                 grant["message"]

@@ -58,7 +58,7 @@ impl Port for Counted {
     }
 }
 
-/// Returns the arm of the controller after the agent has read this arm.
+/// Waits until the agent has read the arm from the controller, and returns this arm.
 fn model(served: &Served) -> Value {
     let mut patience = Patience::begin();
     loop {

@@ -23,8 +23,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let job = anna.begin("POST /api/moves", json!({ "to_rad": [0.5, 0.0, 0.0, 0.0, 0.0, 0.0] }));
     assert_eq!(anna.over(job)["stage"], "finished");
     assert!(blocks(&served) > before, "it records");
-    // Two requests for the log are sent at the same time. The agent serves one of them. The other one is refused, or
-    // served after the first. While the log is read, the agent serves other requests.
+    // Two requests for the log are sent at the same time. The agent serves one of them, and refuses the other request
+    // or serves it afterwards. While the log is read, the agent serves other requests.
     let (viewer, operator) = (&served.tokens.viewer, &served.tokens.operator);
     let files = std::thread::scope(|scope| {
         let both = [(); 2].map(|()| scope.spawn(|| served.bytes_as(Some(operator), "GET /api/log")));
@@ -41,8 +41,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let (_, head, file) = files.iter().find(|(status, ..)| *status == 200).expect("one of them");
     assert!(head.to_ascii_lowercase().contains("content-type: application/octet-stream"), "{head}");
 
-    // The file is equal to the output of `jtc log fetch`: a recording that any MCAP tool can read. It also contains
-    // the log from which each tick can be computed again.
+    // The file is equal to the output of `jtc log fetch`: a recording that any MCAP tool can read. The file also
+    // contains the original log, from which the calculation of each tick can be repeated.
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
     std::fs::write(&path, file).expect("a file");

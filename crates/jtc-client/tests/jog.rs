@@ -16,14 +16,15 @@ fn ready(anna: &Program<'_>) {
     until("an arm that can be jogged", || anna.ask("POST /api/jog", Some(still.clone())).0 == 204);
 }
 
-/// Returns the status time and the position that a user sees at present.
+/// Returns the time of the present status and the position in this status, as a user sees them.
 fn seen(served: &Served) -> (u64, f64) {
     let (_, status) = served.api("GET /api/status", None, None);
     let position = status["controller"]["joints"][5]["position_rad"].as_f64().expect("it is measured");
     (status["at_ms"].as_u64().expect("a time"), position)
 }
 
-/// Requests a jog of the last joint, and returns the response. The request contains the status time that the user saw.
+/// Requests a jog of the last joint, and returns the response. The request contains the time of the status that the
+/// user saw.
 fn jog(anna: &Program<'_>, as_of_ms: u64, rate: f64) -> (u16, Value) {
     let body = json!({ "rates_rad_s": [0.0, 0.0, 0.0, 0.0, 0.0, rate] });
     anna.ask(&format!("POST /api/jog?as_of_ms={as_of_ms}"), Some(body))
@@ -63,7 +64,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
         let (status, error) = jog(&anna, as_of_ms, 0.0);
         assert_eq!(status, 204, "{error}");
     }
-    // If a request contains no time, the agent does not know the age of the status that the user saw.
+    // A request to end the jog needs no time, but an invalid time is refused.
     let body = json!({ "rates_rad_s": vec![0.0; 6] });
     assert_eq!(anna.ask("POST /api/jog?as_of_ms=-1", Some(body.clone())).0, 400);
     assert_eq!(anna.ask("POST /api/jog", Some(body)).0, 204);
@@ -81,7 +82,8 @@ fn a_status_that_no_agent_has_shown_yet_is_none() {
     assert!((seen(&served).1 - before).abs() < 1e-3);
 }
 
-/// Clients can detect late messages, even if the messages arrive at regular intervals.
+/// Each status of a stream contains its time. Clients can therefore detect late messages, even if the messages arrive
+/// at regular intervals.
 #[test]
 fn each_status_of_a_stream_has_the_time_when_it_was_made() {
     let served = Served::start(921_600);

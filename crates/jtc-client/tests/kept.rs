@@ -6,7 +6,7 @@ use common::Served;
 use common::program::Program;
 use serde_json::{Value, json};
 
-/// Returns a short motion of the base joint by `far_rad`.
+/// Returns the text of a trajectory file with a short motion of the base joint by `far_rad` and back.
 fn sway(far_rad: f64) -> String {
     let rows = (0..=200).map(|i| {
         let t = f64::from(i) * 0.01;
@@ -86,7 +86,8 @@ fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
         get(&served, "/api/status")["controller"]["joints"][1]["position_rad"].as_f64().expect("a position")
     };
     let before = place();
-    // The trajectory reaches 2 rad/s in the middle. The agent can store a trajectory with this velocity.
+    // The trajectory exceeds the velocity limit of the base joint. The agent stores it, but the check before the run
+    // refuses it.
     assert_eq!(put(&served, "7", "too fast", 2.6).0, 200);
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
     let ended = anna.over(job);

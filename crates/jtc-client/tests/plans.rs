@@ -73,7 +73,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     assert_eq!(plan(json!({ "waypoints": THREE })).0, 200);
     assert_eq!(anna.over(job)["stage"], "finished");
 
-    // The plan uses the limits of the controller.
+    // The plan uses the limits of the controller: with a lower velocity limit, the motion takes longer.
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
     std::thread::sleep(Duration::from_millis(500));
     let slow = json!([{ "name": "velocity_max_rad_s", "joint": 1, "value": 0.1 }]);

@@ -40,7 +40,8 @@ fn poses_are_saved_used_deleted_and_outlast_the_agent() {
     // A pose that the arm cannot reach causes a warning but is saved, because the limits may be wrong.
     let (_, far) = put("far", Some(json!({ "positions_rad": [0, 2, 0, 0, 0, 0] })));
     assert!(far["warning"].as_str().is_some_and(|w| w.contains("joint 2: 2 rad is outside")), "{far}");
-    // Before the recovery the position of the arm is unknown.
+    // A pose without positions saves the current position of the arm, which is known only after the recovery. While
+    // the arm moves, the agent refuses this request.
     let anna = Program::new(&first, "anna", 60.0, "continue");
     anna.recover();
     let job = anna

@@ -36,7 +36,7 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
     let lines = logged(&served, "host_timeout_ms = 1500, velocity_max_rad_s of joint 2 = 0.75");
     assert!(lines.len() == 1 && lines[0]["why_not"].is_null(), "{lines:?}");
 
-    // Each invalid setting is sent together with a valid setting. The agent refuses both.
+    // Each invalid setting is sent together with a valid setting. The agent refuses both settings.
     for (wrong, facts) in [
         (json!({ "name": "host_timeout", "value": 1 }), [Value::Null, json!(1.0), Value::Null]),
         (json!({ "name": "host_timeout_ms", "value": 60001 }), [Value::Null, json!(60001.0), json!(60000.0)]),
@@ -47,7 +47,8 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
         (json!({ "name": "torque_max_nm", "joint": 6, "value": -1 }), [json!(6), json!(-1.0), json!(0.01)]),
         (json!({ "name": "stop_ms", "value": 400 }), [Value::Null, json!(400.0), Value::Null]),
         (json!({ "name": "payload_mass_kg", "value": 1 }), [const { Value::Null }; 3]),
-        // The value is within the range of the setting, but is not below the highest position of the joint.
+        // The value is within the range of the setting, but is not below the highest position of the joint. The agent
+        // therefore refuses it.
         (json!({ "name": "position_min_rad", "joint": 4, "value": 3 }), [json!(4), json!(3.0), json!(2.97)]),
     ] {
         let (status, error) = change(json!([{ "name": "stop_ms", "value": 300 }, wrong]));
@@ -63,7 +64,7 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
         assert!(matches!(change(none).0, 400 | 422));
     }
 
-    // While the torque is on, the controller refuses these settings and keeps its parameters. It accepts some other
+    // While the torque is on, the controller refuses these settings and keeps its parameters, but accepts some other
     // settings.
     anna.recover();
     let (status, error) = change(json!([{ "name": "stop_ms", "value": 300 }]));

@@ -10,8 +10,8 @@ use tungstenite::Message;
 
 use crate::common::socket;
 
-/// Number of viewers, and URL paths of the clients that never read their messages. Each viewer receives 25 statuses per
-/// second.
+/// Number of viewers; each viewer receives 25 statuses per second. `DEAF` lists the URL paths of the clients that
+/// never read their messages.
 pub(crate) const VIEWERS: usize = 50;
 const DEAF: [&str; 12] = [
     "stream", "line", "foxglove", "stream", "line", "foxglove", "stream", "line", "foxglove", "stream",

@@ -63,7 +63,7 @@ impl Seen {
         self.since_stop += bytes.len();
         while !bytes.is_empty() {
             if self.left == 0 {
-                // The first part of a frame contains at least its header.
+                // The header contains the length, and the first part of a frame always contains the complete header.
                 self.left = usize::from(u16::from_be_bytes([bytes[2], bytes[3]]));
             }
             let taken = self.left.min(bytes.len());

@@ -73,7 +73,8 @@ pub(crate) fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     }
 }
 
-/// Checks that the request is refused to a viewer, to an operator without the lease, and to an operator that waits for the lease.
+/// Checks that the agent refuses the request of a viewer, of an operator without the lease, and of an operator that
+/// waits for the lease.
 pub(crate) fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
     let ask =
         |token: &String, key: Option<&str>| served.api_as(Some(token), request, key, Some(body.clone()));

@@ -61,7 +61,7 @@ pub(crate) use variables::VARIABLES;
         0  done\n  \
         1  the controller reported an error\n  \
         2  wrong usage or unreadable input\n  \
-        3  no link to the controller\n  \
+        3  no connection to the controller\n  \
         4  refused by a check (nothing was sent or moved)\n  \
         5  fault while running",
     max_term_width = 100,
@@ -152,8 +152,8 @@ pub(crate) enum Command {
         after_help = "The command runs an agent. The agent keeps the port open, and forwards the requests of \
             its clients to the controller. Many clients can read at the same time. Only one client at a time \
             can move the arm or change settings. Every client can stop the arm.\n\n\
-            Other commands use the agent with --port http://HOST:PORT. Commands with --port PATH also use \
-            the agent if an agent of the same user has opened this serial port.\n\n\
+            Other commands use the agent with --port http://HOST:PORT. A command also uses the agent if an \
+            agent of the same user has opened the serial port of the command.\n\n\
             Clients on this computer can read, stop and pause without a token. All other requests need the \
             operator's token from the token file. Only the owner of this file can read it.\n\n\
             Examples:\n  \
@@ -282,8 +282,8 @@ pub(crate) enum Command {
     /// Reset drives or the gripper; the arm can lose its torque
     #[command(
         after_help = "If you reset one or more joints, the whole arm loses its torque. During a motion \
-            and in Teaching, the command refuses to reset joints. A reset of the gripper does not remove the \
-            torque, but switches off the pump.\n\n\
+            and in Teaching, a reset of joints is refused. After a reset of the gripper alone, the arm keeps \
+            its torque. A reset of the gripper switches off the pump.\n\n\
             Examples:\n  \
             jtc reset --joints 3          reset joint 3\n  \
             jtc reset --joints 1,3 --yes  reset joints 1 and 3 without a question\n  \
@@ -316,10 +316,11 @@ pub(crate) enum Command {
         after_help = "Without JOINT and RATE, use the keys of the terminal. The keys 1 to 6 select a joint. \
             Hold the left or right arrow key to move the selected joint. The up and down arrow keys change \
             the velocity (0.01 to 0.5 rad/s). Press q to quit.\n\n\
-            The arm begins to stop at most 0.2 s after you release the key. The arm also begins to stop 0.2 \
-            s after the command is killed or loses its connection. The stop takes at most 0.52 s if the \
-            drives have enough torque. Joints stop before their position limits. You can jog only in the \
-            state HoldPos, and not while a motion is paused.\n\n\
+            The arm begins to stop at most 0.2 s after the last key press. A terminal repeats the key \
+            presses while you hold a key. The arm also begins to stop 0.2 s after the last message of the \
+            command, for example if the command is killed. The stop takes at most 0.52 s if the drives have \
+            enough torque. Joints stop before their position limits. You can jog only in the state HoldPos, \
+            and not while a motion is paused.\n\n\
             Examples:\n  \
             jtc jog\n  \
             jtc jog 3 0.1                  move joint 3 at 0.1 rad/s until Ctrl-C\n  \

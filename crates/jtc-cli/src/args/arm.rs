@@ -13,8 +13,8 @@ pub(crate) enum ArmCommand {
     #[command(after_help = "The command prints each frame that it rotated, and each value that it \
         estimated.\n\n\
         The arm must be a chain of six revolute or continuous joints. If the robot has more movable joints \
-        (a gripper, a seventh axis, a second arm), select the six joints with --joints or --tip. The arm \
-        file treats the other joints as fixed at position 0.\n\n\
+        (a gripper, a seventh axis, a second arm), select the six joints with --joints or --tip. The command \
+        treats the other joints as fixed at position 0.\n\n\
         A URDF contains only some of the parameters. For example, rotor inertia, gains and acceleration \
         limits are missing. The command uses rules to compute starting values for the missing parameters. \
         The arm file contains these rules, and marks the starting values as proposed.\n\n\

@@ -13,9 +13,10 @@ pub(crate) enum LogCommand {
     #[command(
         after_help = "The report shows the first error, and the events before and after this error.\n\n\
             The flight recorder is a memory in the controller. It contains every control cycle (tick, 1 ms) \
-            of the last seconds, and stops 0.3 s after the first error. A reset does not delete the log. \
-            Only `jtc log clear` deletes the log; `jtc clear` does not. You can read the log while the arm \
-            moves. The flight recorder pauses while you read.\n\n\
+            of the last seconds (at least 2 s), and stops 0.3 s after the first error. The stopped log \
+            survives a reset, and stays in the controller until `jtc log clear`. `jtc clear` does not delete \
+            the log. A new log replaces a log without any commanded torque as soon as the torque is on. You \
+            can read the log while the arm moves. The flight recorder pauses while you read.\n\n\
             The command computes each tick again, with the code of the controller and the present arm of the \
             controller. If the controller recorded the log with another arm, set the file of that arm with \
             --arm.\n\n\

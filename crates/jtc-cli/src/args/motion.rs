@@ -112,9 +112,8 @@ pub(crate) enum TrajCommand {
             command works like `jtc traj run`.\n\n\
             An MCAP file of `traj run` or `move` contains the whole trajectory. The command runs the whole \
             trajectory, even if the recorded run was interrupted. To run only the rest of an interrupted \
-            run, use `jtc traj continue`. Other recordings contain only a part of a trajectory. From these \
-            recordings, the command runs the recorded part of the last execution, along the commanded \
-            path.\n\n\
+            run, use `jtc traj continue`. From other recordings, the command runs the recorded part of the \
+            last execution, along the commanded path.\n\n\
             With --measured, the command follows the measured positions (one every 40 ms). Use --measured \
             for a motion by hand, because such a motion has no commanded path. If the measured path exceeds \
             the limits or does not end at rest, the command plans a new motion. The new motion follows the \

@@ -187,8 +187,9 @@ pub(crate) enum Command {
             the addresses in records is bytes or words. If the records are without gaps in only one of these \
             units, the command uses this unit. You can set the unit with --addresses. For boards that need \
             two files, set the key `prog.plan` of the profile (see `ucom help profile`).\n\n\
-            With `all`, the command programs all boards that answer. It also reports each board of the \
-            inventory that does not answer.\n\n\
+            `all` means the boards that answer and the boards of the inventory. The inventory must contain \
+            each board that answers. The command reports each board of the inventory that does not \
+            answer.\n\n\
             A board reports only the Program ID (a checksum) and the flash date of its program. Therefore, \
             the command also writes a record of each update to the inventory. A board is up-to-date if it \
             reports the Program ID of the image, and its record contains the same bytes and the same load \
@@ -256,9 +257,9 @@ pub(crate) enum Command {
             its date. `ucom help params` shows the format of parameter files.")]
     Par(ParArgs),
     /// Show live sensor outputs of running boards
-    #[command(after_help = "If the cache does not contain the names of the outputs, the command first asks \
-            the boards for them. Then it only listens. The values come from boards that `ucom run` or \
-            another PC has started.\n\n\
+    #[command(after_help = "The command first sends queries to find the boards and the names of their \
+            outputs. Then it only listens. The values come from boards that `ucom run` or another PC has \
+            started.\n\n\
             Examples:\n  \
             ucom so 1\n  \
             ucom so 1 --count 100 --csv > so.csv\n  \

@@ -30,7 +30,7 @@ pub(crate) struct UpdateArgs {
     pub image: PathBuf,
     /// Read files of any name as raw bytes.
     ///
-    /// This option has no effect on Intel HEX and S-records. The command reads text as raw bytes only from a .bin file
+    /// With this option, the command refuses Intel HEX and S-records. It reads text as raw bytes only from a .bin file
     #[arg(long)]
     pub raw: bool,
     /// Set the unit of the addresses in Intel HEX and S-records.
@@ -99,7 +99,7 @@ pub(crate) struct UpdateArgs {
     pub rewrite: bool,
     /// Read the flash numbers from this inventory file.
     ///
-    /// `ucom init` writes this file. Each update adds a record of the image to the file
+    /// `ucom init` writes this file. Each update records the written image in the file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]

@@ -50,7 +50,7 @@ pub(crate) struct ServeArgs {
     pub command_log: Option<PathBuf>,
     /// Read the flash numbers from this inventory file.
     ///
-    /// `ucom init` writes this file. Each update adds a record of the image to the file
+    /// `ucom init` writes this file. Each update records the written image in the file
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     /// Limit the size of the command log.

@@ -1,5 +1,5 @@
-//! Describes frames as text. The decoder remembers the previous frames of an answer, because a later package of the
-//! answer can look like its first frame.
+//! Describes frames as text. The decoder remembers the previous frames of an answer, because a later package can look
+//! like the first frame of an answer.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub struct Described {
     pub value: Value,
 }
 
-/// Decoder for the frames on a bus. The caller must pass the frames in their order.
+/// Decoder for the frames on a bus. The caller must pass the frames in the order in which they were received.
 pub struct Decoder {
     profile: Profile,
     answers: BTreeMap<(Function, Sequence), Answer>,

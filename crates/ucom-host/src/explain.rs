@@ -210,9 +210,12 @@ pub fn words() -> Vec<Word> {
     fixed.chain(errors).collect()
 }
 
-/// Returns the words that match the query exactly. If no word matches exactly, the function returns the words that match without regard to
-/// letter case and punctuation. If no word matches in this way and the query has at least 3 letters, the function returns the words that
-/// contain the query.
+/// Returns the words that match the query. The function tries three kinds of matches in this order, and returns the
+/// words of the first kind that occurs:
+///
+/// - The word is equal to the query.
+/// - The word is equal to the query without regard to letter case and punctuation.
+/// - The word contains the query, which must have at least 3 letters.
 pub fn find<'a>(all: &'a [Word], query: &str) -> Vec<&'a Word> {
     let any = |fits: &dyn Fn(&str) -> bool| -> Vec<&'a Word> {
         all.iter().filter(|word| word.shown.iter().any(|shown| fits(shown))).collect()

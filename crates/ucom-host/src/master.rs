@@ -1,16 +1,17 @@
 //! PC side of the protocol: procedures are state machines that do no I/O.
 //!
-//! A [`Master`] receives frames and the time, and returns frames that a driver must send. The master never waits, and has no clock and no
-//! thread. A driver of the master is a loop of a few lines:
+//! A [`Master`] receives frames and the time, and returns frames that a driver must send. The master never waits, and
+//! has no clock and no thread. A driver of the master is a loop of a few lines:
 //!
 //! 1. The driver delivers every frame that has arrived: [`Master::handle`].
 //! 2. The driver sends frames as long as [`Master::poll`] returns frames.
 //! 3. The driver handles the events that [`Master::take_event`] returns.
 //! 4. The driver waits for the next frame, at most until [`Master::next_deadline`].
 //!
-//! Deliver all received frames to the master before you call `poll`. A wait of a procedure ends only in `poll`. A late driver therefore
-//! does not treat a board as silent if the board's answer has arrived. Use [`Master::poll_behind`] if frames may arrive while the driver
-//! delivers other frames. Times are in microseconds since an arbitrary start, from a monotonic clock.
+//! Deliver all received frames to the master before you call `poll`. A wait of a procedure ends only in `poll`.
+//! Therefore, even with a late driver, the master does not treat a board as silent if the board's answer has arrived.
+//! Use [`Master::poll_behind`] if frames may arrive while the driver delivers other frames. Times are in microseconds
+//! since an arbitrary start, from a monotonic clock.
 //!
 //! ```
 //! use ucom_host::master::{Event, Master, Outcome, Request};
@@ -31,9 +32,9 @@
 //! assert!(report.boards.is_empty());
 //! ```
 //!
-//! A procedure that changes a board first makes this PC the master of the bus. The procedure listens for another master (D-08), and then
-//! the master sends heartbeats until [`Master::end_session`]. Procedures that only scan, or only read information and descriptions, do not
-//! change boards and do not send heartbeats.
+//! A procedure that changes a board first makes this PC the master of the bus. The procedure listens for another
+//! master (D-08), and then the master sends heartbeats until [`Master::end_session`]. Procedures that only scan, or
+//! only read information and descriptions, do not change boards and do not send heartbeats.
 
 mod counted;
 pub mod doctor;

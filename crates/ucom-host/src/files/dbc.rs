@@ -1,9 +1,10 @@
-//! Writes DBC files for cantools, SavvyCAN and similar tools. A DBC file describes the frames of the protocol, and the process data of
-//! known boards by name.
+//! Writes DBC files for cantools, SavvyCAN and similar tools. A DBC file describes the frames of the protocol. For
+//! boards whose description is known, it also contains the names of their inputs, outputs and parameters.
 //!
-//! CI, SO and PAR frames are multiplexed by their buffer offset: the first word of the frame selects which three words follow (D-15).
-//! Packages of strings have the same identifier as other frames, and a frame does not show that it is such a package. Therefore, the DBC
-//! file describes only the first frame of DSP_INFO and of the IO description. In the DBC file, debug texts and program data are raw bytes.
+//! CI, SO and PAR frames are multiplexed by their buffer offset: the first word of the frame shows which three words
+//! of the buffer follow (D-15). Packages of strings have the same identifiers as other frames, and their content does
+//! not distinguish them from those frames. Therefore the DBC file describes only the first frame of DSP_INFO and of
+//! the IO description. It describes debug texts and program data as raw bytes.
 mod names;
 #[cfg(test)]
 mod tests;
@@ -150,7 +151,7 @@ pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     text
 }
 
-/// Returns the fields of a function whose layout does not depend on the board.
+/// Returns the fields in the frames of a function, for functions whose frames have the same layout on all boards.
 fn fields(function: Function) -> Vec<DbcSignal> {
     let status = |byte| {
         let bits = Status::NAMES.iter().enumerate();

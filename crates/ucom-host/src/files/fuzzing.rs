@@ -33,8 +33,8 @@ pub fn image(data: &[u8]) {
 
 /// Reads recordings in every format. If the target reads a recording and writes it again in the same format, the recording is unchanged.
 pub fn recording(data: &[u8]) {
-    // Prepares a recording for the comparison: text formats store times in whole microseconds, and a file that this
-    // program writes is complete.
+    // Changes a recording to the form in which it is read back: the text formats store times in whole microseconds,
+    // and a file that this program has written is never incomplete.
     let as_written = |recording: &mut Recording| {
         recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
         recording.broken_off = None;
@@ -106,8 +106,8 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Reads parameter files and checks the files against a board. The valid values are then written as the text of a parameter file. A reader
-/// must convert this text to equal words.
+/// Reads parameter files and checks them against a board. The valid values are then written as a parameter file,
+/// which must result in the same words when it is read again.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(file) = ParamsFile::parse(text) else { return };

@@ -1,11 +1,12 @@
-//! Reads firmware images. The reader converts raw bytes, Intel HEX and Motorola S-records to the bytes that an update sends. An update
-//! never sends the characters of an Intel HEX or S-record file.
+//! Reads firmware images. The reader converts raw bytes, Intel HEX and Motorola S-records to the bytes that an update
+//! sends. An update never sends the characters of an Intel HEX or S-record file.
 //!
-//! The addresses of the loader count 16-bit words, so every image starts at a word and consists of complete words. In S-records of the
-//! boards' toolchain, the addresses also count words. In Intel HEX and all other formats, the addresses count bytes. The reader detects
-//! from the records if the addresses of a file count in the other unit. In the wrong unit, the records leave gaps or overlap; in the right
-//! unit, each record follows the previous record without a gap. The reader does not guess the unit if the file has only one or two records.
-//! The user can always set the unit by an option.
+//! The addresses of the loader count 16-bit words, so every image starts at a word and consists of complete words.
+//! Addresses in S-records of the boards' toolchain also count words; addresses in Intel HEX and all other formats
+//! count bytes. Some files use the other unit, and the reader detects this from the records. In the right unit, each
+//! record follows the previous record without a gap; in the wrong unit, the records leave gaps or overlap. If the
+//! file has only one or two records, the reader does not guess the unit. The user can always set the unit by an
+//! option.
 mod detect;
 mod error;
 mod hex;
@@ -24,8 +25,8 @@ use segments::Segments;
 pub const MAX_BYTES: usize = 1 << 20;
 
 /// Minimum number of consecutive records that show the unit of the addresses. Fewer records can follow one another by
-/// coincidence: a file may contain an intended gap that is as long as a record. In a table of interrupt vectors, such
-/// a gap may follow every entry, but the records of these tables are short (see `EVIDENCE_BYTES`).
+/// coincidence: in the wrong unit, an intended gap that is as long as a record is not visible. A table of interrupt
+/// vectors can have such a gap after every entry, but its records are short (see `EVIDENCE_BYTES`).
 const EVIDENCE: usize = 3;
 /// Minimum average length, in bytes, of the records that show the unit of the addresses. Linkers write records of 16 bytes and more.
 const EVIDENCE_BYTES: usize = 12;
@@ -96,15 +97,16 @@ pub enum Gaps {
 /// Options for reading an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Format of the image file. If `None`, the reader detects the format from the content and the name of the file. The reader never reads
-    /// records as raw bytes. The reader reads a text as raw bytes only if the text is in a `.bin` file and the format is set.
+    /// Format of the image file. If `None`, the reader detects the format from the content and the name of the file.
+    /// With [`Format::Bin`], the reader still refuses records, and accepts a text only in a `.bin` file.
     pub format: Option<Format>,
-    /// Unit of the record addresses. If `None`, the unit is words in S-records and bytes in Intel HEX. The reader uses the other unit if
-    /// the file has at least three records that follow one another only in that unit.
+    /// Unit of the record addresses. If `None`, addresses in S-records count words, and addresses in Intel HEX count
+    /// bytes. If at least three records follow one another only in the other unit, the reader uses that unit.
     pub address_unit: Option<AddressUnit>,
     /// Treatment of gaps between records.
     pub gaps: Gaps,
-    /// `true` to swap the two bytes of each word, for a toolchain whose byte order differs from the order in which bytes are sent.
+    /// `true` to swap the two bytes of each word, for a toolchain that writes the bytes in another order than the
+    /// update sends them.
     pub swap_bytes: bool,
     /// Load address in words, which replaces the address in the image file. If `None`, the reader uses the address in the file, or 0 for
     /// raw bytes.
@@ -217,8 +219,9 @@ impl Image {
     /// Reads an image from a file.
     pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
         let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
-        // A limit of 16 characters per byte is enough for records with at least two data bytes. For example, an S-record with a 32-bit
-        // address, two data bytes and a line end has at most 20 characters.
+        // The file needs at most 16 characters per byte of the image, if its records have at least two data bytes.
+        // For example, an S-record with a 32-bit address and two data bytes has at most 20 characters, including the
+        // line end.
         let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > most {

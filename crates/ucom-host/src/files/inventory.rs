@@ -45,7 +45,8 @@ pub struct InventoryBoard {
 }
 
 impl InventoryBoard {
-    /// Returns the record of the last update of this board; `None` for a record of another board.
+    /// Returns the flash record of the last update of this board; `None` if the record belongs to another board or
+    /// does not exist.
     pub fn record(&self) -> Option<FlashRecord> {
         self.program.filter(|record| record.flash_number == self.flash_number)
     }
@@ -270,7 +271,8 @@ impl Inventory {
         }
     }
 
-    /// Returns the boards without their flash records, because flash records of a deleted file are not reliable.
+    /// Returns the inventory without its flash records. The function is used after the inventory file was deleted,
+    /// because the flash records are then not reliable.
     #[must_use]
     pub fn without_records(mut self) -> Self {
         self.boards.values_mut().for_each(|board| board.program = None);

@@ -175,8 +175,8 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes the remaining data of the recording and ends the file. Without this call, an MCAP file has no index, and a text file may lack
-    /// its last lines.
+    /// Writes the remaining data of the recording and ends the file. Without this call, an MCAP file has no index,
+    /// and a text file can lack its last lines.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => Ok(w.into_inner().flush()?),

@@ -36,8 +36,8 @@ impl BoardSignals {
         Self { ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
     }
 
-    /// Returns the signals of a program for which the signal table has no entry. These signals accept only raw words, because the units of
-    /// numbers are not known.
+    /// Returns the signals of a program that the signal table does not contain. All signals accept only raw words,
+    /// because the units of numbers are not known.
     pub fn raw_only(mut self) -> Self {
         for signal in self.ci.iter_mut().chain(&mut self.so).chain(&mut self.par) {
             signal.raw_only = true;

@@ -220,8 +220,8 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         f.problem(shared.to_string(), SHARED_CAUSE, shared_remedy());
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // The PC has read the other values of these boards in the wrong byte order too. Therefore the doctor derives
-        // no findings from these values.
+        // The PC also read the other values of these boards in the wrong byte order, so the doctor derives no
+        // findings from them.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }
@@ -251,7 +251,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
     }
 }
 
-/// Adds a finding about the number of boards that have a number.
+/// Adds a finding about how many boards have a number and how many do not.
 fn numbers(scan: &ScanReport, f: &mut Findings) {
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {

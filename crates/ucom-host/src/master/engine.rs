@@ -1,5 +1,5 @@
-//! Foundation on which all procedures of the master run. This module contains the clock, the queued frames, the
-//! mailboxes, the last known states of the boards, and the supervision of the boards.
+//! Parts that all procedures of the master use: the clock, the queued frames, the mailboxes, the last known states of
+//! the boards, and the supervision of the boards.
 //!
 //! Each file imports only files that come before it in this list: times, statistics, boards, holders, event, mailbox,
 //! shared, inputs, supervise, link.

@@ -79,8 +79,8 @@ impl Master {
         self.poll_behind(now, now)
     }
 
-    /// Like `poll`, for a driver that has not delivered the frames received after the time `received` yet. Waits
-    /// of procedures end only up to the time `received`, but heartbeats are sent up to `now`.
+    /// Like `poll`, for a driver that has delivered only the frames that were received up to the time `received`.
+    /// Waits of procedures end only up to the time `received`, but heartbeats are sent up to `now`.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -157,8 +157,8 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns an error for each board number that two boards share. The same error ends a procedure that uses the
-    /// number.
+    /// Returns an error for each board number that two boards share. A procedure that uses such a number ends with
+    /// the same error.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
@@ -248,9 +248,9 @@ impl Master {
         core.start_session();
     }
 
-    /// Sends a command that stops control loops (ADMIN_DATA, all 0) before all queued frames. Repeats this command twice shortly
-    /// afterwards. The command is sent to the given boards, in reverse order, or to all boards by broadcast. This function does not wait
-    /// for an answer; [`Request::Stop`] checks each board.
+    /// Sends a command that stops control loops (ADMIN_DATA, all 0) before all queued frames, and repeats it twice
+    /// shortly afterwards. The command is sent to the given boards, in reverse order, or to all boards by broadcast.
+    /// This function does not wait for an answer; [`Request::Stop`] checks each board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

@@ -47,8 +47,8 @@ impl Cache {
         let Self { place: Place::Directory(directory), fresh } = self else { return self };
         let texts = Arc::new(Mutex::new(all(&directory)));
         let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
-        // The writer thread ends with the last clone of this cache. The last clone does not wait for the thread. If data are not stored in
-        // time, the next session reads them from the boards again.
+        // The writer thread ends after the last clone of this cache is dropped, but the program does not wait for the
+        // thread. If data are not stored in time, the next session reads them from the boards again.
         std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
         Self { place: Place::Memory(Memory { texts, writer }), fresh }
     }

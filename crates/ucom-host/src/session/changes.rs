@@ -102,8 +102,8 @@ impl Driver {
         several.try_for_each(|board| self.seen(*board).map(drop))
     }
 
-    /// Stops boards down to the stop level `level`. The function sends all stop commands before it sends a query to any board, so that a
-    /// silent board does not delay the stop of other boards. The function collects the failures of boards.
+    /// Stops boards down to the stop level `level`. The function sends all stop commands before any query, so that a
+    /// silent board does not delay the stop of other boards. The result contains the failures of single boards.
     ///
     /// # Errors
     /// Returns an error if the boards on the bus are not known, or if no board answers.
@@ -129,8 +129,8 @@ impl Driver {
         Ok(stopped)
     }
 
-    /// Makes the outputs of boards safe; the control loops of the boards continue. Every board gets the command, even if other boards do
-    /// not answer. The function collects the failures of boards.
+    /// Makes the outputs of boards safe; the control loops of the boards continue. Every board gets the command, even
+    /// if other boards do not answer. The result contains the failures of single boards.
     pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
         let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
         for board in boards {

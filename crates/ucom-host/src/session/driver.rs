@@ -103,7 +103,8 @@ impl Driver {
         self.ask(board, true)
     }
 
-    /// Like `seen`, but Ctrl-C does not cancel the read, because a cancelled procedure may have left the board in any state.
+    /// Like `seen`, but Ctrl-C does not cancel the read. After a cancelled procedure, a board can be in any state, so
+    /// its state must be read.
     pub fn seen_for_certain(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, false)
     }

@@ -1,8 +1,10 @@
-//! Supervises the boards of a run: boards that have left their control loops, and the age of the values of each board.
+//! Supervises the boards of a run: which boards have left their control loops, and how old the values of each board
+//! are.
 //!
-//! A board can leave its control loop without a command from this PC. The cause may be missing heartbeats of this PC, a stop from another
-//! PC, or the end of the loop in the application. The board reports the end of its control loop in a single MCA_ADMIN_DATA frame. If the
-//! frame is lost, the sensor outputs of the board stop in any case, and the master then reads the board's status.
+//! A board can leave its control loop without a command from this PC: because heartbeats of this PC are missing,
+//! because another PC stops the board, or because the application ends the loop. The board reports the end of its
+//! control loop in a single MCA_ADMIN_DATA frame. If this frame is lost, the PC still detects that the sensor outputs
+//! of the board have stopped, and the master then reads the board's status.
 
 use std::collections::BTreeMap;
 
@@ -107,7 +109,7 @@ struct One {
     /// `true` if any board was lost or has rebooted since this board started to run. With `on_lost`, this loss or reboot may be the reason
     /// for the stop of this board.
     lost: bool,
-    /// `true` if the board left its control loop at any time before any board was lost or had rebooted.
+    /// `true` if the board left its control loop before any board was lost or had rebooted.
     left: bool,
     /// `true` if the status byte of the board shows that the board has left its control loop. In this case, the PC did not receive the
     /// board's own report about the end of the loop.
@@ -204,9 +206,9 @@ impl Followed {
         notices
     }
 
-    /// Returns `true` if the run has ended: every board has left its control loop, has rebooted, or was lost and stopped by `on_lost`. Only
-    /// a new run can start the control loop of such a board again. With `on_lost = report`, the run waits for a lost board, which may still
-    /// be in its control loop.
+    /// Returns `true` if the run has ended: every board has left its control loop, has rebooted, or was lost and
+    /// stopped by `on_lost`. Only a new run can start the control loop of such a board again. With `on_lost =
+    /// report`, the run does not end because of a lost board, which may still be in its control loop.
     pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
         let boards = master.boards();
         let waits_for_lost = master.profile().on_lost == OnLost::Report;
@@ -356,8 +358,8 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // When the control loop of the board is restarted, earlier losses do not count any more. If the board then
-        // leaves its control loop, a loss is not reported as the reason.
+        // After a restart of the board's control loop, earlier losses do not count. If the board then leaves its
+        // control loop, the loss is not reported as the reason.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);
@@ -380,7 +382,8 @@ mod tests {
         assert!(followed.is_over(&master, 5_100_000));
     }
 
-    /// With a policy that stops a lost board, the run ends. With `on_lost = report`, the run waits for the lost board.
+    /// D-51: if `on_lost` requires that a lost board is stopped, the run ends. With `on_lost = report`, the lost
+    /// board may still be in its control loop, so the run does not end.
     #[test]
     fn d51_a_lost_board_is_waited_for_only_where_nobody_stops_it() {
         for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {

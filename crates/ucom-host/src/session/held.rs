@@ -127,8 +127,8 @@ impl Session {
         self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
     }
 
-    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands` is `false`). If the heartbeats
-    /// continued, the boards of another PC would not become safe after that PC was lost (D-50).
+    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands` is
+    /// `false`). Otherwise, the heartbeats would keep the boards of another PC running after that PC was lost (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();
@@ -166,8 +166,8 @@ impl Session {
         known
     }
 
-    /// Runs an action that uses the signal names of boards. If the cached names are not the names of the board, the function reads the
-    /// names from the board and runs the action once more.
+    /// Runs an action that uses the signal names of boards. If the cached names of a board are wrong, the function
+    /// reads the names from the board and runs the action once more.
     pub fn by_names<T>(
         &mut self,
         mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
@@ -219,8 +219,8 @@ impl Session {
         self.held.borrow_mut().runs_no_more(board);
     }
 
-    /// Records that the control loop of this board has ended but its application still runs. A board that this session has not started is
-    /// not listed as started, because its heartbeats are not supervised here.
+    /// Records that the control loop of this board has ended but its application still runs. The board stays listed
+    /// as started only if this session has started it.
     pub fn only_started(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         let counted = held.started.contains(&board);

@@ -1,6 +1,6 @@
-//! Values that this tool wrote to the parameters of a board, with times. The parameters of the board may have other values now. The
-//! protocol has no function that reads parameters back. A restart of the application resets the parameters, and this tool may not notice a
-//! restart (D-35).
+//! Values that this tool wrote to the parameters of a board, with times. The parameters can have other values now: a
+//! restart of the application resets them, and this tool does not always notice a restart. The protocol has no
+//! function that reads parameters back (D-35).
 
 use std::collections::BTreeMap;
 
@@ -79,7 +79,8 @@ mod tests {
         assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
     }
 
-    /// Another program has other parameters, even if their index is equal.
+    /// D-35: another program has other parameters. Its parameters have no history, even if a parameter of the
+    /// previous program has the same index.
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();

@@ -106,17 +106,17 @@ fn file(key: DescriptionKey) -> String {
 }
 
 impl Known {
-    /// Returns a word in the form that the master uses. The form contains the name of the signal, or the index if the
-    /// name also belongs to another signal.
+    /// Returns a word together with the name of its signal, as the master expects it. If the name also belongs to
+    /// another signal, the index is used instead.
     pub fn setting(&self, kind: Kind, word: &ParamsWord) -> Setting {
-        // The name of a signal may also match the name or the index of another signal. In this case, the index is
-        // used instead of the name.
+        // The name of a signal can also match the name or the index of another signal. Then the index is used instead
+        // of the name.
         let by_name = self.names.find(self.board, kind, &word.name) == Ok(word.index);
         let name = if by_name { word.name.clone() } else { format!("##{}", word.index) };
         Setting { name, value: word.word }
     }
 
-    /// Returns this board with the signal names that it has sent since it was read.
+    /// Returns this board with the signal names `names`, which the board itself has sent.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }

@@ -10,12 +10,13 @@ use super::error::SessionError;
 use super::pump::Line;
 use crate::files::recording::{FrameKind, RecordedFrame};
 
-/// Longest wait that is timed precisely.
+/// Longest wait that is timed precisely. The first part of a longer wait uses the timeout of the bus, which is less
+/// precise.
 const COARSE: Duration = Duration::from_millis(12);
 /// Interval at which the bus is polled during a wait that is timed precisely.
 const LOOK: Duration = Duration::from_micros(100);
-/// Largest delay with which a sleep of the thread may end. The thread does not sleep during the last part of a wait,
-/// which has this length, but polls the bus.
+/// Largest delay after the planned end of a sleep of the thread. For the last part of a wait, which has this length,
+/// the thread polls the bus instead of sleeping.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// Open CAN bus with its clock.

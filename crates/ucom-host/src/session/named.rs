@@ -19,7 +19,8 @@ impl Known {
         keys(names, names.len())
     }
 
-    /// Returns the units of the signals whose unit is in a signal table, with the keys of the JSON object.
+    /// Returns the units of the signals as a JSON object with signal names as keys. Signals without a unit in a
+    /// signal table are omitted.
     pub fn units(&self, kind: Kind) -> Value {
         let (names, signals) = (self.names.names(kind), self.signals.all(kind));
         let pairs = keys(names, names.len()).into_iter().zip(signals);

@@ -151,7 +151,7 @@ impl ParameterFile {
         Ok(self.verdict(problems)?)
     }
 
-    /// Returns the words in the file for all boards. If the file has errors, the function returns all of them.
+    /// Returns the words in the file for all boards. If the file has errors, the function returns all errors.
     pub fn words<'a>(
         &self,
         known: impl Fn(u8) -> Option<&'a Known>,

@@ -1,5 +1,6 @@
-//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered to the master before
-//! a timeout can end. Sending frames and receiving frames cannot block each other.
+//! Moves frames between the bus and the PC side. Received frames are delivered to the master before a wait of a
+//! procedure can end, so that a frame that has arrived in time never causes a timeout. Sending frames and receiving
+//! frames cannot block each other.
 
 use std::time::Duration;
 
@@ -10,8 +11,8 @@ use crate::master::Master;
 
 /// Longest wait for a frame. The loop checks for Ctrl-C at this interval.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Limit of the frames that are delivered to the master before the due frames are sent. The next constant limits the
-/// time of the delivery, µs. With these limits, the PC continues to send heartbeats on a flooded bus.
+/// Limit of the frames that are delivered to the master before the due frames are sent. `LONGEST_US` limits the time
+/// of the delivery, µs. With these limits, the PC continues to send heartbeats on a flooded bus.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
 /// Limit of the frames that the PC sends before it handles received frames.

@@ -42,8 +42,7 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     Ok(all)
 }
 
-/// Shows a note about values that no word can represent exactly, because the word with the nearest value is sent
-/// instead.
+/// Shows a note about each value that no word can represent exactly. The word with the nearest value is sent instead.
 pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     for word in words {
         if let Some(rounded) = &word.rounded {
@@ -66,7 +65,8 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their signal names. The procedure started the applications only of boards that could not send their names otherwise.
+/// Boards with their signal names. Applications were started only on boards whose signal names were not known
+/// otherwise.
 #[derive(Default)]
 pub struct Prepared {
     /// Boards with their signal names, by board number.
@@ -90,7 +90,8 @@ impl Prepared {
                 // The board is recorded before the start command is sent, because a cancelled start may still have reached the board.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
-                    // If the start was refused, no frame was sent. A stop would then be a command on a bus whose master is another PC.
+                    // A refused start has sent no frame, so no stop is needed. A stop could be a command on a bus
+                    // whose master is another PC.
                     if e.kind() == ErrorKind::Refused {
                         self.started.borrow_mut().pop();
                     }

@@ -126,8 +126,9 @@ impl Watch {
         }
     }
 
-    /// Sends queries to the boards once, and again if the user requests it. Permanent queries would look like a second master to other PCs
-    /// (D-08), and the view receives changes of boards without queries.
+    /// Sends queries to the boards once, and again if the user requests it. Permanent queries are not necessary,
+    /// because the view receives changes of boards without queries. To other PCs, they would look like a second
+    /// master (D-08).
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;

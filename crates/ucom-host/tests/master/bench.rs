@@ -1,5 +1,5 @@
-//! Test bus in memory and in virtual time. The master is on one side of the bus, and boards or a script are on the other side. A test can
-//! set faults for the frames between the two sides.
+//! Test bus in memory and in virtual time. The master is on one side of the bus; simulated boards or a table of
+//! answers are on the other side. A test can set faults for the frames between the two sides.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Frame, Profile};
@@ -77,8 +77,8 @@ pub(super) struct Bench {
     pub events: Vec<(u64, Event)>,
     /// Number of the frame that has a fault, and the kind of the fault.
     pub fault: Option<(usize, Fault)>,
-    /// Beginnings of the texts of lost frames, and the number of frames to lose for each text. In these texts, `<` marks a frame of the
-    /// master, and `>` marks a frame of a board.
+    /// Frames to lose: the beginning of the frame's text, and the number of frames that are lost. A text begins with
+    /// `<` for a frame of the master, and with `>` for a frame of a board.
     pub lose: Vec<(&'static str, u32)>,
     /// Bus members that are disconnected. A disconnected member receives no frames, and none of its frames arrives.
     pub cut: Vec<usize>,

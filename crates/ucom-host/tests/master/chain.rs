@@ -1,4 +1,4 @@
-//! Tests of the master with the boards of this crate.
+//! Tests of the master with the boards of the crate `ucom`.
 
 use ucom_host::master::{InitOptions, Outcome, Request};
 

@@ -15,8 +15,9 @@ fn has_competing_master(bench: &Bench) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::CompetingMaster { .. }))
 }
 
-/// D-08: a heartbeat with a board's number arrives before the first intrusive command. If the board is started, the heartbeat comes from
-/// this board; otherwise it comes from another PC. If the board does not answer, the master does not refuse the command.
+/// D-08: a heartbeat with a board's number arrives before the first command that changes boards. If the board is not
+/// started, the heartbeat comes from another PC, and the master refuses the command. If the board is started or does
+/// not answer, the master does not refuse the command.
 #[test]
 fn d08_whose_heartbeat_is_it() {
     for (status, refused) in [(Some("8B"), false), (Some("AB"), false), (Some("1B"), true), (None, false)] {
@@ -113,7 +114,8 @@ fn a_single_reset_is_checked() {
         }
         assert_eq!((bench.board(0).phase(), bench.board(2).phase()), (Phase::Idle, Phase::Idle), "{what}");
     }
-    // The board has executed the reset, but none of its later frames arrives at the master.
+    // The board has executed the reset, but its reports do not arrive. The master returns an error for the missing
+    // answer.
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();
@@ -123,8 +125,8 @@ fn a_single_reset_is_checked() {
     );
 }
 
-/// D-50: the driver delivers frames to the master late. The master does not interpret a frame that is not delivered
-/// yet as silence, and still sends heartbeats.
+/// D-50: the driver delivers frames to the master late. The master does not report a silent board while a frame is
+/// not delivered yet, and it still sends heartbeats.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());

@@ -43,7 +43,8 @@ fn failed(report: &ConformanceReport) -> Vec<String> {
     failed.map(|t| format!("{} {:?} {:?}", t.id, t.board, t.verdict)).collect()
 }
 
-/// Runs every conformance test in both byte orders. The run omits only conformance tests that need a special bus.
+/// Runs every conformance test in both byte orders, and no test fails. Only tests that cannot run on this bus are
+/// skipped.
 #[test]
 fn boards_of_this_crate_pass_every_test() {
     for endian in [Endian::Little, Endian::Big] {
@@ -81,8 +82,8 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // Without options, the run may send PC_INFO, PC_REPORT, PC_INIT with a number that the board already has, and dump requests. The
-        // master also sends heartbeats, because the start of the application has begun them.
+        // Without options, the master sends only PC_INFO, PC_REPORT, PC_INIT with a number that the board already
+        // has, and dump requests. It also sends heartbeats, which began with the start of the application.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
             // The master sends PC_INIT(n) only directly after a PC_INFO to number n.
@@ -207,8 +208,8 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T4",
             receives(|_, f| {
-                // The PC first switches on the pin when it numbers the chain. The fault loses only the second such
-                // command, which the test sends.
+                // The PC switches on the pin twice: when it numbers the chain, and in the test. The fault loses only
+                // the second command.
                 static RECEIVED: AtomicUsize = AtomicUsize::new(0);
                 let raised = f.to_string() == "1C1#0202";
                 if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }

@@ -1,5 +1,5 @@
-//! The conformance tests restore the state of the boards at their end, after a cancel, and when a board disconnects. This file also tests
-//! the requests for conformance tests that the master refuses.
+//! Tests that the conformance tests restore the state of the boards: at their end, after a cancel, and when a board
+//! disconnects. This file also contains tests in which the master refuses to run the conformance tests.
 
 use super::bench::Exit;
 use ucom::{Function, Status};

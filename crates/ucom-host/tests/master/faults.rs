@@ -51,8 +51,8 @@ fn every_frame_of_an_init_disturbed() {
                 complete += 1;
             } else {
                 named += 1;
-                // If a single frame is only lost, doubled or late, the chain is always complete. Only a corrupted frame can result in an
-                // incomplete chain.
+                // A single frame that is lost, doubled or late never results in an incomplete chain. Only a corrupted
+                // frame can have this result.
                 assert!(matches!(fault, Fault::Corrupted(_)), "{what}: {:?}", report.findings);
             }
         }
@@ -83,16 +83,16 @@ fn every_frame_of_a_scan_disturbed() {
             if !matches!(fault, Fault::Corrupted(_)) {
                 assert_eq!(report.boards.len(), 3, "{what}");
             } else if report.boards.len() < 3 {
-                // The fault changed a request into a reset, so the boards have no numbers. The scan reports that the boards have no
-                // numbers.
+                // The corrupted frame has reset boards, so they have no numbers. The scan must report this.
                 assert!(!report.findings.is_empty(), "{what}");
             }
         }
     }
 }
 
-/// The test applies a fault to each frame of a run in turn, from the exloader to enabled outputs. Unless the frame is
-/// corrupted, every description that the master accepts is correct. The outputs of other boards are never enabled.
+/// The test repeats the start of a board, from the exloader to enabled outputs, each time with a fault in another
+/// frame. Unless the frame is corrupted, every description that the master accepts is correct. The outputs of other
+/// boards are never enabled.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

@@ -16,9 +16,9 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show
-/// that a board has accepted the number. If the master ignored them, two boards that switch on their outgoing pin by
-/// themselves would get the same number.
+/// D-21, D-24: the acknowledgement and the first frame of DSP_INFO are lost. The later frames with this number show
+/// that a board has accepted the number, so the master must not repeat PC_INIT. Otherwise, the next board would take
+/// the same number, because these boards switch on their outgoing pin by themselves.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     let profile = Profile { chain_auto_opinit: true, ..Profile::default() };

@@ -64,8 +64,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
         while let Some(frame) = master.poll(now) {
             queue.push_back((now, frame));
         }
-        // The bus carries 1 Mbit/s. Unused bus time cannot be used later, so `spare` is reset when the queue is
-        // empty.
+        // The bus carries 1 Mbit/s; `spare` is the free bus time in bits. Unused bus time cannot be used later, so
+        // `spare` is reset when the queue is empty.
         spare += MS;
         while let Some((since, next)) = queue.front()
             && spare >= frame_bits(next.dlc())

@@ -153,7 +153,8 @@ fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
     bench.go(Request::Probe(alive.clone()), 120).unwrap();
     assert!(!bench.board(0).application.running && bench.board(0).status().has(Status::MSTART));
-    // The test cancels the probe while it reads all frames in raw form, and while a control loop runs with other heartbeats.
+    // The test cancels the probe while it reads all frames in raw form (after `201#`), and while it starts a control
+    // loop (after `541#`).
     for until in ["<201#", "<541#"] {
         let mut bench = numbered();
         let id = bench.master.start(bench.now, Request::Probe(alive.clone())).unwrap();

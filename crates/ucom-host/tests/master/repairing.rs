@@ -39,8 +39,8 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // In this case, the board did not receive the number, or the outgoing pin of its neighbour is still on. Such
-        // an error does not say which boards have numbers.
+        // With any other error, the board did not receive the number, or the outgoing pin of its neighbour is still
+        // on. Such an error does not show which boards have numbers.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
@@ -61,8 +61,8 @@ fn d21_a_number_goes_to_one_board_only() {
     assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
 }
 
-/// The incoming pin of the first board is always active. As long as the first board has no number, it would take any number that is
-/// assigned to another board.
+/// The incoming pin of the first board is always active, so without a number the first board would take any number.
+/// Therefore the master refuses to repair another board until the first board has its number.
 #[test]
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);

@@ -23,7 +23,7 @@ fn running(flash_ids: &[u16], boards: &[u8]) -> Bench {
     bench
 }
 
-/// Vector 13.2: the master starts only board 1. The test compares each frame.
+/// Vector 13.2: the master starts only board 1. The test compares each frame with the vector.
 #[test]
 fn start_order() {
     let mut bench = initialised(&[0x21]);
@@ -130,7 +130,8 @@ fn d36_kept_names_of_another_application_start_nothing() {
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
-/// D-14: the master reads a dump with incorrect totals again, at most three times.
+/// D-14: if frames of a dump are missing, surplus or swapped, the master requests the dump again. It sends at most
+/// three requests.
 #[test]
 fn d14_dump_is_accepted_only_if_the_totals_fit() {
     let good = ["581#010000000000", "581#0100", "581#6865616420", "581#0100", "581#737065656400"];
@@ -314,7 +315,7 @@ fn d26_reboot_of_a_running_board() {
     ));
 }
 
-/// D-50: when the session ends, boards stop by themselves.
+/// D-50: after the end of the session, the PC sends no heartbeats, so boards stop by themselves.
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);

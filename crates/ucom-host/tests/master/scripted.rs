@@ -1,4 +1,4 @@
-//! Tests for rows of the acceptance table in which the boards are only a table of frames.
+//! Tests for rows of the acceptance table. The boards are simulated by a table of frames.
 
 use super::bench::Exit;
 use ucom_host::master::{
@@ -54,7 +54,8 @@ fn p1_scan_is_harmless() {
     }
 }
 
-/// P-2, vector 13.1: the test compares the golden chain frame by frame. The master detects the end of the chain within one second.
+/// P-2, vector 13.1: the test compares the frames that number the golden chain with the vector. The master detects
+/// the end of the chain within one second.
 #[test]
 fn p2_init_of_the_golden_chain() {
     let mut bench = Bench::script(golden(3));
@@ -209,7 +210,8 @@ fn init_names_a_broken_wire() {
     assert!(report.findings[0].to_string().contains("0x42 after position 1"));
 }
 
-/// D-07: the master identifies reports in other modes by their data byte.
+/// D-07: the master identifies the board by the data byte of its report, even if the identifier does not match the
+/// report mode of the profile.
 #[test]
 fn d07_reports_by_data_byte() {
     let script = Script::default().on("240#", &["401#21", "441#21", "481#21", "4C1#21"]);

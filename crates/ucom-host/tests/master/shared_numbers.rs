@@ -254,8 +254,8 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
     assert!(bench.go(Request::Info { board: 1 }, 10).is_err_and(|e| is_shared(&e, [0x21, 0x42])));
 }
 
-/// A scan of two boards with the same number has one finding, which lists both boards. It does not report a board
-/// without a number.
+/// A scan of two boards with the same number has one finding, which lists both boards. The scan does not report a
+/// board without a number.
 #[test]
 fn d24_a_scan_names_both() {
     let mut bench = sharing([0x21, 0x42], &[]);

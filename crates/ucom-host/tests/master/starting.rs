@@ -64,8 +64,8 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
     }
 }
 
-/// The test repeats the run for every board and every step; each time, the board does not answer this step. After the failed run, the
-/// other boards are in their previous state.
+/// The test repeats the run for every board and every step; each time, the answers of the board in this step are
+/// lost. After the failed run, the other boards are in their previous state.
 #[test]
 fn a_run_that_fails_is_undone() {
     let steps = [("> 14", "PC_INFO"), ("> 60", "flags"), ("> 6C", "initial inputs")];

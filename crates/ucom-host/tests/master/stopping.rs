@@ -23,7 +23,8 @@ fn bad_bus(bench: &mut Bench) {
     bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
 }
 
-/// Section 9 (codes 6 to 8 are only logged): the master still repeats a stop if an error report arrives and ADMIN_DATA is lost.
+/// Section 9: errors 6 to 8 of a board are only logged. If such an error arrives and ADMIN_DATA is lost, the master
+/// still repeats the stop.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     for lost in ["< 601#00000000", "< 601#01000000"] {
@@ -137,8 +138,8 @@ fn slow_boards_are_idle_after_a_cancelled_run() {
     }
 }
 
-/// A stop of all boards begins with a broadcast, which the master sends three times. The master sends a stop of some boards only to these
-/// boards.
+/// A stop of all boards begins with a broadcast, which the master sends three times. A stop of some boards is sent
+/// only to these boards.
 #[test]
 fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -163,8 +164,8 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 
-/// U-2: the master sends two queries to determine if a board runs, because one answer can be lost. The sensor outputs, which also show that
-/// the board runs, can be lost too.
+/// U-2: a running board prevents an update even if one of its answers and its sensor outputs are lost. The master
+/// sends two queries to determine if a board runs.
 #[test]
 fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     let mut bench = initialised(&[0x21, 0x42]);

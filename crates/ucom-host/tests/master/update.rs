@@ -1,4 +1,4 @@
-//! Tests of firmware updates, with boards of this crate and with boards that are tables of frames.
+//! Tests of firmware updates, with boards of the crate `ucom` and with boards that are simulated by tables of frames.
 
 use super::bench::Exit;
 use ucom::{BoardInfo, Memory};
@@ -65,7 +65,8 @@ fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }
 
-/// Vector 13.4: the test compares the update with the golden image, and the read-back, frame by frame.
+/// Vector 13.4: the test writes the golden image to a board, and compares the frames of the update and of the
+/// read-back with the vector.
 #[test]
 fn golden_update() {
     let mut bench = initialised(&[0x21]);
@@ -154,8 +155,8 @@ fn p10_success_must_be_read_back() {
     assert_eq!(report.exit(), 5);
 }
 
-/// P-11, U-7: errors 2 and 5 end the update after one attempt, and other errors end it after three attempts. Each attempt to update the
-/// board begins with XRESET.
+/// P-11, U-7: errors 2 and 5 end the update after one attempt. Other errors, and a missing answer, end it after three
+/// attempts. Each attempt to update the board begins with XRESET.
 #[test]
 fn p11_attempts_by_error() {
     type Case = (fn(usize, usize) -> Option<&'static str>, usize, u8);
@@ -187,7 +188,8 @@ fn p11_attempts_by_error() {
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 2));
 }
 
-/// An error in the middle of a block is an answer to this block: the master does not wait for DSP_READY and does not make another attempt.
+/// Error 2 in the middle of a block is an answer to this block: the master does not wait for DSP_READY and does not
+/// make another attempt.
 #[test]
 fn errors_in_the_middle_of_a_block_count() {
     let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
@@ -356,7 +358,7 @@ fn progress_is_of_both_cycles() {
     assert_eq!(bytes, (1..=34).map(|i| 64 * i).collect::<Vec<u64>>());
 }
 
-/// A fault affects one frame of an update, and the report describes the result correctly.
+/// In each run, another frame of an update has a fault. The report always describes the result correctly.
 #[test]
 fn every_frame_of_an_update_disturbed() {
     let (from, to) = {

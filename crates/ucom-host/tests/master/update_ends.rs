@@ -16,7 +16,8 @@ use super::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
-/// Starts an update and continues it until `stop` returns `true`. Then `end` ends the update, and the report must be available at once.
+/// Starts an update, and calls `end` when `stop` returns `true`. The function returns the report of the update, which
+/// must be available at once.
 fn ended(
     bench: &mut Bench,
     options: UpdateOptions,
@@ -356,7 +357,8 @@ fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
                     assert_eq!(code, Some("still-programming"), "after {after} µs: {result:?}");
                     named += 1;
                 } else {
-                    // The master had not read this board before the update ended.
+                    // The master had not read this board before the update ended, so the report contains only the
+                    // cancel or the failure of the bus.
                     assert!(matches!(code, Some("cancelled" | "bus")), "after {after} µs: {result:?}");
                 }
             }

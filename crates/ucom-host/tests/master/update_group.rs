@@ -22,8 +22,9 @@ fn broadcasts(bench: &Bench) -> usize {
     bench.beginning("2C0#")
 }
 
-/// D-46: the master commands every board that is not selected to leave programming mode, and then requests the state of each board. Answers
-/// to a broadcast PC_INFO may be lost, and a board that still has PROG = 1 would be erased with the group.
+/// D-46: the master commands every board that is not selected to leave programming mode, and then requests the state
+/// of each board separately. Answers to a broadcast PC_INFO can be lost, and a board that still has PROG = 1 would be
+/// erased with the group.
 #[test]
 fn d46_a_group_leaves_other_boards_alone() {
     for lose in [vec![], vec![("> 142#", 2)], vec![("> 142#", 2), ("< 1C2#0400", 2)]] {
@@ -110,8 +111,8 @@ fn a_silent_board_that_may_listen_ends_the_broadcast() {
 /// accepted the later blocks.
 #[test]
 fn a_board_that_fell_behind_is_asked() {
-    // `block` is the number of DSP_READY frames of board 2 before the loss, in cycle 1 or 2. The board still accepts
-    // all blocks, so it needs no second attempt.
+    // `block` is the number of DSP_READY frames that board 2 sends before one of them is lost. The board still
+    // accepts all blocks, so it needs no second attempt.
     for block in [0, 2, 3, 5] {
         let mut bench = initialised(&[0x21, 0x42]);
         let id = bench.master.start(bench.now, Request::Update(group(&[1, 2]))).unwrap();
@@ -152,9 +153,9 @@ fn a_board_that_was_lost_in_a_group_may_be_erased() {
     assert_eq!(check_program(&mut bench, 1, 128), OLD);
 }
 
-/// D-43: after an error code of its CAN controller or of its start, or after an unknown code, a board still accepts blocks. The memory of
-/// this board is erased together with the memory of the other boards. If the answers of the board are lost, the report states this. If the
-/// answers of the board arrive, the master reads the board, which reports the program.
+/// D-43: after an error of its CAN controller or of its start, or after an unknown error code, a board still accepts
+/// blocks. Its memory is then erased together with the memory of the other boards. If its later answers arrive, the
+/// master reads the board and finds the new program. If they are lost, the outcome is `unknown`.
 #[test]
 fn d43_not_every_error_ends_a_transfer() {
     for code in ["06", "08", "09", "0B", "2A"] {

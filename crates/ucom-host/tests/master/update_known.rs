@@ -70,7 +70,7 @@ fn d62_the_flash_record_decides() {
             let expected = if is_sent { both("verified", true) } else { both("program-up-to-date", false) };
             assert_eq!((boards, code), (expected, if is_sent { 0 } else { 4 }), "{name} {mode:?}");
         }
-        // If image and address are equal to the image and address in the flash record, the board is up to date.
+        // The board is up to date if image and address are equal to those in the flash record.
         let (mut bench, mut options) = written();
         options.mode = mode;
         assert_eq!(again(&mut bench, options), (both("up-to-date", true), 0, false), "{mode:?}");
@@ -100,8 +100,8 @@ fn d62_an_accepted_program_is_not_verified() {
     assert_eq!((boards, code), (vec![("program-up-to-date", false)], 5));
 }
 
-/// D-62: the Program ID of a board covers program memory only. Every update writes a second image, for data memory, again, even if flash
-/// records exist.
+/// D-62: the Program ID of a board covers program memory only. Therefore every update writes a second image, which is
+/// for data memory, even if flash records exist.
 #[test]
 fn d62_data_memory_is_written_each_time() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };

@@ -58,7 +58,8 @@ fn d40_what_the_first_cycle_may_have_erased() {
     }
 }
 
-/// The update writes each of the two images to its memory. The report contains address, length and Program ID of each image.
+/// The update writes each of the two images to the memory that the plan defines. The report contains address, length
+/// and Program ID of each image.
 #[test]
 fn d40_two_images_reach_two_memories() {
     for (plan, memory) in [(Plan::ExloaderApp, Memory::Ram), (Plan::PmemXmem, Memory::Data)] {

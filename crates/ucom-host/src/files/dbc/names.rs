@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 /// Maximum length of a name that all readers of DBC files accept.
 const MAX: usize = 32;
 
-/// Words that have another meaning for a reader of DBC files or a C compiler.
+/// Reserved words, which are not allowed as names in DBC files or in C.
 const RESERVED: [&str; 44] = [
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
     "extern", "float", "for", "goto", "if", "int", "long", "register", "return", "short", "signed", "sizeof",
@@ -12,7 +12,7 @@ const RESERVED: [&str; 44] = [
     "BU_", "CM_", "BA_", "VAL_", "EV_", "NS_", "BS_", "VERSION", "inline", "restrict",
 ];
 
-/// Set of names that assigns a unique name to each text.
+/// Names that are already used. Each text gets a new name that differs from all of them.
 #[derive(Default)]
 pub(super) struct Names {
     used: BTreeSet<String>,
@@ -24,7 +24,7 @@ impl Names {
         Self { used: taken.iter().map(|name| name.to_ascii_lowercase()).collect() }
     }
 
-    /// Returns the unique name for a text. If the text has no letter or digit, the name is made from `fallback`.
+    /// Returns a new unique name for a text. If the text has no letter or digit, the name is made from `fallback`.
     pub(super) fn name(&mut self, text: &str, fallback: &str) -> String {
         let mut base = identifier(text);
         if base.is_empty() {

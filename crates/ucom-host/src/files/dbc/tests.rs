@@ -1,5 +1,4 @@
-//! Tests of the DBC files with the crate `can-dbc`. The crate `can-dbc` reads the DBC files, and the tests decode frames with the parsed
-//! files.
+//! Tests of the DBC files. The crate `can-dbc` reads the files, and the tests decode frames with the result.
 
 use can_dbc::{ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, ValueType};
 use std::panic;
@@ -61,7 +60,8 @@ fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     message.signals.iter().filter(applies).map(|s| (s.name.clone(), value(s, &data))).collect()
 }
 
-/// P-21: process data in a DBC file have the names in the board's description. The decoded values are equal in both byte orders.
+/// P-21: the sensor outputs in a DBC file have the names from the board's description. SO frames in either byte order
+/// decode to the same values.
 #[test]
 fn p21_so_frames_decode_by_name() {
     let numbers = [100_i16, -20, 32767, -32768, 5];
@@ -154,8 +154,8 @@ fn every_message_has_a_name_and_an_identifier_of_its_own() {
     ids.sort_by_key(|id| id.raw());
     ids.dedup();
     assert_eq!((names.len(), ids.len()), (count, count));
-    // Expected number of messages: 24 functions for each of two boards, 128 reports, and 11 for the broadcasts and the error without a
-    // board number.
+    // Expected number of messages: 24 functions for each of the two boards, 128 reports (4 functions with 32 numbers
+    // each), and 11 messages for the broadcasts and for the error of a board without a number.
     assert_eq!(count, 2 * 24 + 128 + 11);
 }
 

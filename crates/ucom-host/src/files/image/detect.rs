@@ -91,8 +91,9 @@ fn extension(name: Option<&Path>) -> Option<String> {
     name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-/// Returns the line number, as text, of the first complete or damaged record. The content may be a text in any encoding, with missing or
-/// damaged characters. The function returns `None` if the content is not a text, or if it has no such line.
+/// Returns the line number, as text, of the first complete or damaged record. The content can be a text in any
+/// encoding, with missing or damaged characters. The function returns `None` if the content is not a text, or if the
+/// text has no such record.
 fn record_place(content: &[u8]) -> Option<String> {
     // Removes bytes that are not letters: zeros of two-byte encodings, padding, and end marks of old systems.
     let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
@@ -104,8 +105,9 @@ fn record_place(content: &[u8]) -> Option<String> {
     Some(format!("line {line}"))
 }
 
-/// Returns `true` if the line has at least 8 hexadecimal digits, as the shortest records do, and hardly any other characters. If the line
-/// starts with the mark of a record, it is enough if half of its characters are hexadecimal digits.
+/// Returns `true` if the line is a complete or damaged record: it has at least 8 hexadecimal digits and hardly any
+/// other characters. If the line is the mark of a record (`:` or `S`) followed only by letters and digits, it is
+/// enough that half of the characters are hexadecimal digits.
 fn was_record(line: &[u8]) -> bool {
     let digits = line.iter().filter(|b| b.is_ascii_hexdigit()).count();
     let percent = match line {

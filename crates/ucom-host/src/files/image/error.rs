@@ -232,8 +232,8 @@ impl ImageError {
         }
     }
 
-    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high. The addresses of such records may
-    /// have another unit.
+    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high. A possible
+    /// cause is that the addresses have another unit.
     pub fn is_of_addresses(&self) -> bool {
         use LineProblem::{HalfWord, Overlap, TooLarge};
         matches!(

@@ -93,7 +93,7 @@ impl Segments {
         let beyond = ImageError::AddressRange { address_words: u32::MAX, words: 0 };
         let Ok(address_words) = words(first) else { return Err(beyond) };
         if first % 2 == 1 {
-            // No record contains the other half of the first word.
+            // The image begins in the middle of a word, and no record contains the other half of this word.
             return Err(ImageError::Gap { address_words, bytes: 1 });
         }
         let mut bytes: Vec<u8> = Vec::new();

@@ -1,4 +1,4 @@
-//! Tests with records from the published examples of the file formats, and with encoders that this file implements from the rules of the
+//! Tests with the published examples of the file formats, and with encoders in this file that follow the rules of the
 //! formats.
 
 use proptest::prelude::*;
@@ -226,9 +226,8 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// The test uses damaged Intel HEX and S-record files. The reader refuses each of these files because of its content,
-/// with and without the option for raw bytes, and with any name. The error never recommends an option that bypasses a
-/// check.
+/// The reader refuses damaged Intel HEX and S-record files because of their content, with any file name, and with and
+/// without the option for raw bytes. The error never recommends an option that bypasses a check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
@@ -299,8 +298,8 @@ fn characters_of_records_are_never_an_image() {
     }
 }
 
-/// On request, the reader reads a file with any name as raw bytes, except Intel HEX and S-record files. Even on request, the reader accepts
-/// a text only from a `.bin` file.
+/// With the option for raw bytes, the reader reads a file with any name as raw bytes, except Intel HEX and S-record
+/// files. It still accepts a text only from a `.bin` file.
 #[test]
 fn raw_bytes_on_request_are_looked_at() {
     let dir = tempfile::tempdir().unwrap();

@@ -135,8 +135,8 @@ pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<Par
     problems
 }
 
-/// Returns the words for a board whose description is known: first the words of its inputs, then the words of its parameters. If the entry
-/// of the board has errors, the function returns all of them.
+/// Returns the words for a board whose description is known: first the words of its inputs, then the words of its
+/// parameters. If the entry of the board in the file has errors, the function returns all errors.
 pub fn check_board(
     board: &ParamsBoard,
     description: &IoDescription,

@@ -165,8 +165,8 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: a saved file is read with another signal table, or without a table. Each value then gives the saved
-/// word or is refused, but never gives another word.
+/// D-11, D-35: a parameter file is saved with one signal table, and read with another signal table or without a
+/// table. Each value in the file results in the saved word or in an error, never in another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };

@@ -31,7 +31,8 @@ pub struct SavedSignal {
     pub signal: Signal,
     /// Requested word; `None` if the signal is written as a comment.
     pub word: Option<u16>,
-    /// Remark after the entry in the file. For a requested word, the remark is the time of writing.
+    /// Remark after the entry in the file. For a requested word, the remark contains the time at which the word was
+    /// written to the board.
     pub remark: String,
 }
 
@@ -90,9 +91,9 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// Returns the text that a parameter file contains for a 16-bit word. A parameter file may be read again with another
-/// signal table, or without one. A number without a unit could then give another word. Therefore the text is a number
-/// with a unit, which a reader without the table refuses, or the raw word.
+/// Returns the text that a parameter file contains for a 16-bit word: a number with a unit, on or off, or the raw
+/// word. A number without a unit could result in another word if the file is read with another signal table or
+/// without one. A reader without the table refuses a number with a unit.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
     let text = match signal.kind {
@@ -127,15 +128,15 @@ const KEY_MAX: usize = 1024;
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
-    // Another signal may have the name `#1`, which is also the form of an index. Additional `#` characters
-    // distinguish the index from every name.
+    // Another signal can have the name `#1`, which looks like an index. Therefore `#` characters are added until the
+    // index differs from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
     let fits = |name: &str| quoted(name).chars().count() <= KEY_MAX;
     let name = names.chain(numbers).find(|name| fits(name) && means(name)).unwrap_or_default();
     let word = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    // These words have a special meaning in YAML.
+    // These words have a special meaning in YAML, so they must be quoted as keys.
     let taken = ["null", "true", "false", "yes", "no", "on", "off", "y", "n"];
     if word && !taken.contains(&name.to_ascii_lowercase().as_str()) { name } else { quoted(&name) }
 }

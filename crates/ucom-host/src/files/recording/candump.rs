@@ -77,7 +77,8 @@ fn frame_of(text: &str) -> Result<RecordedFrame, RecordProblem> {
         return Err(RecordProblem::Id);
     }
     let made = |kind, data, dlc| RecordedFrame { id, extended: extended && !error, kind, data, dlc };
-    // The kernel reports errors as classic data frames.
+    // The kernel reports errors as classic data frames, so a line with the error flag cannot be a CAN FD frame or a
+    // remote frame.
     if error && body.starts_with(['#', 'R', 'r']) {
         return Err(RecordProblem::Data);
     }

@@ -185,8 +185,8 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         Ok(())
     });
-    // The length of the last chunk is missing if the writer was killed, so the read error may occur before the end of
-    // the file. A missing end mark shows that the file is incomplete.
+    // If the writer was killed, the length of the last chunk is missing, so the read error can occur before the end
+    // of the file. The missing end mark shows that the file is incomplete and not damaged.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
     let broken_off = |why: String| format!("the file ends after {} bytes{why}", file.len());
     recording.broken_off = match read {

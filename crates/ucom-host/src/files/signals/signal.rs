@@ -32,9 +32,9 @@ pub struct Signal {
     pub offset: f64,
     /// Unit such as `deg`; empty if the signal has no unit.
     pub unit: String,
-    /// Smallest value that may be written, in the signal's unit.
+    /// Smallest allowed value, in the signal's unit.
     pub min: Option<f64>,
-    /// Largest value that may be written, in the signal's unit.
+    /// Largest allowed value, in the signal's unit.
     pub max: Option<f64>,
     /// `true` if a signal table has an entry for the signal; otherwise the signal's word is raw.
     pub known: bool,
@@ -125,7 +125,7 @@ impl Signal {
         }
     }
 
-    /// Returns the smallest and the largest value that may be written, in the signal's unit.
+    /// Returns the smallest and the largest allowed value, in the signal's unit.
     pub fn range(&self) -> (f64, f64) {
         let (low, high) = self.words();
         let (a, b) = (self.scaled(low), self.scaled(high));
@@ -148,8 +148,8 @@ impl Signal {
         (text(low, self.min), text(high, self.max))
     }
 
-    /// Returns, as numbers, the smallest and the largest word whose values are within the limits. If no word is within the limits, the
-    /// first number is larger than the second.
+    /// Returns the smallest and the largest word whose values are within the limits, as numbers. If no word is within
+    /// the limits, the first number is larger than the second.
     pub(super) fn allowed(&self) -> (i32, i32) {
         let (low, high) = self.words();
         let steps = |limit: f64| (limit - self.offset) / self.scale;
@@ -168,8 +168,8 @@ impl Signal {
         !below && !above
     }
 
-    /// Returns the value that is really sent, with its unit, if no word can represent the requested value exactly;
-    /// returns `None` otherwise.
+    /// Returns the value that is sent, with its unit, if no word can represent the requested value exactly; returns
+    /// `None` otherwise.
     pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
         let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
@@ -177,11 +177,11 @@ impl Signal {
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// Returns the word that is sent for a value. If the signal has a scale, the function returns the word with the
-    /// nearest value, but never a word beyond the limits.
+    /// Returns the word that is sent for a value. If the signal has a scale, the word with the nearest value is sent,
+    /// but never a word beyond the limits.
     ///
     /// # Errors
-    /// Returns an error if the value is out of the limits or has another unit or type. A fraction is also an error if
+    /// Returns an error if the value is beyond a limit, or has another unit or type. A fraction is also an error if
     /// the signal has no scale.
     pub fn word(&self, given: &SignalValue) -> Result<u16, ValueError> {
         let text = || given.to_string();

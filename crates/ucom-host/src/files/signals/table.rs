@@ -20,7 +20,7 @@ pub struct SignalTable {
 /// Signals of one program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramSignals {
-    /// Program IDs of the versions of the program to which the table applies.
+    /// Program IDs of all program versions to which the table applies.
     pub program_ids: Vec<u16>,
     /// Name of the program for display.
     pub name: String,

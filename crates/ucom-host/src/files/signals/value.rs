@@ -10,8 +10,8 @@ const UNIT_MAX: usize = 32;
 pub enum SignalValue {
     /// `0x05DC`: a raw word, for any type and scale of the signal.
     Raw(u16),
-    /// Number, with or without a unit. `15.5 deg` is a value in the signal's unit. `15.5` is a value of a signal without a unit. Without a
-    /// signal table, `15.5` is the word as a number.
+    /// Number, with or without a unit. With a unit, as in `15.5 deg`, it is a value in the signal's unit. Without a
+    /// unit, it is a value of a signal that has no unit. Without a signal table, it is the word as a number.
     Number {
         /// Number in the text.
         value: f64,
@@ -64,8 +64,8 @@ impl FromStr for SignalValue {
         if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
-        // In some programming languages, 0o10 and -0x10 are numbers. The reader refuses such texts, so that it does
-        // not read them as 0 with a unit.
+        // Some programming languages accept numbers such as 0o10 and -0x10. The reader refuses them, because it would
+        // otherwise read the number 0 with a unit.
         let mut letters = unit.chars();
         let joined = !text.contains(char::is_whitespace);
         if joined

@@ -17,7 +17,7 @@ pub enum Life {
     Lost,
 }
 
-/// Time in µs after the end of a board's application during which a last heartbeat may still arrive.
+/// Time in µs after the end of a board's application within which a last heartbeat can still arrive.
 const UNDER_WAY: u64 = 100_000;
 
 /// Last known state of a board.
@@ -29,7 +29,7 @@ pub struct Board {
     pub description: Option<String>,
     /// Flags that the board sent last (`MCA_ADMIN_DATA`).
     pub admin: Option<Admin>,
-    /// State of the board's supervision.
+    /// State of the board's heartbeat supervision.
     pub life: Life,
     /// Time of the last heartbeat, µs.
     pub alive_at: Option<u64>,
@@ -47,7 +47,8 @@ pub struct Board {
     pub bad_strings: u64,
     /// Number of MCA_DSP_READY frames from the board, including frames without a request.
     pub ready_count: u64,
-    /// Start of the time in which the application is known to be stopped and no automatic start is pending.
+    /// Time since which the application has certainly been stopped, without a pending automatic start; `None` if this
+    /// is not known.
     pub(crate) stopped_at: Option<u64>,
     /// Time of the last start command to the board. The time is cleared when the board reports that it has started.
     pub(crate) starting_since: Option<u64>,
@@ -85,7 +86,8 @@ impl Board {
         self.life != Life::Lost && !self.rebooted
     }
 
-    /// Returns the state of the board in one word. Frames that the board sent without a request have priority over an older answer.
+    /// Returns the state of the board in one word. Frames that the board sends without a request, such as heartbeats
+    /// and outputs, have priority over an older answer to PC_INFO.
     pub fn state_name(&self, now_us: u64) -> &'static str {
         match (self.life, self.status()) {
             _ if self.rebooted => "rebooted",
@@ -146,7 +148,8 @@ impl Board {
         self.errors.push((at, code));
     }
 
-    /// Returns `true` if a heartbeat with the number of this board cannot be from the board itself (D-08).
+    /// Returns `true` if a heartbeat with the number of this board cannot come from the board, because its
+    /// application is known to be stopped (D-08).
     pub(crate) fn cannot_be_alive(&self, now: u64) -> bool {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }

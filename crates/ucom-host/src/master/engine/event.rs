@@ -52,7 +52,7 @@ pub enum Event {
         /// Text of the note.
         text: String,
     },
-    /// The supervision of a board's heartbeats changed.
+    /// The state of a board's heartbeat supervision changed.
     Supervision {
         /// Board number.
         board: u8,
@@ -61,7 +61,8 @@ pub enum Event {
     },
     /// A board reported an error.
     BoardError {
-        /// Board number; for a board without a number, the number that the profile defines for such boards (0 by default).
+        /// Number of the board. For a board without a number, it is the number that the profile defines for such
+        /// boards (0 by default).
         board: u8,
         /// Reported error code.
         code: ErrorCode,
@@ -92,9 +93,10 @@ pub enum Event {
     },
     /// A frame is not of this protocol (D-02). The master reports only the first foreign frame of each kind, but counts all foreign frames.
     Foreign(Foreign),
-    /// Another PC sent a frame and is therefore a competing master (D-08). The master reports this event only after at least one second
-    /// without frames of another PC. [`Master::competing_master`](crate::master::Master::competing_master) also returns a competing master
-    /// that sends permanently.
+    /// Another PC sent a frame and is therefore a competing master (D-08). The master reports the first frame, and a
+    /// later frame only if no other PC sent a frame in the second before it.
+    /// [`Master::competing_master`](crate::master::Master::competing_master) returns the last frame, also while the
+    /// competing master sends permanently.
     CompetingMaster {
         /// Function of the frame.
         function: Function,
@@ -105,7 +107,8 @@ pub enum Event {
     NumberShared {
         /// Number that the boards share.
         board: u8,
-        /// Flash numbers of the boards that share the number. The list contains one number twice if the boards cannot be distinguished.
+        /// Flash numbers of the boards that share the number. The list contains the same flash number twice if the
+        /// boards cannot be distinguished.
         found: Vec<u16>,
     },
     /// The master discarded events because the caller did not fetch them.

@@ -1,24 +1,24 @@
-//! Detection of board numbers that two boards share. The master checks every answer to PC_INFO, for each procedure.
+//! Detection of board numbers that two boards share. The master checks every answer to PC_INFO, in every procedure.
 //!
 //! If two boards have the same number, both boards carry out every command to this number: an update writes both
-//! boards, and both boards move. A board cannot detect a shared number, but the PC can, because two boards answer one
-//! PC_INFO. The master compares all answers ([`Holders::received`]). Before a procedure changes a board, the
-//! procedure waits until no other board can answer (`one_board_each`).
+//! boards, and a motion command moves both boards. A board cannot detect a shared number, but the PC can, because
+//! both boards answer a PC_INFO. The master compares all answers ([`Holders::received`]). Before a procedure changes
+//! a board, it waits until no further answer can arrive (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
-/// Number of consecutive PC_INFO requests that one flash number must answer twice before the board number is considered shared. A single
-/// double answer is not enough, because a gateway may sometimes send a frame twice.
+/// Number of consecutive PC_INFO requests that must each get two answers with the same flash number before the board
+/// number is considered shared. A single double answer is not enough, because a gateway can send a frame twice.
 const TWICE: u32 = 3;
 /// Limit of flash numbers that are stored for each board number. The limit is necessary because damaged answers may contain any flash
 /// number.
 const MOST: usize = 8;
 
-/// Returns the contents of a payload if it is the first frame of a DSP_INFO answer; returns `None` otherwise. The
-/// check compares the board number and the status, because a package of the description has other bytes at these
-/// positions.
+/// Returns the values in a payload if it is the first frame of a DSP_INFO answer; returns `None` otherwise. The
+/// function checks the board number and the status, because the packages of the description contain other bytes at
+/// these positions.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
     let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
@@ -36,15 +36,16 @@ pub(crate) struct Holders {
 struct Holder {
     /// Time of the last PC_INFO to the board number, µs.
     asked_at: Option<u64>,
-    /// Number of first frames in the answers to the last PC_INFO, by flash number. The next field is the number of
-    /// all other frames in these answers, and `of_one` is the number of other frames in one complete answer.
+    /// Number of first frames in the answers to the last PC_INFO, by flash number. `packages` counts all other frames
+    /// in these answers; `of_one` is the number of other frames in one complete answer.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
-    /// Number of consecutive earlier PC_INFO requests to which one flash number sent two answers.
+    /// Number of consecutive PC_INFO requests, before the last request, that got two answers with the same flash
+    /// number.
     twice: u32,
-    /// Number of PC_INFO requests that each flash number answered. The next fields are the flash number that answered
-    /// last, and the number of times that it changed.
+    /// Number of answered PC_INFO requests, by flash number. `last` is the flash number in the last answer; `changes`
+    /// counts how often it differed from the answer before.
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
@@ -95,9 +96,9 @@ impl Holder {
     /// Returns the flash numbers of the boards that share the board number, according to the answers received so far.
     /// The list is empty if the answers do not show a shared number.
     ///
-    /// Neither a single damaged answer nor the replacement of a board is mistaken for a shared number. If different
-    /// flash numbers answer different PC_INFO requests, each flash number must answer repeatedly, and the flash
-    /// numbers must alternate.
+    /// A single damaged answer, or the replacement of a board, must not look like a shared number. Therefore, if each
+    /// PC_INFO gets only one answer, at least two flash numbers must have answered more than once, and they must
+    /// alternate.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();
@@ -117,11 +118,11 @@ impl Holder {
 /// Next step of the check that a board number belongs to only one board.
 pub(crate) enum Open {
     Nothing,
-    /// Another board may still answer until this time.
+    /// Time until which another board can still answer.
     Wait(u64),
     /// No board has answered a recent PC_INFO to the board number.
     Ask,
-    /// One flash number answered twice, so one more PC_INFO is needed.
+    /// One flash number answered the same PC_INFO twice, so one more PC_INFO is needed.
     AskAgain,
 }
 
@@ -143,7 +144,7 @@ impl Holders {
         (!holder.shared.is_empty()).then(|| holder.shared.clone())
     }
 
-    /// Handles a frame of this PC, or of another PC, that may change which board has a board number.
+    /// Handles a frame of this PC, or of another PC, that can change which board has a board number.
     pub(crate) fn may_change(
         &mut self,
         function: Function,
@@ -162,7 +163,8 @@ impl Holders {
             _ => false,
         };
         match (forgets, function) {
-            // A reset to the number of unnumbered boards reaches all boards, with every value of `addr.broadcast`.
+            // A reset that is sent to the number for boards without a number reaches all boards, whatever
+            // `addr.broadcast` is.
             (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
             (true, _) => self.forget(to.number()),
             (false, Function::Info) if broadcast => {
@@ -179,8 +181,8 @@ impl Holders {
         mine.filter_map(|(_, holder)| holder.asked_at).max()
     }
 
-    /// Removes the recorded answers of a board number that another board may have now: the number was assigned or
-    /// withdrawn, or its board has rebooted.
+    /// Removes the recorded answers of a board number, because another board can have the number now: the number was
+    /// assigned or withdrawn, or its board has rebooted.
     pub(crate) fn forget(&mut self, number: u8) {
         self.numbers.remove(&number);
     }
@@ -190,7 +192,8 @@ impl Holders {
         self.numbers.clear();
     }
 
-    /// Returns the lowest of the given board numbers that boards share. Each bit of `numbers` is a board number.
+    /// Returns an error for the lowest of these board numbers that two boards share. Each bit of `numbers` is a board
+    /// number.
     pub(crate) fn shared(&self, numbers: u32) -> Option<IdentityError> {
         let mine =
             |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
@@ -198,20 +201,21 @@ impl Holders {
         Some(IdentityError::NumberShared { board: *board, found: holder.shared.clone(), given_back: false })
     }
 
-    /// Returns all board numbers that boards share.
+    /// Returns an error for each board number that two boards share.
     pub(crate) fn all_shared(&self) -> Vec<IdentityError> {
         self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
     }
 
-    /// Returns the board numbers to which one flash number has answered twice, but not often enough to be certain.
+    /// Returns the board numbers that two boards possibly share: one flash number has answered a PC_INFO twice, but
+    /// not often enough to be certain.
     pub(crate) fn doubtful(&self) -> Vec<u8> {
         let doubtful = |holder: &Holder| holder.shared.is_empty() && holder.answered_twice();
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// Returns the next step that is needed to be sure that a board number belongs to one board. The driver has
-    /// delivered all frames up to the time `received`. The function ignores a PC_INFO that was sent more than
-    /// `oldest` µs ago.
+    /// Returns the next step that is needed to be sure that a board number belongs to only one board. `received` is
+    /// the time up to which the driver has delivered all frames. `patience` is the time that boards have for an
+    /// answer, µs. A PC_INFO that is older than `oldest` µs is ignored.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {
@@ -228,7 +232,8 @@ impl Holders {
 mod tests {
     use super::*;
 
-    /// Simulates one PC_INFO to board 1 for each list of flash numbers that answer.
+    /// Simulates one PC_INFO to board 1 for each list in `answers`. A list contains the flash numbers of the boards
+    /// that answer. The function returns flash numbers if the answers show a shared number.
     fn question(holders: &mut Holders, answers: &[&[u16]]) -> Option<Vec<u16>> {
         let profile = Profile::default();
         let mut news = None;

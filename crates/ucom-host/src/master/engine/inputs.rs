@@ -7,7 +7,7 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percentage of the bus time that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
-/// Longest delay of the repeated inputs, in µs, that the master may make up by sending them at shorter intervals.
+/// Largest delay, in µs, that the master makes up for by repeating the inputs at shorter intervals.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
@@ -24,12 +24,12 @@ impl Core {
         all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
-    /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34).
-    /// The master sends the inputs of the board that has waited longest first.
+    /// Repeats the controller inputs of each board every `ci.period`, so that the loss of a frame has no lasting
+    /// effect (D-34). If the inputs of several boards are due, the board that has waited longest comes first.
     ///
     /// The repeated inputs use only a part of the bus time, even if boards were started with `force`. Without this
-    /// limit, inputs would delay answers and heartbeats, which have a lower priority on the bus. A socket does not
-    /// limit the inputs, because it accepts more frames than the bus can carry.
+    /// limit, inputs would delay answers and heartbeats, which have a lower priority on the bus. The queue of a
+    /// socket is no limit, because it accepts more frames than the bus can carry.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -61,9 +61,9 @@ impl Core {
         offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
-    /// Sends a changed controller input at once. If this PC repeats the inputs, it sends the complete package of inputs, which takes effect
-    /// as a whole (D-34). If this PC does not repeat the inputs, it sends only the changed word (DLC 4, D-15), because it does not know the
-    /// other words.
+    /// Sends a changed controller input at once. If this PC repeats the inputs, it sends the whole package of three
+    /// words that contains the input, because a package takes effect as a whole (D-34). Otherwise, it sends only the
+    /// changed word (DLC 4, D-15), because it does not know the other words.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
         let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
         if data.repeat.is_some() {
@@ -82,16 +82,16 @@ impl Core {
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
             data.ci_known.clear();
-            // The board may run another application now, so it must send its description again.
+            // The board can be running another application now, so it must send its description again.
             data.sent = false;
         }
     }
 
-    /// Writes one parameter of a board. The PC cannot read the value back, so its copy of the parameters marks the
-    /// value as assumed (D-35).
+    /// Writes one parameter of a board. The PC cannot read the value back, so it marks the value in its own copy of
+    /// the parameters as assumed (D-35).
     ///
     /// The package contains only the word of this parameter (DLC 4, which every receiver accepts). The other words of
-    /// the buffer may be unknown and must not change.
+    /// the buffer must not change, and the PC does not always know them.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };
         let Some(data) = self.data.get_mut(&board) else { return false };

@@ -61,15 +61,16 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Like [`Link::send`], but discards frames that were received before the frame left the queue.
+    /// Like [`Link::send`], but discards all frames that were received before the sent frame left the queue, because
+    /// they cannot be answers to it.
     pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but keeps error frames that were received before the frame left the queue. Procedures send
-    /// program data with `feed`, because a board may report an error in the middle of a block. The function returns
-    /// the time at which the frame left the queue.
+    /// Like [`Link::ask`], but keeps error frames that were received before the sent frame left the queue. Procedures
+    /// send program data with `feed`, because a board can report an error in the middle of a block. The function
+    /// returns the time at which the frame left the queue.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
@@ -133,7 +134,7 @@ impl Link {
         self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
 
-    /// Starts or stops the storage of every unparsed frame for [`Link::next_raw`].
+    /// Starts or stops the storage of unparsed frames, which [`Link::next_raw`] returns.
     pub(crate) fn tap(&self, on: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {

@@ -9,7 +9,7 @@ pub(crate) const MAX_RECEIVED: usize = 16_384;
 /// A frame of a board that a procedure receives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Received {
-    /// Time of reception in µs, on the clock that counts only the time that has certainly passed between frames
+    /// Time of reception in µs. The clock counts only the time that has certainly passed between received frames
     /// (`Core::passed`).
     pub at: u64,
     pub from: u8,
@@ -28,7 +28,7 @@ pub(crate) struct Filter {
 impl Filter {
     pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
         let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
-        // The filter always includes error frames, because a board may answer any request with an error.
+        // The filter always includes error frames, because a board can answer any request with an error.
         Self { boards, functions: functions | 1 << Function::Error.number() }
     }
 
@@ -56,7 +56,8 @@ pub(crate) struct Mailbox {
     pub bus_gone: Option<String>,
 }
 
-/// Received frames that a procedure discards when one of its frames leaves the queue, because they cannot be answers to that frame.
+/// Received frames that a procedure discards when a frame that it sends leaves the queue, because they cannot be
+/// answers to that frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Forget {
     Nothing,

@@ -63,7 +63,7 @@ pub(crate) struct Core {
     pub session: Session,
     /// Time, function and destination number of the last frame of another PC.
     pub competing_master: Option<(u64, Function, u8)>,
-    /// Time until which a report of a board is considered to be an answer, and not the sign of a reboot.
+    /// Time until which a report of a board counts as an answer. A later report shows that the board has rebooted.
     pub report_until: u64,
     /// Times at which stop commands will be repeated, with the boards. `on_lost` or the caller has requested these
     /// stops. The master repeats them because a frame can be lost.
@@ -266,8 +266,8 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure may wait until one of the removed frames leaves the queue. Removed frames before the first
-        // remaining frame count as sent, so that the procedure does not wait endlessly.
+        // A procedure may be waiting for a removed frame to leave the queue. Therefore all frames before the first
+        // remaining frame count as sent.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }

@@ -9,10 +9,10 @@ pub const WINDOW_US: u64 = 1_000_000;
 const SLOTS: usize = 10;
 const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
 
-/// Rate per second, computed as the sum of the amounts in the last second.
+/// Rate per second, computed as the sum of the amounts that were added in the last second.
 #[derive(Clone, Debug, Default)]
 pub struct Rate {
-    /// Time slots of the window. Each time slot has a number and a sum.
+    /// Latest time slots, each with its index and the sum of its amounts.
     slots: VecDeque<(u64, u64)>,
 }
 

@@ -92,8 +92,8 @@ impl Core {
         }
     }
 
-    /// Sends the stop command (`run = 0`) at once, and then two more times, because a stop must not depend on one frame. A repeated stop
-    /// command has no further effect.
+    /// Sends the stop command (`run = 0`) at once, and then two more times, because a single frame can be lost. A
+    /// repeated stop command has no further effect.
     pub(crate) fn stop_running(&mut self, to: Sequence) {
         self.urgent(to, ToBoard::Admin(Admin::default()));
         self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);
@@ -203,8 +203,8 @@ impl Core {
         } else {
             self.statistics.undecodable += 1;
         }
-        // The frame is also delivered to procedures, because a probe must detect boards that answer to the number for
-        // boards without a number.
+        // Procedures also receive the frame, because a probe must detect a board that uses the number that the
+        // profile reserves for boards without a number.
         self.deliver(from, message);
     }
 

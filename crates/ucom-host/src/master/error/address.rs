@@ -17,8 +17,8 @@ pub enum AddressError {
         /// Board number in the data.
         data: u8,
     },
-    /// The first board of the chain does not answer. If this board has no number, it would take the number that is
-    /// meant for another board.
+    /// The first board of the chain does not answer. If it has no number, it would take the number that the PC
+    /// assigns to another board.
     #[error("board {other} does not answer; if it has no number, it would take number {board}")]
     MayTakeNumber {
         /// Number that the PC wanted to assign.
@@ -26,8 +26,8 @@ pub enum AddressError {
         /// Number of the first board of the chain.
         other: u8,
     },
-    /// The boards that report differ from the boards that have a number. A new address assignment could give boards other numbers than
-    /// before.
+    /// The reports do not match the boards that have a number. Therefore a new address assignment could give boards
+    /// other numbers than before.
     #[error(
         "boards that report: {reports}, boards with a number: {boards}; these counts must be equal, and \
          each flash id must be unique"

@@ -42,8 +42,8 @@ pub enum IdentityError {
     NumberShared {
         /// Number that the boards share.
         board: u8,
-        /// Flash numbers of the boards that answered to this number. The list contains one number twice if the boards
-        /// cannot be distinguished.
+        /// Flash numbers of the boards that answered to this number. The list contains the same flash number twice if
+        /// the boards cannot be distinguished.
         found: Vec<u16>,
         /// `true` if the PC has withdrawn the number and no board answers to it.
         given_back: bool,

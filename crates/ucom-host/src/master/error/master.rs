@@ -1,4 +1,4 @@
-//! Errors of procedures that this PC did not begin or ended early.
+//! Errors for procedures that this PC refused to begin, or ended early.
 use crate::master::error::words::Boards;
 use host_kit::{Diagnose, Diagnosis, ErrorKind, next};
 use ucom::Function;

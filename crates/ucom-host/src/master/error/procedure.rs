@@ -85,8 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Returns the facts for a diagnosis of some boards. The facts contain the board number if there is exactly one
-/// board.
+/// Returns the facts for a diagnosis. The facts contain the board number if `boards` contains exactly one board.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

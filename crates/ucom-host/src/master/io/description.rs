@@ -27,8 +27,9 @@ impl Kind {
     }
 }
 
-/// Key under which a board's description is stored. The key contains the Program ID, the flash date (D-36) and the board. The key includes
-/// the board because boards with equal images can have different applications.
+/// Key under which a board's description is stored. The key contains the Program ID, the flash date (D-36) and the
+/// flash number. The flash number is necessary because the applications of two boards can differ even if their images
+/// are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {
     /// Flash number of the board.
@@ -49,7 +50,7 @@ impl DescriptionKey {
 /// Description that an application sends about itself and about every signal. The description is stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
-    /// Text about the application. This text may differ from the board's own description in DSP_INFO.
+    /// Text about the application. It can differ from the board's own description in DSP_INFO.
     pub description: String,
     /// Texts of the controller inputs.
     pub ci: Vec<String>,

@@ -101,7 +101,8 @@ mod tests {
             let whole: Vec<_> = packages(200).iter().filter_map(|p| assembler.push(5, p)).collect();
             assert_eq!(whole.len(), 1);
             assert_eq!(whole[0].words, (200..208).collect::<Vec<u16>>());
-            // If the first package is lost, the assembler cannot distinguish this loss from a start in the middle of a snapshot.
+            // Without the first package, the assembler cannot know that a snapshot has begun, so it does not count
+            // this snapshot as incomplete.
             assert_eq!(whole[0].incomplete_before, u64::from(lost > 0));
         }
     }

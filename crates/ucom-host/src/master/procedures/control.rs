@@ -35,8 +35,8 @@ pub(crate) async fn set_status_procedure(
         return forget_number(&link, board, mask, value).await;
     }
     if mask.has(Status::MSTART) && value.has(Status::MSTART) {
-        // The change starts the application, which needs as much time as after PC_START. Therefore the PC waits for
-        // MSTART before it reads the status back.
+        // Setting MSTART starts the application, which takes as long as a start by PC_START. Therefore the PC waits
+        // for MSTART before it reads the status back.
         let before = numbers(&link, board).await?;
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         if !before.status.has(Status::MSTART) {
@@ -49,7 +49,8 @@ pub(crate) async fn set_status_procedure(
     Ok(Outcome::Status { board, info: now })
 }
 
-/// Clears the INIT bit of a board. After this command, the board forgets its number, so its silence confirms the change.
+/// Clears the INIT bit of a board. The board then forgets its number and no longer answers, so its silence confirms
+/// the change.
 async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> Result<Outcome, Error> {
     let to = link.board(board)?;
     let before = numbers(link, board).await?;
@@ -317,8 +318,8 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// Returns the flags of a board before a change, as the board sent them last. If the board has not sent flags, the function derives them
-/// from the status, with the outputs off (D-37).
+/// Returns the flags of a board before a change: the last flags that the board has sent. If the board has sent no
+/// flags, the function derives them from the status, with the outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
     // A command that only ends motion must not wait for answers of boards.
@@ -330,8 +331,8 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
-    // The control loop bit is taken from the status byte, because the frame with the last flags of the board may have
-    // been lost.
+    // The frame with the last flags of the board may have been lost, so the control loop bit is taken from the status
+    // byte.
     Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
         active: flags.active && run,

@@ -1,5 +1,6 @@
-//! Reads the descriptions and the initial inputs of boards. A request for a description or for inputs changes nothing and is sent at most
-//! three times. The PC accepts an answer only if its totals are correct (D-14).
+//! Reads the descriptions and the initial inputs of boards. A request for a description or for inputs changes nothing
+//! and is sent at most three times. The PC accepts an answer only if the numbers of received strings and packages are
+//! correct (D-14).
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, Incomplete, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, SnapshotAssembler};
@@ -10,8 +11,7 @@ use ucom::{
     Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard,
 };
 
-/// Limit of strings that a board may announce in its description. A description with more strings is not possible, because a bus could not
-/// carry the data of more signals.
+/// Limit of the strings in a description. A board cannot have more signals, because a bus could not carry their data.
 const MAX_STRINGS: u32 = 4096;
 
 /// Parts of one description that were received so far.
@@ -63,7 +63,7 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
-    /// Returns the reason why the answer is not complete. If the byte order is probably wrong, the function returns this as the reason.
+    /// Returns the reason why the answer is not complete: `problem`, or the byte order if it is probably wrong.
     fn problem(&self, problem: Incomplete) -> Incomplete {
         let exchanged = |d: &Dimensions| {
             let all = [d.ci, d.so, d.par];
@@ -137,10 +137,11 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
 }
 
-/// Returns the description of a board whose application runs. The board must have sent the description since the application started.
+/// Returns the description of a board whose application runs. The board must have sent the description since the
+/// application started.
 ///
-/// A description that is stored only for this Program ID and date (D-36) may belong to another application. Therefore the names in such a
-/// description are not used to write values.
+/// A description from an earlier start can belong to another application, even if Program ID and date are equal
+/// (D-36). Therefore the names in such a description are not used to write values.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
     let kept = link.with(|core| {
@@ -186,7 +187,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // Each attempt is evaluated alone, because a board may change its values between two attempts.
+        // Each attempt starts with an empty buffer, because a board can change its values between two attempts.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;

@@ -150,7 +150,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // A single damaged frame may contain any values, so PC_INFO is sent again.
+            // A single damaged frame can contain any values, so PC_INFO is sent again.
             Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
                 if mismatch.as_ref() != Some(&e) =>
             {
@@ -188,7 +188,7 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
     Err(ExchangeError::Contradiction { board, tries: TRIES + 1 }.into())
 }
 
-/// Returns the values that are equal in all answers of one board.
+/// Returns the flash number, the Program ID and the flash date, which are equal in all answers of one board.
 pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }
@@ -229,9 +229,9 @@ pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// Sends a request that the board answers with its flags. An error that the board reports does not end the exchange. A bad bus can cause
-/// such errors, and a board often reports them when the request itself was lost. If all attempts fail, the function returns the error of
-/// the board.
+/// Sends a request that the board answers with its flags. An error of the board does not end the exchange: a bad bus
+/// can cause errors, and a board often reports an error when the request itself was lost. If all attempts fail, the
+/// function returns the error of the board.
 async fn ask_admin(
     link: &Link,
     board: u8,

@@ -1,8 +1,9 @@
 //! Assigns numbers to the boards of a chain, in the order of the init wire (section on initialisation: D-21, D-24).
 //!
-//! A board takes the number of PC_INIT(n) if it has no number and its incoming pin is active. After this PC has confirmed the number, it
-//! switches on the board's outgoing pin, which lets the next board accept a number. The PC repeats PC_INIT only after a PC_INFO. Without
-//! this PC_INFO, the next board would take the same number if a board switches on its pin by itself.
+//! A board takes the number of PC_INIT(n) if it has no number and its incoming pin is active. When this PC has
+//! confirmed the number, the PC switches on the outgoing pin of the board, so that the next board can take a number.
+//! The PC sends PC_INFO before it repeats PC_INIT. Otherwise, if a board has taken the number and has switched on its
+//! pin by itself, the next board would take the same number.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -88,8 +89,8 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
     }
     let seen = info(link, number).await?;
     one_board_each(link, &[number]).await?;
-    // The PC also switches on the outgoing pin if the board reports that this pin is already on. The additional command is harmless, and
-    // the PC must read the status back in any case.
+    // The PC sends this command even if the board reports that its outgoing pin is already on. The additional command
+    // is harmless, and the status must be read back in both cases.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
         // Either the answer of the board was damaged, or two boards have the same number.

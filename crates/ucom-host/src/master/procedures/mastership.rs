@@ -51,9 +51,10 @@ impl Link {
         }
     }
 
-    /// Reports heartbeats that another PC sends. A heartbeat with the number of a board may come from the board, or from another PC that
-    /// sends heartbeats only to this board. The status of the board shows the sender: a board that is not started sends no heartbeats. If
-    /// the board does not answer, the PC assumes that the board sent the heartbeat.
+    /// Reports heartbeats that another PC sends. A heartbeat with the number of a board can come from the board, or
+    /// from another PC that sends heartbeats only to this board. A board that is not started sends no heartbeats, so
+    /// the status of the board shows the sender. If the board does not answer, the PC assumes that the board sent the
+    /// heartbeat.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

@@ -73,7 +73,7 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Identit
     link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
-/// Waits until the last PC_INFO to these boards can no longer be answered. This is necessary because a board that shares a number may
+/// Waits until the last PC_INFO to these boards can no longer be answered, because a board that shares a number can
 /// answer late. Each bit of `boards` is a board.
 pub(crate) async fn last_answers(link: &Link, boards: u32) {
     let patience = link.times().info;

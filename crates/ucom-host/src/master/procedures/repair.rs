@@ -1,9 +1,11 @@
-//! Assigns a lost number to its board again while the other boards keep their numbers (section on initialisation: D-21, D-24).
+//! Assigns a lost number to its board again while the other boards keep their numbers (section on initialisation:
+//! D-21, D-24).
 //!
-//! PC_INIT(n) assigns the number to *every* board without a number whose incoming pin is active. Therefore only the outgoing pin of the
-//! board before n may be on when PC_INIT(n) is sent. The incoming pin of the first board is always active, so the first board must have its
-//! number. Other outgoing pins may be off, for example after a cancel. Pins that are off do no harm: only PC_INIT depends on them, and each
-//! repair switches on the pin that it needs.
+//! PC_INIT(n) assigns the number to *every* board without a number whose incoming pin is active. Therefore, when
+//! PC_INIT(n) is sent, no outgoing pin may be on except the pin of the board before n. The incoming pin of the first
+//! board is always active, so the first board must have its number. The other outgoing pins can also be off at other
+//! times, for example after a cancel. This does no harm: only PC_INIT depends on the pins, and each repair switches
+//! on the pin that it needs.
 
 use crate::master::engine::{Link, MS, head};
 use crate::master::error::{AddressError, Error, IdentityError};
@@ -51,7 +53,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
-        // A board with another flash number must lose the number. If that board kept the number, the next command would reach that board.
+        // A board with another flash number must lose the number. Otherwise, the next command would reach that board.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give up number {number}"));
@@ -68,16 +70,16 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
 
 /// Switches off the outgoing pins of all boards except the board before `number`, whose pin must be on.
 ///
-/// The function sends PC_SETSTATUS to every other number three times, even if no board answers: a board may work although its answers are
-/// lost. The function reads the status of each board that answers.
+/// The function sends PC_SETSTATUS to every other number three times, even if no board answers: a board can execute
+/// the command although its answers are lost. The function reads the status of each board that answers.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
     let first = numbers.first().map_or(number, |n| n.number());
     let feeder = (number > first).then(|| number - 1);
     if let Some(feeder) = feeder {
-        // The pin of the board before `number` stays on only if that board has a number. If the pin of the board before `number` is off, no
-        // board can take this number.
+        // No board can take `number` while the outgoing pin of the board before it is off, and this pin stays on only
+        // while its board has a number.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
             return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
@@ -174,8 +176,8 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The right board already has the number. At most its outgoing pin is off, so the repair only switches on
-        // this pin.
+        // The right board already has the number. Its outgoing pin can be off, so the repair only switches on this
+        // pin.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

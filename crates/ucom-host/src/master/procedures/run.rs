@@ -59,8 +59,8 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // Checks that can refuse the run (names, bus load) are made before a board is started, if the required data are
-    // already known.
+    // The checks that can refuse the run (names, bus load) are made before a board is started, if the data for them
+    // are already known.
     let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
@@ -133,8 +133,8 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // If the board was already running, this PC knows only the inputs that it sent to the board itself. The initial values must not replace
-    // the inputs that another PC has set, unless the user requests this.
+    // If the control loop was already running, this PC knows only the inputs that it has sent itself. It must not
+    // replace inputs of another PC by initial values, unless the user sets inputs.
     let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
     let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;

@@ -18,10 +18,11 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
-    // The scan sends another PC_INFO to each number that two boards may share. Numbers that two boards certainly share are reported below.
+    // The scan sends another PC_INFO to each number that two boards possibly share. Numbers that two boards certainly
+    // share are reported below.
     let doubtful = link.with(|core| core.holders.doubtful());
     let _ = one_board_each(&link, &doubtful).await;
-    // If a board has answered PC_INFO but has not reported, its report may have been lost.
+    // Detects boards that answered PC_INFO but did not report. Their reports may have been lost.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };

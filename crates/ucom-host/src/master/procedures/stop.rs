@@ -12,7 +12,8 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     link.board(board)?;
     link.become_master(force).await?;
     let info = stop_board(&link, board, level).await;
-    // A number that two boards share is only reported as an event, after both boards have received the stop command.
+    // The stop does not fail if two boards share the number, because both boards have received the stop command. The
+    // shared number is only reported as an event.
     let _ = one_board_each(&link, &[board]).await;
     Ok(Outcome::Status { board, info: info? })
 }
@@ -48,9 +49,9 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// Stops a board to which a start command was sent and which has not yet reported the start. Such a board may start at any time until
-/// `start.timeout` has passed. Therefore the board gets the stop command in any state, and the function reads the state of the board again
-/// after that time.
+/// Stops a board to which a start command was sent, but which has not reported the start yet. Such a board can start
+/// at any time until `start.timeout` has passed. Therefore it gets the stop command in any state, and the function
+/// reads its state again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;

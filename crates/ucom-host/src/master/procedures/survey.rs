@@ -50,8 +50,8 @@ impl Slot {
     }
 }
 
-/// Sends PC_INFO to all given numbers in at most four rounds. The function repeats PC_INFO until the board has sent a complete description
-/// and two answers that agree, or has been silent three times.
+/// Sends PC_INFO to all given numbers in at most four rounds. A number gets further requests until its board has sent
+/// a complete description and two answers that agree, or has been silent three times.
 pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
     let times = link.times();

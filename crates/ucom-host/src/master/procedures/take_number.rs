@@ -5,9 +5,9 @@ use crate::master::procedures::exchange::TRIES;
 use crate::master::procedures::exchange::{Answer, ask_info};
 use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
 
-/// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the function switches off the
-/// board's outgoing pin before each repetition. Without this step, the next board would also take the number if the board switches on its
-/// pin by itself.
+/// Sends PC_INIT at most three times, until the board acknowledges it or answers PC_INFO. If `lower` is set, the
+/// function switches off the board's outgoing pin before each repetition. Otherwise, the next board would also take
+/// the number if the board has switched on its pin by itself.
 pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
     let to = link.board(number)?;
     let nobody = link.profile().unnumbered().number();

@@ -148,9 +148,9 @@ impl Request {
         }
     }
 
-    /// Returns `true` if the request continues when two boards have the same number. A stop must not wait, and both boards receive the stop
-    /// command. This also applies to a change of flags that only ends motion. A scan, an init and a repair detect boards with the same
-    /// number themselves and report these boards in more detail.
+    /// Returns `true` if the request continues when two boards have the same number. A stop, and a change of flags
+    /// that only ends motion, must not wait, and both boards receive the command. A scan, an init and a repair detect
+    /// boards with the same number themselves and report them in more detail.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,

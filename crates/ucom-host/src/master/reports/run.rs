@@ -16,7 +16,7 @@ pub struct Setting {
 pub struct RunBoard {
     /// Board number.
     pub board: u8,
-    /// Inputs that the user sets to other values than the board's initial inputs.
+    /// Inputs whose values the user sets; these values replace the board's initial inputs.
     pub ci: Vec<Setting>,
     /// Parameters that the user sets.
     pub par: Vec<Setting>,

@@ -21,7 +21,7 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
         (word(&signal, "32767"), word(&signal, "-32768"), word(&signal, "0xFFEC")),
         (Ok(32767), Ok(32768), Ok(65516))
     );
-    // The conversion refuses a number that would be read back as another number.
+    // The conversion refuses a value that no word of this signal can represent.
     for wrong in ["32768", "40000", "65535", "-32769", "1.5", "3 deg", "on"] {
         assert!(word(&signal, wrong).is_err(), "{wrong}");
     }
@@ -60,7 +60,8 @@ fn d11_scale_offset_and_unit() {
     assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
     let down = signal(SignalType::Int16, -0.5, 0.0, "");
     assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
-    // Without the signal table, the number would be the raw word. The signal has no unit, so only a raw word is accepted.
+    // Without the signal table, the number would be the raw word; with the table, it would be scaled. The signal has
+    // no unit that could show the difference, so only a raw word is accepted.
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
         message.starts_with("2: the table has a scale but no unit for this signal")

@@ -97,8 +97,9 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     let answers = move |all: Vec<Frame>| -> Vec<Frame> {
         all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
     };
-    // An MCA_DUMP_IO_DESCRIPTION frame with data is always a board's answer, never a request (D-12). Only the board itself may send an
-    // MCA_DUMP_IO_DESCRIPTION frame with its number. Therefore no answer of the board may be pending when the test sends its frame.
+    // An MCA_DUMP_IO_DESCRIPTION frame with data is always a board's answer, never a request (D-12), and only the
+    // board itself may send such a frame with its number. Therefore the test sends its frame only when no answer of
+    // the board is pending.
     bench.send(Function::DumpIo, board, &[0]).await;
     let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {
@@ -181,8 +182,8 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
             continue;
         };
         wrong |= usize::from(profile.endian.word([*a, *b])) != first;
-        // Number of bytes that contain words of the buffer. With `pd.short_last`, the last package may end after
-        // these bytes. Any further bytes must be 0.
+        // Number of bytes in the package that contain words of the buffer. With `pd.short_last`, the last package can
+        // end after these bytes. Any further bytes must be 0.
         let surplus = 2 * usize::from(dimensions.ci).saturating_sub(first).min(3);
         wrong |= words.len() < surplus || words.iter().skip(surplus).any(|byte| *byte != 0);
     }

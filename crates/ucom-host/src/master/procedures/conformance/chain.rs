@@ -134,8 +134,9 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// Tests the automatic start of an application. In this test, the first board of the chain takes the number `board` after a reset.
-/// Therefore the chain must have been renumbered immediately before, and `board` must be the first board.
+/// Tests the automatic start of an application. The test resets all boards, and then sends PC_INIT with the number
+/// `board`, which the first board of the chain takes. Therefore `board` must be the number of the first board, and
+/// the chain must have been renumbered immediately before the test.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("this board does not exist".into()));

@@ -73,8 +73,8 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
-        // U-2: on the bus, program data have a higher priority than the process data of every running board, even if the board is not
-        // tested.
+        // U-2: program data have a higher priority on the bus than process data. Therefore tests that change boards
+        // are refused while any board runs, even a board that is not tested.
         let states = board_states(link).await;
         running.extend(states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b));
         running.sort_unstable();
@@ -93,8 +93,8 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
     Ok(Found { boards, strangers: !all })
 }
 
-/// Returns the number of different reports from boards. Also returns `true` if the reports match the numbered boards and if the low byte of
-/// each flash number is unique.
+/// Returns the number of different reports. The second value is `true` if the reports match the numbered boards and
+/// if the low byte of each flash number is unique.
 async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
     let mut reports = Reports::default();
     for _ in 0..2 {

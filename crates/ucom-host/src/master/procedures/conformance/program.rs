@@ -147,8 +147,8 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
         Case::Pause => {
             bench.send(Function::Prog, board, &[0x43; 8]).await;
             bench.link.sleep(300 * MS).await;
-            // A board may detect the pause only when the next frame arrives. The test also evaluates the frames that arrive during the
-            // pause.
+            // Some boards detect the pause only when the next frame arrives. The test also evaluates the frames that
+            // arrive during the pause.
             bench.link.with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
             bench.link.flush().await;
         }

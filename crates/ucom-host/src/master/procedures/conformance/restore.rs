@@ -99,8 +99,8 @@ pub(super) async fn put_back(
     Ok(())
 }
 
-/// Checks that the board answers and is the same board as before. A board may be silent for a long time, either because it erases its
-/// memory or because it has rebooted and lost its number.
+/// Checks that the board answers and is the same board as before. A board can be silent for a long time, because it
+/// erases its memory, or because it has rebooted and lost its number.
 async fn answering(
     link: &Link,
     before: &BoardSeen,
@@ -144,7 +144,7 @@ async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     Ok(())
 }
 
-/// Waits until the application has started, if it may be starting but did not run before the tests.
+/// Waits until the application has started, if it did not run before the tests and may be starting now.
 async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Result<BoardInfo, Error> {
     if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
         return Ok(now);

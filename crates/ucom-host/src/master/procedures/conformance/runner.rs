@@ -48,7 +48,8 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // If the user has not allowed the tests that need `--init`, each of these tests is listed only once, not once for each board.
+            // If the user has not allowed the tests that need `--init`, each of these tests is listed once, and not
+            // once for each board.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),

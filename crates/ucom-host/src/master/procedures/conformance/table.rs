@@ -36,11 +36,12 @@ impl Level {
 pub(super) enum Scope {
     /// The test covers the whole chain once.
     Chain,
-    /// The test covers the whole chain once. Boards may have no number before and after the test.
+    /// The test covers the whole chain once. The boards need no numbers before the test, and possibly have no numbers
+    /// after it.
     Numbers,
     /// The test covers each board.
     Board,
-    /// The test covers the board with the first number. After the test, boards may have no number.
+    /// The test covers the board with the first number. After the test, boards possibly have no numbers.
     First,
     /// The test covers the board that the user allowed the tests to program.
     Programmed,
@@ -69,7 +70,8 @@ pub(super) struct Test {
 }
 
 impl Test {
-    /// Returns `true` if a board must finish this test and the `next` test before another board begins this test.
+    /// Returns `true` if each board must complete this test and the `next` test before the tests of another board
+    /// begin.
     pub(super) fn goes_with(&self, next: &Self) -> bool {
         let board = |test: &Self| matches!(test.scope, Scope::Board | Scope::Programmed);
         board(self) && board(next) && (self.level == next.level || next.level == Level::Program)

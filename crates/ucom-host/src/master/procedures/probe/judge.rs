@@ -1,5 +1,5 @@
-//! Derives a profile from the frames that a probe received. If an observation determines the value of a profile key, the value is reported;
-//! other keys keep their values.
+//! Derives a profile from the frames that a probe received. A profile key gets a new value if an observation
+//! determines the value; the other keys keep their values.
 
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
@@ -18,7 +18,7 @@ pub(super) struct Seen {
     pub image: Option<Arc<[u8]>>,
     pub reports: Vec<Report>,
     pub raised: Option<bool>,
-    /// Number of boards that answered a PC_INFO to number 0, and number of boards that answered a PC_INFO to number 31.
+    /// Number of boards that answered a PC_INFO to number 0, and to number 31.
     pub broadcast: [usize; 2],
     /// `true` if a board has number 0.
     pub zero_answers: bool,
@@ -141,8 +141,8 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // `addr.first` is determined after the broadcast number, because 0 cannot be both the broadcast number and the number of the first
-    // board.
+    // 0 cannot be both the broadcast number and the number of the first board, so the broadcast number is determined
+    // before `addr.first`.
     let first = if seen.zero_answers {
         Some("0")
     } else {
@@ -157,8 +157,8 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
 
 fn strings(rows: &mut Rows, seen: &Seen) {
     let headers = seen.headers();
-    // Number of string headers that match an interpretation. An interpretation consists of a byte order and of a count that includes or
-    // excludes the header. The best interpretation must match more headers than any other interpretation.
+    // Number of string headers that match this byte order and a count that includes (`inclusive`) or excludes the
+    // header. The best combination must match more headers than each of the others.
     let fits = |endian: Endian, inclusive: bool| {
         let fit = |(count, packages): &&([u8; 2], usize)| {
             usize::from(endian.word(*count)) == packages + usize::from(inclusive) && (count[0] != count[1])

@@ -18,8 +18,8 @@ use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status
 /// the result.
 const ROUNDS: usize = 3;
 
-/// Returns the findings of a probe, or the error that ended it. In each case, the profile of the session does not change, and every board
-/// that the probe started is stopped again.
+/// Runs a probe, and returns its findings or the error that ended it. In both cases, the profile of the session does
+/// not change. Every board that the probe started is stopped again, unless the bus has failed.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let (before, mut begun) = (link.profile(), None);
     let result = link.or_cancel(measure(&link, &options, &mut begun)).await;
@@ -36,7 +36,8 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     result.map(Outcome::Probe)
 }
 
-/// Refuses steps that end control loops or interrupt their heartbeats while control loops run.
+/// Returns an error if control loops run and `force` is not set, because the next steps would end the loops or
+/// interrupt their heartbeats.
 fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     let running = |core: &mut Core| {
         let running = core.boards.iter().filter(|(_, board)| board.is_known() && board.running(core.now));
@@ -64,7 +65,8 @@ async fn measure(
         no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
         seen.raised = pin_raised(link).await?;
-        // All boards of the chain get numbers in this step. Values that the present profile interprets wrongly are corrected below.
+        // This step assigns numbers to all boards of the chain. Values that the present profile interprets wrongly
+        // are corrected in later steps.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
         if let Outcome::Init(report) = init(link.clone(), whole).await? {
@@ -119,8 +121,8 @@ fn use_profile(link: &Link, profile: Profile) {
     });
 }
 
-/// Collects the raw reports of all boards. The function requests the reports several times, because a board may be booting and a frame may
-/// be lost.
+/// Collects the raw reports of all boards. The function requests the reports several times, because a board can be
+/// booting, and a frame can be lost.
 async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     let mut reports = Vec::new();
     for _ in 0..ROUNDS {

@@ -140,12 +140,12 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The command is necessary because the board must not interpret the next program data as the remainder of this transfer. The PC sends
-    // the command while the board is still listed as in progress. Therefore the command is also sent if the user cancels the update at this
-    // moment.
+    // The board must not interpret the next program data as the remainder of this transfer. The PC sends the command
+    // while the board is still listed as in progress, so the command is also sent if the user cancels the update at
+    // this moment.
     leave_programming(link, board).await;
-    // If another board has taken the number since the transfer began, that board reports errors about program data, or receives the data in
-    // the wrong order.
+    // The cause of the failure can be that another board has taken the number since the transfer began. That board
+    // reports errors about program data, or receives the data in the wrong order.
     if let Err(error) = one_board_each(link, &[board]).await {
         session.fail_with(board, error.into());
         return None;

@@ -11,10 +11,12 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Updates all boards whose update is not done yet by one broadcast transfer. A board that leaves the group is then updated alone.
+/// Updates all boards whose update is not done yet by one broadcast transfer. A board that leaves the group is then
+/// updated alone.
 ///
-/// If a board outside the group keeps PROG = 1, the PC refuses the update. If a selected board fails before the transfer and may still
-/// accept program data, the procedure does not send a broadcast. The PC then updates the other boards one by one.
+/// If a board outside the group keeps PROG = 1, the PC refuses the update. If a selected board fails before the
+/// transfer, but possibly still accepts program data, the PC sends no broadcast and updates the other boards one by
+/// one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("the boards are updated one by one, because `addr.broadcast` is none".into());
@@ -70,10 +72,11 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Checks a board whose DSP_READY was lost: the board may have received the whole transfer together with the other boards. If the update of
-/// the board is done, the function verifies the program. If the update is not done, the session stores whether the flash was erased, as far
-/// as the answer of the board shows this. If the board already had this program before the update, its answer does not show whether the
-/// update is done.
+/// Checks a board whose DSP_READY was lost, because it may still have received the whole transfer. If the update of
+/// the board is done, the function verifies the program. Otherwise, the session stores whether the flash was erased,
+/// as far as the answer of the board shows this.
+///
+/// If the board already had this program before the update, its answer cannot show whether the update is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));
@@ -113,9 +116,9 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Starts the exloaders of the selected boards. The function returns the boards whose exloaders run. The second value
-/// is `true` if a board failed and did not confirm the end of its programming mode. Frames to the group would then
-/// erase that board without any report.
+/// Starts the exloaders of the selected boards, and returns the boards whose exloaders run. The second value is
+/// `true` if a board failed and did not confirm the end of its programming mode. Frames to the group would erase such
+/// a board without any report.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

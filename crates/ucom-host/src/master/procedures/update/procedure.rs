@@ -121,8 +121,9 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// Handles boards that were found in programming mode, if the update ends early. If this PC is already the master, the function ends the
-/// programming mode of these boards. If this PC is not the master, it may not send frames to these boards (D-08), so it reports them.
+/// Handles boards that were found in programming mode, if the update ends early. If this PC is the master, the
+/// function ends the programming mode of these boards. Otherwise, this PC must not send commands (D-08), so the
+/// function only reports the boards.
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
@@ -162,14 +163,16 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         session.refuse(&error.into());
         return Ok(());
     }
-    // U-2: on the bus, program data have a higher priority than the process data of running boards.
+    // U-2: program data have a higher priority on the bus than process data. Therefore the update is refused while
+    // boards run, unless `force` is set.
     let states = board_states(link).await;
     let running: Vec<u8> = states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b).collect();
     if !running.is_empty() && !session.options.force {
         session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
-    // D-08: a dry run checks this too, because the report of a dry run must show the result of a real update.
+    // D-08: a dry run also checks for another PC, because its report must show the result that a real update would
+    // have.
     if let Err(error) = link.look_for_master(session.options.force).await {
         session.refuse(&error);
         return Ok(());
@@ -227,7 +230,8 @@ fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<Up
     if other_date && !options.any_date {
         return None;
     }
-    // If the board's answer differs from its answer after the recorded update, the board has received another program since that update.
+    // The flash record is valid only if the board still reports the recorded Program ID and date. Otherwise, the
+    // board has received another program since the recorded update.
     let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
     Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }

@@ -139,7 +139,7 @@ impl UpdateSession {
         }
     }
 
-    /// Cancels the start of each board whose update only lacks the start of the application.
+    /// Cancels the start of each board whose update is complete except for the start of the application.
     pub(super) fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);

@@ -24,8 +24,8 @@ pub(super) enum Broken {
 }
 
 impl Broken {
-    /// Returns `true` if the board discards the following program data (D-43), because it has reported a programming error. After any other
-    /// error, and after silence, the board may still accept program data.
+    /// Returns `true` if the board discards the following program data (D-43), because it has reported a programming
+    /// error. After any other error, and after silence, the board possibly still accepts program data.
     pub(super) fn ended_transfer(self) -> bool {
         use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
         let Self::Device { code, .. } = self else { return false };
@@ -54,8 +54,8 @@ pub(super) struct Transferred {
 }
 
 impl Attempt<'_> {
-    /// Sends the blocks of both cycles. The function calls `erasing` before the first frame of a cycle that may erase memory. The arguments
-    /// of `erasing` are the boards that still take part in the attempt, and the boards that have left it.
+    /// Sends the blocks of both cycles. Before the first frame of a cycle that can erase memory, the function calls
+    /// `erasing` with two lists: the boards that still take part in the attempt, and the boards that have left it.
     pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);
@@ -85,8 +85,8 @@ impl Attempt<'_> {
         out
     }
 
-    /// Sends the eight frames of a block of program data. A frame that was received before the last of these frames left the queue is not
-    /// an answer to the block.
+    /// Sends the eight frames of a block of program data. Only an error can be an answer to the block before the last
+    /// of these frames has left the queue; other frames that were received before are discarded.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
         let mut next = 0;

@@ -89,7 +89,8 @@ pub enum UpdateFailure {
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
-        /// State of the board after the cancel. The state is the outcome of the board, or `Running` if the application may be running.
+        /// State in which the cancel left the board: the outcome of the board, or `Running` if the application may be
+        /// running.
         left: UpdateOutcome,
     },
     /// An earlier board of the list failed, so the update of this board was skipped.

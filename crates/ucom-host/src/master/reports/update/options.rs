@@ -45,11 +45,11 @@ pub struct UpdateOptions {
     pub targets: Vec<UpdateTarget>,
     /// Image to write.
     pub image: UpdateImage,
-    /// Second image, which is sent in the other cycle. With the plan `exloader-app`, this image is sent in the first cycle. With the plans
-    /// `pmem-xmem` and `raw`, this image is sent in the second cycle.
+    /// Second image. With the plan `exloader-app`, the second image is sent in the first cycle, and the main image in
+    /// the second cycle. With the plans `pmem-xmem` and `raw`, the second image is sent in the second cycle.
     pub second: Option<UpdateImage>,
-    /// Program ID that the user expects. If the image determines its Program ID, both IDs must be equal. If the image
-    /// does not determine it (plan `raw`, `prog.header` or `prog.checksum` `none`), the board must report the
+    /// Program ID that the user expects. If the Program ID of the image is known, it must be equal to the expected
+    /// ID. If it is not known (plan `raw`, or `none` for `prog.header` or `prog.checksum`), the board must report the
     /// expected ID at the end.
     pub expect_program_id: Option<u16>,
     /// Flash date as a 16-bit word, see [`DateForm`](ucom::DateForm).
@@ -70,9 +70,10 @@ pub struct UpdateOptions {
     pub rewrite: bool,
     /// `true` to start the application at the end of the update.
     pub start: bool,
-    /// `true` to report no failure for an image that cannot be verified. This is the case with plan `raw`, or with `prog.header` or
-    /// `prog.checksum` `none`, and without [`expect_program_id`](Self::expect_program_id). The option also applies to a board that already
-    /// reports the program but whose flash content is not known (D-62).
+    /// `true` to report no failure if a written program cannot be verified. A program cannot be verified with the
+    /// plan `raw`, or if `prog.header` or `prog.checksum` is `none`, unless
+    /// [`expect_program_id`](Self::expect_program_id) is set. The option also applies to a board that already reports
+    /// the program but whose flash content is not known (D-62).
     pub accept_unverified: bool,
     /// `true` to continue with the next board after a failure of one board.
     pub keep_going: bool,

@@ -85,7 +85,7 @@ pub struct PlannedImage {
     pub address_words: Option<u32>,
     /// Length of the image in bytes.
     pub bytes: usize,
-    /// Program ID of the image (D-44); `None` if the ID is not visible or not computed.
+    /// Program ID of the image (D-44); `None` for one of the reasons in [`Unverifiable`].
     pub program_id: Option<u16>,
 }
 

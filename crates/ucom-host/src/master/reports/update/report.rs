@@ -19,8 +19,9 @@ pub struct UpdateResult {
     pub after: Option<BoardInfo>,
     /// Outcome of the update.
     pub outcome: UpdateOutcome,
-    /// `true` if PC_INFO returns the Program ID and date of the image, and this tool has written exactly this image to this address. The
-    /// image was written in this update, or in an earlier update according to the flash record.
+    /// `true` if PC_INFO returns the Program ID and date of the image, and this tool has written exactly this image
+    /// to this address. The tool has written it in this update, or in an earlier update that the flash record
+    /// describes.
     pub verified: bool,
     /// Number of attempts to update the board.
     pub attempts: u32,

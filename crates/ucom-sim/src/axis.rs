@@ -1,8 +1,8 @@
 //! Motor axis that a board's application moves in a simulated chain.
 use serde::Deserialize;
 
-/// Step of the numerical integration, s. The step is small compared with the time constants of the largest gains that the words of the
-/// protocol can represent.
+/// Step of the numerical integration, s. The step is short compared with the time constants of the position control,
+/// even with the largest gains that the words of the protocol can represent.
 const STEP_S: f64 = 0.000_5;
 /// Speed below which friction stops the axis, °/s.
 const STANDS_DEG_S: f64 = 0.5;
@@ -79,7 +79,7 @@ pub(super) struct Axis {
     pub current: f64,
     /// Temperature of the motor, °C.
     pub temperature: f64,
-    /// Set point, in degrees, that moves to the set position within the speed limit.
+    /// Set point of the position controller, degrees. It moves towards the set position, at most at the speed limit.
     pub reference: f64,
 }
 

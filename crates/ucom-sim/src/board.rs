@@ -21,7 +21,8 @@ pub(super) struct Board {
     node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
     /// `true` for the first board of the chain, whose incoming pin is strapped active.
     strapped: bool,
-    /// `true` while the board has no power; each of the next three fields is `true` while the fault of its name is active.
+    /// `true` while the board has no power. `silent`, `deaf` and `ack_held` are `true` while the fault of the same
+    /// name is active.
     pub unpowered: bool,
     pub silent: bool,
     pub deaf: bool,
@@ -35,7 +36,7 @@ pub(super) struct Board {
     /// INITACK that the board holds back because the fault `ack_held` is active.
     held: Option<Frame>,
     next_us: u64,
-    /// Contradictory status bits that the board has had, as text; `None` if its status was always possible.
+    /// Contradiction between status bits that the board has had, as text; `None` if its status was always possible.
     pub violation: Option<&'static str>,
 }
 
@@ -207,7 +208,7 @@ impl Board {
         }
     }
 
-    /// Assigns a number that another board has already taken to this board, as if both boards had received one PC_INIT.
+    /// Gives this board a number that another board already has, as if both boards had received one PC_INIT.
     pub(crate) fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
@@ -258,8 +259,8 @@ pub struct BoardState {
     pub driven: bool,
 }
 
-/// Returns the application that the factory programs into a board. The function derives the image from the description, so that boards have
-/// different applications.
+/// Returns the image of the application that a new board contains. The image is derived from the description, so that
+/// boards have different applications.
 fn image(config: &BoardConfig) -> Vec<u8> {
     let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();

@@ -1,5 +1,5 @@
-//! Parts of a board in memory, for tests, examples and simulations: flash with times and faults, a pin on a wire, a store, and an
-//! application that records its calls.
+//! Simulated parts of a board in memory, for tests, examples and simulations: flash with operation times and faults,
+//! init pins on a wire, a store, and an application that records its calls.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -97,8 +97,8 @@ impl MemoryFlash {
         }
     }
 
-    /// Starts a flash operation. The function returns the extent to which the operation is performed: 2 for complete, 1 for half, 0 for not
-    /// at all.
+    /// Starts a flash operation. The function returns how much of the operation is performed: 2 for all, 1 for half,
+    /// 0 for nothing.
     fn begin(&mut self, now_us: u64, duration: u64) -> Result<usize, FlashError> {
         if self.dark {
             return Err(FlashError);
@@ -342,7 +342,7 @@ impl Application for MemoryApplication {
         self.sampled_so.clone_from(&self.so);
     }
 
-    // The trait calls the snapshot of the outputs `so`.
+    // In the trait `Application`, `so` returns the outputs of the last snapshot, not the present outputs.
     #[allow(clippy::misnamed_getters)]
     fn so(&self) -> &[u16] {
         &self.sampled_so

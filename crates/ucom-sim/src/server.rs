@@ -29,7 +29,8 @@ pub struct ChainServer<'a> {
     leaving: Vec<MemberId>,
     started: Instant,
     start_us: u64,
-    /// Last frame on the wire: the time in ns at which it ended, the frame, and the frames that clients receive for it.
+    /// Last frame on the wire: the time in ns at which it ended, the frame, and the copies of it that clients
+    /// receive.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
     /// Clients that received a message that their CAN controller is bus-off.
     off: BTreeSet<ClientId>,
@@ -81,8 +82,8 @@ impl<'a> ChainServer<'a> {
         self.bus.stats()
     }
 
-    /// Serves the clients and the boards. The function waits for an event of a client. This wait ends at the next event of the chain or the
-    /// bus, or after `patience`.
+    /// Serves the clients and the boards. The function waits for an event of a client, at most until the next event
+    /// of the chain or the bus, and at most for `patience`.
     pub fn turn(&mut self, patience: Duration) {
         let now_us = self.now_us();
         self.advance(now_us);
@@ -178,7 +179,8 @@ impl<'a> ChainServer<'a> {
                 }
                 // Frames of several members that are equal bit for bit are one frame on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // The faults were already applied to frames of clients when the server received them.
+                    // Only frames of boards are changed by the faults here. The faults were already applied to frames
+                    // of clients when the server received them.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }

@@ -42,7 +42,8 @@ pub struct ChainSim {
 }
 
 impl ChainSim {
-    /// Creates a chain of boards at power-up. `profile` defines the frames of the fault `foreign-master`.
+    /// Creates a chain of boards at power-up. `profile` defines the frames that another PC sends with the fault
+    /// `foreign-master`.
     pub fn new(config: &ChainConfig, faults: Vec<Fault>, seed: u64, profile: &Profile) -> Self {
         let board = |(i, board)| Board::new(board, i == 0, seed.wrapping_mul(31).wrapping_add(i as u64));
         let boards: Vec<Board> = config.boards.iter().enumerate().map(board).collect();
@@ -159,7 +160,8 @@ impl ChainSim {
     /// Applies the faults `lost`, `corrupted` and `doubled` to data between the chain and its clients. The function returns zero, one or
     /// two copies of the data.
     pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
-        // The number of random values per call is constant, so that the setting of one fault does not change the effect of other faults.
+        // Each call uses the same number of random values, so that the setting of one fault does not change the
+        // effect of other faults.
         let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
         if lost < self.lost {
             return Vec::new();
@@ -195,7 +197,7 @@ impl ChainSim {
         }
     }
 
-    /// Assigns the number of the previous board in the chain to a board, if the previous board has a number.
+    /// Gives a board the number of the previous board in the chain, if the previous board has a number.
     fn share_number(&mut self, i: usize) {
         let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
         if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {

@@ -85,7 +85,8 @@ fn the_same_seed_gives_the_same_frames() {
     };
     let first = run(1);
     assert!(first.len() > 300 && first == run(1));
-    // Only the back-off of flags that are sent without a request is random: it depends on the seed.
+    // Another seed results in other frames: it changes the random back-off of flags that boards send without a
+    // request.
     assert_ne!(first, run(2));
 }
 

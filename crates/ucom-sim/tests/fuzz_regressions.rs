@@ -11,7 +11,8 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// The input contains a number, a start, a run, and a frame that is too short. The test also runs all truncations of this input.
+/// The input assigns a number to the board, starts its application and its control loop, and contains a frame that is
+/// too short. The test also runs all truncations of this input.
 #[test]
 fn a_history() {
     let mut history = Vec::new();

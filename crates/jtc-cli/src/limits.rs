@@ -33,7 +33,7 @@ pub(crate) fn refused(arm: &str, differences: &[Difference], out: &Output) -> Fa
     listed(&Failure { message, ..Failure::of(&error) }, differences, out)
 }
 
-/// Like [`accept`], but compares all parameters of an arm with the arm that the controller `has` (J-55).
+/// Like [`accept`], but compares all parameters of `arm` with `has`, the arm of the controller (J-55).
 pub(crate) fn same_arm(
     arm: &Arm,
     has: &Arm,

@@ -31,8 +31,9 @@ impl LinkArgs {
         Ok(self.open_as(policy, true)??)
     }
 
-    /// Opens the link for a Stop or a Pause. An agent on this computer accepts a Stop or a Pause without a token, and even with an unknown
-    /// token. The inner error is the error of opening a serial port that no agent of this user has opened.
+    /// Opens the link for a Stop or a Pause. An agent on this computer accepts both without a token, and even with an
+    /// unknown token. If no agent of this user has opened the serial port and the port cannot be opened, the inner
+    /// error contains the reason.
     pub(crate) fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
             // The agent does not answer, so a second attempt would only waste time.

@@ -18,8 +18,8 @@ use frames::{Frames, Incoming};
 pub(crate) use pty::{Pty, PtyError};
 pub(crate) use typed::{Typed, hand};
 
-/// Largest number of host bytes that wait for transmission, like the buffer of a serial adapter. When this buffer is full, writes of
-/// the host block.
+/// Largest number of host bytes that the simulator buffers for transmission, like a serial adapter. When this buffer
+/// is full, writes of the host block.
 const WAITING_MAX: usize = 4096;
 /// Longest wait for a host that does not read, if virtual time does not follow the real-time clock. After this wait,
 /// statuses are lost.

@@ -15,8 +15,8 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Begins a recording in `output`. The file name extension selects the format. The function discards an earlier recording in the
-    /// file. The recording reports a later write error at once. `goes_on` is the part of the error message that describes the
+    /// Begins a recording in `output`, and discards an earlier recording in the file. The file name extension selects
+    /// the format. A later write error is reported at once; `goes_on` is the part of this message that describes the
     /// consequence.
     pub(crate) fn begin(
         output: &mut OutputFile,

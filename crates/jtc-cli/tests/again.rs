@@ -54,7 +54,8 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     assert!(part["position_min_rad"].as_f64().unwrap() > -0.01, "{part}");
 }
 
-/// If a recording without its trajectory ends in motion, the output suggests a next step, and this step works.
+/// A CSV recording contains only a part of a motion, because the run was interrupted. The error of `traj replay`
+/// suggests `--measured` and `traj continue`, and both suggestions work.
 #[test]
 fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -163,8 +164,9 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let before = place(&sim);
         assert!(before[0] > 0.01, "{before:?}");
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // If the recording includes the stop, it contains the final position of the arm. A recording that ends before the stop does not
-        // contain the final position.
+        // If the recording contains the stop, the motion continues from the position at which the arm came to rest.
+        // The recording of a killed program may end before the stop; the command then reports that it has no later
+        // position.
         let stands =
             output.err.contains("and the arm is at rest there: the motion continues from that position");
         assert!(stands || signal == "-KILL" && output.err.contains("no later position"), "{}", output.err);
@@ -174,14 +176,16 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         assert!((3.0..6.0).contains(&executed), "{executed} s of the 6 s are left");
         at(&sim, [0.0; 6]);
     }
-    // A trajectory at another speed has other points, so this trajectory does not match the recording.
+    // The recorded run had another speed, so the points of the trajectory file do not match the recording. The
+    // command must refuse it.
     let half = sim.path("half.csv");
     let mut child = moving_with(&sim, &[&file, "--speed", "80", "--record", &half]);
     cli_kit::testing::signal(&child, "-INT");
     child.wait().unwrap();
     let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
     assert!(output.err.contains("at another speed"), "{}", output.err);
-    // A finished run has no remainder. A CSV recording does not contain the commanded path.
+    // A CSV recording does not contain the complete trajectory, so the command needs the trajectory file. The
+    // recorded run has finished, so no part of it remains, and the command is refused.
     let (other, whole, rest) =
         (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
     sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
@@ -215,9 +219,9 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     at(&sim, [0.0; 6]);
 }
 
-/// After an interruption in the second of three runs, the command executes the remainder of the second run, and then
-/// the third run. This also works with the recording of a continued run, and if the controller has finished the run
-/// after the program was killed.
+/// If the second of three runs is interrupted, the command executes the remainder of this run, and then the third
+/// run. The same holds for the recording of a continued run, and for a run that the controller has finished after its
+/// program was killed.
 #[test]
 fn the_runs_that_are_left_are_run() {
     let sim = Sim::start(&["--no-throttle"]).held();

@@ -59,7 +59,8 @@ fn j55_a_run_without_an_arm_file_is_checked_with_the_arm_of_the_controller() {
     let dir = Dir::new();
     let text = include_str!("../../../arms/avena.toml");
     let wide = dir.file("wide.toml", &text.replacen("position_max_rad = 2.97", "position_max_rad = 2.99", 1));
-    // Joint 1 moves to 2.98 rad and back. The limit of the built-in arm is 2.97 rad.
+    // Joint 1 moves to 2.98 rad and back. The limit of the built-in arm is 2.97 rad, and the limit in `wide` is 2.99
+    // rad. The motion must therefore pass only with the arm `wide`.
     let mut motion = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=500 {
         let s = f64::from(i) / 500.0;

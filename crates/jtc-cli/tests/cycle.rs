@@ -138,7 +138,7 @@ fn runs(desk: &Desk) {
     page.finish();
 }
 
-/// The simulator runs in real time, so that the test can stop a motion.
+/// Tests the section about an interrupted run. The simulator runs in real time, so that the test can stop a motion.
 fn broken_off() {
     let mut page = Page::new(PAGE, "continue");
     let desk = Desk::simulated(&["--no-throttle"]);

@@ -137,7 +137,8 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     let way = sim.json(&["jog", "3", "0.2", "--duration", "1"], 0);
     let at = |value: &Value, j: usize| value[j].as_f64().unwrap();
     let moved = at(&way["to_rad"], 2) - at(&way["from_rad"], 2);
-    // The permitted range is wide, because the arm comes to rest if a busy computer repeats the jog too late.
+    // The permitted range is wide: on a busy computer, the command may repeat the jog too late, and the arm then
+    // comes to rest in between.
     assert!((0.05..0.25).contains(&moved), "{moved}");
     assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
     let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
@@ -168,7 +169,8 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
         "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 4\nin_state = \"hold\"\nafter_s = 10\n";
-    // The drives are enabled 4 s after the controller enters HoldPos. Without the fault, the jog would take a minute.
+    // Joint 4 stops answering 10 s after the controller enters HoldPos; the drives are enabled after 4 s. The fault
+    // therefore occurs during the jog, which would otherwise take a minute.
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
     let output = sim.jtc(&["--json", "jog", "2", "0.01", "--duration", "60"]).ends(5);
     let error = &output.json()["error"];
@@ -228,7 +230,7 @@ fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
 }
 
-/// If the user only stores parameters, the controller must not start position hold with these parameters.
+/// While `arm push --store` only stores an arm, the controller must not start position hold with the new parameters.
 #[test]
 fn j54_an_arm_that_is_stored_is_not_held_in_between() {
     let dir = tempfile::tempdir().unwrap();

@@ -39,8 +39,8 @@ fn image(board: &str) -> Vec<u8> {
     bytes
 }
 
-/// Creates a USB drive with this label, an image, and a catalogue of images. The catalogue is in another folder and lists the image
-/// with a wrong digest.
+/// Creates a USB drive with this label, an image, and a catalogue of images with a wrong digest. Returns the
+/// directory of the test, the path of the drive and the path of the image.
 fn desk(label: &str) -> (Dir, String, String) {
     let dir = Dir::new();
     fs::create_dir(dir.path(label)).unwrap();
@@ -208,8 +208,8 @@ mod with_a_board {
         let board = Board::new(H745, Path::new(&drive), image(H745).len());
         let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
         let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
-        // In the second pass of the loop, a board already runs the image. The command cannot determine if the USB drive
-        // belongs to this board.
+        // In the second pass of the loop, the board already runs the image. The command must still write the image,
+        // because it cannot determine whether the USB drive belongs to this board.
         for _ in 0..2 {
             let done = json(&jtc(&dir, &words).ends(0));
             assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");
@@ -255,8 +255,8 @@ mod with_a_board {
             },
             "the report of the board has changed in the meantime",
         );
-        // The USB drive is unmounted, but its folder still exists. After that, another USB drive is mounted at this
-        // folder.
+        // Before the user answers, another USB drive is mounted at this folder, or the USB drive is unmounted and its
+        // folder stays. The command must detect both changes.
         let page = Path::new(&drive).join("MBED.HTM");
         answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is at this place");
         fs::remove_file(page).unwrap();

@@ -145,8 +145,8 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
     assert!(durations[1] <= durations[0] && durations[2] < durations[1], "{durations:?}");
 }
 
-/// The arc is a quarter circle about the vertical axis of the base. The command ignores the orientation of the point on the arc, so the
-/// file may omit it.
+/// The arc is a quarter circle about the vertical axis of the base. The command ignores the orientation of the point
+/// on the arc, so the file can omit it.
 #[test]
 fn an_arc_is_round() {
     let dir = Dir::new();
@@ -227,7 +227,7 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
             legs.iter().enumerate().map(|(i, leg)| format!("0.6,{},0.4,0,0,0,1,{leg}\n", 0.1 * i as f64));
         format!("x,y,z,qx,qy,qz,qw,leg\n{}", rows.collect::<String>())
     };
-    // In each of these files, the column `leg` has an error.
+    // In each of these files, the column `leg` has an error, which the command must report.
     for (kinds, message) in [
         (&["", "via", "line"][..], "refused.csv, line 3: `via` (a point on an arc) is not followed by `arc`"),
         (&["", "line", "via"], "refused.csv, line 4: `via`"),
@@ -241,14 +241,13 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
         let refused = dir.refused(&legs(kinds), &[], 2);
         assert!(refused.contains(message), "{kinds:?}: {refused}");
     }
-    // Three collinear points do not define an arc.
+    // Three collinear points do not define an arc, so the plan is refused.
     let refused = dir.refused(&legs(&["", "via", "arc"]), &[], 4);
     assert!(
         refused.contains("line 4: waypoint 3: the three points of the arc are not on a circle"),
         "{refused}"
     );
-    // In the first plan, the end point is out of reach of the arm. In the second plan, the arm can reach both end points, but not the
-    // middle of the line.
+    // The last waypoint is out of reach of the arm. The error must name this waypoint.
     let far = "x,y,z,qx,qy,qz,qw\n0.6,0,0.4,0,0,0,1\n0.6,0.2,0.4,0,0,0,1\n2.6,0,0.4,0,0,0,1\n";
     let refused = dir.refused(far, &["--line"], 4);
     assert!(refused.contains("line 4: waypoint 3: out of reach"), "{refused}");

@@ -62,7 +62,8 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let motion = format!("{folder}/motion.csv");
     let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
     let refused = |sim: &Sim, kind: &str| {
-        // The move is slow, because the controller may be told a payload that the simulated arm does not carry.
+        // The controller may use a payload that the simulated arm does not carry. The move is slow, so that the arm
+        // can still follow it.
         sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "20"]).ends(0);
         let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
         let kinds: Vec<_> =
@@ -202,7 +203,7 @@ fn what_is_no_move_or_pose_is_refused_before_anything_moves() {
     let output = jtc(&["pose", "remove", "hone", "--arm", &arm]).ends(2);
     assert!(output.err.contains("did you mean \"home\"?"), "{}", output.err);
     at(&sim, [0.0; 6]);
-    // A move can begin only in HoldPos, and its error is the same as the error of `traj run`.
+    // A move can begin only in HoldPos. In another state, its error is the same as the error of `traj run`.
     let sim = Sim::start(&FAST);
     let all_are_there = || sim.json(&["status"], 0)["missing_nodes"].as_array().unwrap().is_empty();
     assert!((0..100).any(|_| all_are_there()), "the drives are brought up");

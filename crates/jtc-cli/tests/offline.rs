@@ -47,7 +47,7 @@ fn the_port_may_stand_before_the_command() {
         let output = jtc(words).ends(3);
         assert!(output.err.contains("/nowhere/tty"), "{}", output.err);
     }
-    // The command uses the option that is closer to the name of the command.
+    // If the option is typed before and after the command, the option after the command applies.
     let output = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
     assert!(output.err.contains("/near/tty"), "{}", output.err);
 }

@@ -177,8 +177,8 @@ fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     std::thread::sleep(std::time::Duration::from_millis(150));
     run.signal("-INT");
     let Ended { code, value, err, sim } = run.end();
-    // On a slow computer, the command may already have ended after the first signal. It then ends in the normal
-    // order.
+    // On a slow computer, the command may already have ended after the first signal. Its outcome is then `stopped`,
+    // as after a single Ctrl-C.
     let at_once = value["error"]["code"] == "ended-at-once";
     assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
     let words = err.contains("MAY BE MOVING") || err.contains("moves nothing more");
@@ -206,8 +206,8 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
             assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
         } else {
-            // The first signal took effect before the second signal arrived. The user has not moved the arm, and the controller holds
-            // the arm again.
+            // The first signal ended the command before the second signal arrived. The exit code is 2, because the
+            // user has not moved the arm. The controller is in HoldPos again.
             assert_eq!((code, state.as_str()), (2, Some("HoldPos")), "{value}");
         }
     }
@@ -313,18 +313,20 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
         let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // After a start of the controller, `recover` waits for the drives. In this test, the drive of joint 1 is never
-    // enabled.
+    // After the start of the controller, `recover` waits for the drives. The drive of joint 1 is never enabled, so
+    // `recover` still waits when the user presses Ctrl-C.
     let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
     cancelled(
         &Sim::with_faults(&["--no-throttle"], fault),
         &["recover", "--defaults"],
         "waiting for joint 1",
     );
-    // The user presses the emergency stop during teaching, after `teach on` has received a status with Teaching.
+    // Fault for the last case of this test: in Teaching, the user presses the emergency stop. The delay of 5 s lets
+    // `teach on` first receive a status with Teaching.
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
-    // The program of the motion is killed, so the arm moves and no program monitors the motion.
+    // The program of a motion is killed, so the arm moves and no program monitors the motion. `recover` stops this
+    // motion, and the arm must come to rest even if the user presses Ctrl-C.
     let file = sim.file("motion.csv", &slow_motion(600));
     let (_person, slave) = terminal();
     let mut run = sim
@@ -338,7 +340,8 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     run.wait().unwrap();
     cancelled(&sim, &["recover"], "stopping the motion");
     stands(&sim);
-    // In Teaching, the emergency stop is pressed and stays pressed.
+    // In Teaching, the emergency stop is pressed and stays pressed. After Ctrl-C, `recover` no longer waits for its
+    // release, and the controller stays in Error.
     sim.jtc(&["teach", "on"]).ends(0);
     reaches(&sim, "Error");
     cancelled(&sim, &["recover"], "release the emergency stop (waiting)");

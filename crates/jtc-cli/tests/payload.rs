@@ -17,9 +17,9 @@ fn mass(value: &Value) -> f64 {
     value["mass_kg"].as_f64().unwrap()
 }
 
-/// Returns two magnitudes from a recording of the simulator: the torque at joint 2 that the control law adds to the
-/// model torque, N·m. The first magnitude is from the time before the model torque of the held arm changes by more
-/// than 2 N·m. The second magnitude is from the end of the recording.
+/// Returns the magnitude of the torque that the control law adds to the model torque at joint 2, N·m, at two times of
+/// a recording. The first time is shortly before the model torque of the held arm changes by more than 2 N·m. The
+/// second time is the end of the recording.
 fn missing(recording: &str) -> (f64, f64) {
     let mut lines = recording.lines().filter(|line| !line.starts_with('#'));
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();

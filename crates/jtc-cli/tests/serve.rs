@@ -84,7 +84,8 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     assert!(log.out.contains("HoldPos"), "{}", log.out);
     let second = run(agent.command(&["serve", "--listen", "127.0.0.1:0"], &port), &[], "").ends(3);
     assert!(second.err.contains(&agent.url), "{}", second.err);
-    // The registration file of the killed agent still exists, although no program listens at its address.
+    // The agent is killed, and its registration file still exists, although no program listens at its address. The
+    // next command must then use the port directly.
     Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
     std::thread::sleep(std::time::Duration::from_millis(200));
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
@@ -105,7 +106,8 @@ fn the_operators_token_is_printed_on_a_terminal_alone() {
         "--token-file",
         tokens.to_str().expect("a name"),
     ];
-    // The first start creates the token. At the second start, the user requests the link.
+    // The first start creates the token, and the second start uses it again. In both starts, the option `--link`
+    // requests the link. The output is not a terminal, so the agent must not print the token.
     for begun in 0..2 {
         let mut command = command_in(&dir);
         let mut child =
@@ -165,8 +167,8 @@ fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     ]
 }
 
-/// In both simulators, the controller has stored the specified arm. The command rejects an arm that a controller cannot
-/// store.
+/// With `--arm`, `jtc serve --sim` and `jtc sim` simulate the specified arm, and the controller has stored it. Both
+/// commands reject an arm that a controller cannot store.
 #[test]
 fn an_arm_is_simulated_as_by_jtc_sim() {
     let dir = tempfile::tempdir().expect("a directory");

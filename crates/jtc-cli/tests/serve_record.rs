@@ -53,7 +53,7 @@ fn read(path: &Path) -> Recording {
     Recording::read(path).expect("a recording")
 }
 
-/// Checks that `jtc report` can create a report page from this recording.
+/// Checks that `jtc report` can create a report page from this recording, and returns the JSON result.
 fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
     let words = ["--json", "report", path.to_str().expect("a name"), "--overwrite"];
     run(command_in(dir), &words, "").ends(0).json()

@@ -181,8 +181,8 @@ fn a_fault_while_running_ends_with_5_and_recover_leads_back() {
     // The command reports the first failure first, with the joint and the values before and after the failure.
     assert_eq!(value["failure"]["joint"], 3, "{}", value["failure"]);
     assert!(value["failure"]["causes"][0].as_str().unwrap().starts_with("joint 3: "), "{}", value["failure"]);
-    // The fault occurs at 500 ms. The reported time is less accurate, because statuses arrive every 40 ms and have
-    // their arrival times after the fault.
+    // The fault occurs at 500 ms. The reported time is less accurate: statuses arrive every 40 ms, and each sample
+    // has the time at which its status arrived.
     let at_ms = value["failure"]["at_ms"].as_f64().unwrap();
     assert!((440.0..700.0).contains(&at_ms), "{}", value["failure"]);
     let text = std::fs::read_to_string(&page).unwrap();
@@ -366,8 +366,8 @@ fn time_goes_on_while_a_frame_arrives() {
                 && send.send(count).is_ok()
             {}
         });
-        // The test repeatedly sends the start of a trajectory segment of 1000 bytes. Therefore, even after a gap that ends a frame,
-        // the next frame is incomplete.
+        // Each write is the start of a trajectory segment of 1000 bytes. The simulator therefore always waits for the
+        // rest of a frame, even after a gap that ends the previous frame.
         let start = [0x9B, 0x0A, 0x03, 0xE8];
         port.write_all(&start).unwrap();
         std::thread::sleep(std::time::Duration::from_millis(1));

@@ -62,8 +62,8 @@ impl Cell {
         })
     }
 
-    /// Runs `jtc stop`. Checks that the Stop went through this program, and that the program ends with exit code 5.
-    /// Returns the JSON results of the program and of `jtc stop`.
+    /// Runs `jtc stop`. Checks that the Stop went through the program `child`, and that this program ends with exit
+    /// code 5. Returns the JSON results of `child` and of `jtc stop`.
     fn stops(&self, child: Child) -> (Value, Value) {
         let stopped = self.jtc(&["--json", "stop"]).ends(0).json();
         let pid = child.id();
@@ -106,8 +106,8 @@ fn a_run_is_stopped_from_a_second_terminal() {
     );
     let holder = &stopped["arms"][0]["holder"]["program"];
     assert_eq!(holder, "jtc traj run", "{stopped}");
-    // The test is repeated with text output, with another name of the port, and with another command that has the
-    // same effect.
+    // The same test with text output, with the real path of the port, and with `jtc run` and `jtc traj stop` instead
+    // of `jtc traj run` and `jtc stop`.
     let child = cell.moving(&["run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     let real = std::fs::canonicalize(&cell.0.port).unwrap();
     let mut other = command();
@@ -115,7 +115,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm is at rest; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // The message says when the stopped program may request a motion again.
+    // The message says when the stopped program can request a motion again.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -167,7 +167,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
         );
         cell.stands();
     }
-    // A new command of the user may move the arm again.
+    // A new command of the user is allowed to move the arm again.
     let short = cell.0.file("short.csv", &motion(0.1));
     cell.jtc(&["traj", "run", &short]).ends(0);
 }
@@ -347,7 +347,7 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!((&stopped["arms"][0]["moved"], &stopped["arms"][0]["holder"]), (&true.into(), &Value::Null));
     cell.stands();
-    // A new program can listen at the same socket as the killed program.
+    // The socket of the killed program does not disturb the next program, which is stopped as usual.
     let child = cell.moving(&["traj", "run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     cell.stops(child);
 }
@@ -376,8 +376,8 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     let file = cell.0.file("motion.csv", &slow_motion(100));
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let socket = std::fs::read_dir(cell.0.path("openjtc")).unwrap().flatten().next().unwrap().path();
-    // The first client of the socket connects and sends nothing. The second client sends an invalid request, and the third client
-    // disconnects after its request.
+    // The first client of the socket connects and sends nothing. The next two clients send an invalid line and an
+    // unknown request, and get no answer. The Stops of further clients must still work.
     let silent = std::os::unix::net::UnixStream::connect(&socket).unwrap();
     for words in [vec![b'x'; 10_000], b"{\"halt\":\"execute\",\"by\":\"x\"}\n".to_vec()] {
         let mut stream = std::os::unix::net::UnixStream::connect(&socket).unwrap();

@@ -22,7 +22,7 @@ const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]
 fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
-    // The timeout is longer than the longest time that a program may wait on a busy computer.
+    // The timeout is longer than the longest delay of a program on a busy computer.
     let sim = supervised(4000);
     let file = sim.file("motion.csv", MOTION);
     assert_eq!(sim.json(&["traj", "run", &file], 0)["outcome"], "finished");

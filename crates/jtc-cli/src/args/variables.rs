@@ -81,7 +81,7 @@ mod tests {
     use crate::args::Cli;
 
     /// A new option must not have a variable that causes an action. Therefore this list contains each permitted
-    /// variable, with the reason why it may exist.
+    /// variable, with the reason why it is permitted.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{File, Format, Limit, Line, Output, Place, Simulator};

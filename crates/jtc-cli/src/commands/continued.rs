@@ -94,7 +94,7 @@ impl Left {
                      requested"
                 ),
             });
-            // The command checks the complete runs that follow before the arm moves.
+            // Before the arm moves, the command also checks the complete runs that follow.
             let verdict = job.verdict(&self.then, None, UploadOptions::default());
             if !verdict.is_ok() {
                 return Err(job.refuse(&verdict, out));

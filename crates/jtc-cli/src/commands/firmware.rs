@@ -123,9 +123,9 @@ fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure>
     }
 }
 
-/// Returns a port that is checked in addition to the ports of the drive's USB device. If the user has specified a
-/// port, this port is returned. Otherwise, the only port of the computer is returned, but only if the board must
-/// report its firmware and the port of the board is unknown.
+/// Returns a port that the command checks in addition to the ports of the drive's USB device: the port that the user
+/// has specified. If the user has specified no port, returns the only port of the computer. This is necessary only if
+/// the board must report its firmware (`needed`) and its own port is not known (`has_own`).
 fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
     match &link.port {
         Some(url) if url.contains("://") => {
@@ -222,8 +222,8 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
     let mut lines = Some(lines);
     let written = write_image(&drive, &image, &mut |bytes| {
-        // The ports are closed as soon as copying has begun. The ST-LINK may remove its serial port from USB together
-        // with its drive. An open port would then appear again under another name.
+        // The ports are closed as soon as copying begins. The ST-LINK may remove its serial port from USB together
+        // with its drive. A port that is still open would then appear again under another name.
         drop(lines.take());
         bar.set_position(bytes as u64);
     });
@@ -239,7 +239,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         return Ok(());
     };
     out.note("copied; the ST-LINK writes the image to the flash, then the board starts");
-    // After flashing, the port of the board may appear again under another name.
+    // After flashing, the port of the board may have another name, so the command searches for the port again.
     let mut again = || {
         let own = places.ports_of(&drive).into_iter().next();
         open(own.as_ref().unwrap_or(&port), record.baud)

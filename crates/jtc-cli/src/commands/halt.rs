@@ -23,8 +23,8 @@ use crate::progress::Progress;
 /// Longest time directly after a program has opened the port, or directly before it closes the port, in which the
 /// program does not accept Stops.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// Like [`CHANGES_HANDS`], for a port for which a program of this user has accepted Stops. This program may be waiting for the end of
-/// an earlier Stop.
+/// Like [`CHANGES_HANDS`], for a port whose program belongs to this user and has accepted Stops before. The time is
+/// longer, because this program may be waiting for the end of an earlier Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
 /// Largest number of programs that may open the port one after another during one Stop.
 const OWNERS: usize = 16;
@@ -274,8 +274,8 @@ impl NotHalted {
         Self { sent, failure: failure.into() }
     }
 
-    /// Returns this failure with its progress raised to at least `sent`. The same Stop had already reached this
-    /// progress in an earlier program.
+    /// Returns this failure with its progress raised to at least `sent`: an earlier program at the port has already
+    /// sent the same Stop.
     fn at_least(self, sent: Sent) -> Self {
         Self { sent: self.sent.max(sent), ..self }
     }
@@ -304,7 +304,8 @@ impl NotHalted {
             ),
         };
         let next = self.failure.next.to_string();
-        // If the hint of the error already mentions the emergency stop, it is not repeated.
+        // If the hint of the error also mentions the emergency stop, this hint is omitted, because `what` already
+        // mentions it.
         let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
         Failure { next: hint.trim_end_matches([' ', '.']).to_owned().into(), ..self.failure }
     }
@@ -352,7 +353,8 @@ fn is_own(_: &str) -> bool {
     false
 }
 
-/// Sends the request to the program that has opened this port, if the program belongs to this user and accepts requests.
+/// Sends the request to the program that has opened this port, if the program belongs to this user and accepts
+/// requests. Returns `None` if no such program answers.
 #[cfg(unix)]
 fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     for socket in halt::sockets_of(path) {
@@ -363,8 +365,8 @@ fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalte
     Ok(None)
 }
 
-/// Sends the request to the program that listens at this socket. If this program does not answer, it may still have sent the
-/// frame.
+/// Sends the request to the program that listens at this socket. An error does not mean that nothing was sent: the
+/// program may have sent the frame without answering.
 #[cfg(unix)]
 fn ask_at(socket: &std::path::Path, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     halt::ask(socket, what, &who()).map_err(|error| NotHalted::after(Sent::Unconfirmed, error))
@@ -375,8 +377,8 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
-/// Stops one arm, and waits until the arm is at rest. The program that has executed the Stop may end before the arm is at rest.
-/// After that, the port is free, or another program has opened the port.
+/// Stops one arm, and waits until the arm is at rest. If the program that has executed the Stop ends before that, the
+/// function sends the Stop again. It uses the port directly, or the next program that has opened the port.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
@@ -416,8 +418,8 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
                     return Ok(Reached::Holder(answer, end));
                 }
-                // The program has ended, or is busy with other clients. If the program has ended, the port is free,
-                // or another program has opened the port.
+                // The program does not answer, because it has ended or is busy with other clients. If its port is
+                // known, the command sends the Stop to this port, or to the program that has opened it now.
                 if link.port.is_some() {
                     return reach(link, Halt::Stop, true);
                 }
@@ -439,7 +441,7 @@ fn directly(
     holder: Option<Answer>,
 ) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
-    // `moved` also becomes `true` if a status shows a motion before the Stop is confirmed.
+    // `moved` becomes `true` if any status shows a motion, even a status before the controller confirms the Stop.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
     let seen = Rc::clone(&moved);
     session.observe(move |_, status| {
@@ -452,7 +454,8 @@ fn directly(
         Err(error) => return Err(unconfirmed(error)),
     };
     let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
-    // An arm in teaching is compliant. After a Stop, the arm must hold its position.
+    // In Teaching, a hand can move the arm. Therefore the command also ends Teaching, so that the controller holds
+    // the arm after the Stop.
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {

@@ -250,8 +250,8 @@ impl Job {
         Failure::shown(ErrorKind::Refused)
     }
 
-    /// Completes the commands in the hint of a failure with the words that the user typed for this job, such as the
-    /// name of the trajectory file.
+    /// Completes the commands in the hint of a failure with the words that the user typed, such as the name of the
+    /// trajectory file.
     pub(super) fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };

@@ -19,7 +19,7 @@ use jtc_host::session::BRING_UP;
 const HELD: Duration = Duration::from_millis(150);
 /// Joint velocities that the user can select with keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
-/// Index in [`RATES`] of the highest velocity at which jogging with keys may begin.
+/// Index in [`RATES`] of the highest velocity at which jogging with keys can begin.
 const FIRST_MAX: usize = 2;
 
 /// Moves the joint until a key, the time limit or a signal ends the jog. Waits until the arm is at rest.
@@ -61,12 +61,12 @@ pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     };
     // The command stops the arm at once after every end of the jog, without waiting for the timeout of the controller.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // If an error has switched off the torque, this error causes all other failures, and may be the only failure.
-    // Therefore the command reports this error first.
+    // If an error has switched off the torque, it is the cause of all other failures. It may also be the only
+    // failure, because the jog itself can succeed. Therefore the command reports this error first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
-        // During a held stop, the controller rejects a jog. The held stop is then reported instead of the rejected
-        // jog.
+        // During a held stop, the controller rejects a jog. The command then reports the held stop, because it is the
+        // cause of the rejected jog.
         (_, Err(failure)) if failure.code == "held-stop" => return Err(failure),
         (jogged, rested) => jogged.and(rested)?,
     };
@@ -109,7 +109,8 @@ fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     Ok(rate_within(share * limits.into_iter().fold(f64::INFINITY, f64::min)))
 }
 
-/// Returns the index of the highest allowed initial velocity that is at most `most`, rad/s.
+/// Returns the index in [`RATES`] of the highest initial velocity that is allowed and is at most `most`, rad/s.
+/// Returns 0 if all velocities are higher.
 fn rate_within(most: f64) -> usize {
     RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
 }
@@ -225,7 +226,8 @@ fn without_error(status: Option<Status>) -> Result<(), Failure> {
     }
 }
 
-/// Waits until every joint is at rest.
+/// Waits until every joint is at rest, and returns the last status. If a joint does not come to rest, the failure is
+/// `still-moving`.
 fn rest(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
     session.jog_to_rest().map_err(|error| Failure::of(&error))?.ok_or_else(|| {

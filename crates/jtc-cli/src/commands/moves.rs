@@ -79,7 +79,7 @@ fn target(args: &MoveArgs, arm: &Arm) -> Result<kinematics::Target, Failure> {
     Ok(kinematics::Target::Joints(joints))
 }
 
-/// Returns the lowest measured bearing temperature in °C, limited to the temperature of a cold hall.
+/// Returns the lowest measured bearing temperature in °C, but at most [`COLD`], the temperature of a cold hall.
 fn coldest(status: &jtc_wire::Status) -> f64 {
     let measured = status.joints.iter().map(|joint| f64::from(joint.temperature));
     measured.fold(COLD, f64::min)

@@ -64,8 +64,7 @@ fn push(
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = labels::missing_parameters(status.jtc_init);
-    // These parameters were not sent by this command, but the controller has values for them. The values come from an
-    // earlier, unknown source.
+    // The command did not send these parameters. The controller has values for them from an earlier, unknown source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
@@ -104,8 +103,8 @@ fn push(
     Ok(())
 }
 
-/// Waits for the result of the controller's trial of new gains on an arm with torque. Returns `true` if the controller has
-/// tested the gains.
+/// Waits for the result of the test of new gains, which the controller makes if the arm has torque. Returns `true` if
+/// the controller has tested the gains.
 pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
     Ok(session.await_trial(|| out.note("the controller tries the gains for 2 s"))?)
 }
@@ -120,8 +119,8 @@ fn check_gains(
     let Some(pid) = set.pid else { return Ok(()) };
     let arm = match &read.arm {
         Some(arm) => Some(arm.clone()),
-        // If the controller cannot report its arm yet, the gains are not checked, because the drives do not produce
-        // torque yet.
+        // If the controller cannot report its arm yet, the gains are not checked. In this state, the drives do not
+        // produce torque.
         None if session.info()?.is_some() => session.device_arm().ok(),
         None => None,
     };

@@ -16,7 +16,8 @@ use super::job::{stem, typed};
 use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
-/// Message if the user specifies a blend but the path has no corners that the planner could round.
+/// Message if the user specifies `--blend-m`, but the motion has no lines or arcs whose corners the planner could
+/// round.
 const NO_LINES: &str = "--blend-m has no effect: it rounds corners between lines and arcs, and this motion \
     has no lines or arcs; use --line, or a column `leg`";
 

@@ -130,8 +130,8 @@ fn match_device(
             }
         }
     }
-    // If the two arms do not differ, these settings are the settings of the arm file. Rotor values that the arm file does not contain
-    // come from the controller.
+    // The settings are those of the arm file, because it matches the arm of the controller. Rotor values that the arm
+    // file does not contain come from the controller.
     job.config = job.arm.config_on_device(&job.device);
     if job.device.payload.is_there() {
         out.note(format!(
@@ -143,9 +143,9 @@ fn match_device(
     Ok(())
 }
 
-/// Checks a motion that the command knows before it connects to the controller. A repeated motion must end at its
-/// start point. If the user has specified an arm file, a failed check is an error. Otherwise, the function returns
-/// the failed verdict for the built-in arm, because the controller may have another arm.
+/// Checks a motion that is known before the command connects to the controller. If the check fails and the user has
+/// specified an arm file, the result is an error. Without an arm file, the function returns the failed verdict for
+/// the built-in arm, because the controller may have another arm. A repeated motion must end at its start point.
 fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<Option<Verdict>, Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {

@@ -195,8 +195,9 @@ fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     })
 }
 
-/// Starts to store the client whose policy applies to a motion. If this agent is killed, the next agent uses the stored policy. The
-/// function also returns the policy that a killed agent has stored; `act_on` applies this policy.
+/// Starts to store which client's policy applies to a motion if this client disconnects. If this agent is killed, the
+/// next agent applies the stored policy. The function also returns the policy that a killed agent has stored, for
+/// `act_on`.
 fn keep_policies(
     port: &str,
     log: &Arc<Mutex<CommandLog>>,
@@ -215,7 +216,8 @@ fn keep_policies(
     Ok(Some(Keeper::begin(&state.join("openjtc"), &port, notices(log, out, "warning"))?))
 }
 
-/// Applies the policy that a killed agent has stored, before this agent serves a client.
+/// Applies the policy that a killed agent has stored, before this agent serves a client. Also starts to read the host
+/// timeout of the controller, in a separate thread.
 fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog>>, out: &Output) -> Keeper {
     if let Some(notice) = will::apply(line, &keeper, found) {
         notices(log, out, "note")(notice);

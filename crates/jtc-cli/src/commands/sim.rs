@@ -4,8 +4,8 @@ use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
 
-/// Notice about the simulated brakes, which hold the arm while the drives produce no torque. The next two constants are notices about an
-/// arm on a stand and about an arm without support.
+/// Notice for a simulated arm with holding brakes. The next two constants are the notices for an arm on a stand, and
+/// for an arm without support.
 #[cfg(unix)]
 const BRAKES: &str =
     "note: simulated holding brakes hold the arm after an error; the known drives have no brakes";

@@ -86,7 +86,8 @@ pub(super) fn as_json(s: &Status) -> Value {
 /// Returns the state of joint `j` (from 0). The result is the last state that the joint has sent, unless the joint does not answer.
 pub(super) fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
-    // A joint that is not ready may still answer. An enabled joint that is not measured does not answer.
+    // A joint that is not ready may answer without measured values. An enabled joint without measured values does not
+    // answer.
     let silent = !is_measured(s, j) && (labels::is_silent(s, j) || state == NodeState::ENABLED);
     if labels::is_absent(s, j) {
         "absent"

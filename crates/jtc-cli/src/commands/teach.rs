@@ -106,8 +106,8 @@ fn record(
                 begun.store(taught.is_begun(), Ordering::Relaxed);
                 ControlFlow::Continue(())
             }
-            // If the file cannot be written, the user does not need to guide the arm any longer. The controller then holds the arm, as
-            // after Ctrl-C.
+            // If the file cannot be written, the recording ends, so that the user does not guide the arm in vain. The
+            // controller then holds the arm, as after Ctrl-C.
             Err(e) => {
                 lost = Some(e);
                 ControlFlow::Break(())

@@ -11,7 +11,8 @@ const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8]
 
 /// Duration of the silence that ends a frame (J-03).
 pub(super) const GAP: Duration = Duration::from_millis(5);
-/// Smallest size in bytes of the first part of a long write to a terminal, if the operating system splits the write.
+/// Smallest size in bytes of the first part of a long write, if the operating system splits a write to a terminal
+/// into parts.
 const PIECE: usize = 2048;
 /// Transmission time of a byte on a serial line at 115,200 Bd.
 const BYTE: Duration = Duration::from_micros(87);
@@ -62,15 +63,15 @@ impl Frames {
     }
 }
 
-/// Tracker of the bytes that the host sends. The tracker determines if a frame is incomplete, and since when its next
-/// byte is missing.
+/// Tracker of the bytes that the host sends. It determines whether a frame is incomplete, and how long its next byte
+/// has been missing.
 ///
-/// With `--speed max`, and while the simulator catches up after a delay, virtual time passes faster than the time of the host. A gap
-/// between two parts of a frame must not become longer in virtual time than it was for the host.
+/// With `--speed max`, and while the simulator catches up after a delay, virtual time runs faster than the clock of
+/// the host. A gap within a frame must not become longer in virtual time than it was for the host.
 ///
-/// A busy operating system can suspend a host within one write for longer than the silence that ends a frame. On a real serial line, the
-/// adapter would still be sending the bytes in its buffer. In a long frame, the silence therefore begins only after a real serial line
-/// would have sent the received bytes.
+/// A busy operating system can suspend the host during a write, for longer than the silence that ends a frame. The
+/// adapter of a real serial line would still be sending the bytes in its buffer in this time. In a long frame, the
+/// silence therefore begins only when a real serial line would have sent the received bytes.
 pub(super) struct Incoming {
     head: Vec<u8>,
     /// Number of received bytes of the current frame.
@@ -209,7 +210,8 @@ mod tests {
         let mut incoming = Incoming::new(start);
         let mut frame = vec![0; 9006];
         frame[..4].copy_from_slice(&[HEADER, 0x04, 0x23, 0x2E]);
-        // The operating system suspends the host after it has sent 2,048 bytes, which take 178 ms on a serial line.
+        // The operating system suspends the host after 2,048 bytes. A serial line needs 178 ms for these bytes, so no
+        // silence counts before this time.
         incoming.push(&frame[..2048], start);
         assert_eq!(incoming.silence(start), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
@@ -220,8 +222,8 @@ mod tests {
         incoming.carries(later(171));
         assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
-        // If the host does not send the remaining bytes, the time after the transmission counts as silence. For a short frame, the
-        // simulator does not wait.
+        // If the host sends nothing more, the silence begins when a serial line would have sent the 2,048 bytes, and
+        // then ends the frame. After fewer bytes, the silence begins at once.
         incoming.push(&frame[..2048], later(170));
         assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
         incoming.push(&frame[..2047], later(600));

@@ -178,8 +178,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     rustix::pty::unlockpt(&master).map_err(fails("unlock the pseudo-terminal"))?;
     let name = rustix::pty::ptsname(&master, Vec::new()).map_err(fails("name of the pseudo-terminal"))?;
     let slave = PathBuf::from(name.to_string_lossy().into_owned());
-    // This code opens the host side once, so that it is in raw mode before a host connects. After that, the system reports a missing host
-    // as a hang-up.
+    // The code opens the host side once and sets raw mode before a host connects. After this first open, the system
+    // reports a missing host as a hang-up.
     let open = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let first = rustix::fs::open(&slave, open, Mode::empty()).map_err(fails("open the host's end"))?;
     raw(&first).map_err(fails("raw mode"))?;
@@ -188,8 +188,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     Ok((master, slave))
 }
 
-/// Checks that a path is free, or contains a link that an earlier simulator has created. The target of such a link is missing, or is a
-/// pseudo-terminal that another program uses now.
+/// Checks that a path is free, or is a link of an earlier simulator. The target of such a link is missing, or is a
+/// pseudo-terminal that no simulator serves now, such as the terminal of a shell.
 fn check_free(path: &Path) -> Result<(), PtyError> {
     let taken = |what| Err(PtyError::Taken { path: path.to_owned(), what });
     match fs::symlink_metadata(path) {
@@ -204,8 +204,8 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
     }
 }
 
-/// Returns `true` if a program uses this pseudo-terminal as a serial port. In this case, the pseudo-terminal is open and in raw mode,
-/// unlike the terminal of a shell. A terminal that a host has locked is also in use.
+/// Returns `true` if a simulator serves this pseudo-terminal as a serial port. The pseudo-terminal is then open and
+/// in raw mode, unlike the terminal of a shell. Also returns `true` if a host has locked the pseudo-terminal.
 fn serves(terminal: &Path) -> bool {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
     match rustix::fs::open(terminal, flags, Mode::empty()) {

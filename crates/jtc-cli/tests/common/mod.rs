@@ -150,7 +150,8 @@ impl Sim {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// Sends a signal to the simulator, waits for its end, and returns the exit code.
+    /// Sends a signal to the simulator, and waits for its end. Returns the exit code, and `true` if the link of the
+    /// port still exists.
     pub(crate) fn end(mut self, signal: &str) -> (i32, bool) {
         let pid = self.child.id().to_string();
         Command::new("kill").args([signal, &pid]).status().expect("kill");

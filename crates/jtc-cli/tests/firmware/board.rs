@@ -146,8 +146,8 @@ impl Running {
     fn take(&self, file: &Path) {
         let bytes = fs::read(file).unwrap();
         fs::remove_dir_all(&self.drive).unwrap();
-        // The delay is longer than the time for which the command waits for a status. After this time, the command
-        // checks the USB drive again.
+        // The delay is longer than the time for which the command waits for a status, so the command must check the
+        // USB drive again.
         thread::sleep(Duration::from_millis(1_800));
         let mut flashed = self.flashed.lock().unwrap();
         (flashed.program, flashed.started, flashed.before_ms) = (Some(program_of(&bytes)), Instant::now(), 0);

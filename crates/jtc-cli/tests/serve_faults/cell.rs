@@ -135,7 +135,7 @@ impl Cell {
         paths.find(|path| path.extension().is_some_and(|kind| kind == "json"))
     }
 
-    /// Checks that the arm stays at rest for this time, and that no motion begins.
+    /// Checks that the arm stays at rest for this time, and that no motion begins. Returns the last status.
     pub(super) fn rests(&self, time: Duration) -> Value {
         let (seen, mut patience) = (Instant::now(), Patience::begin());
         loop {
@@ -187,7 +187,7 @@ impl Program {
         self.child.wait().expect("it ends");
     }
 
-    /// Waits until the command ends, and checks that it reports the lost link.
+    /// Waits until the command ends, checks that it reports the lost link, and returns its error message.
     pub(super) fn ends_without_link(self) -> String {
         let Self { child, err } = self;
         let ended = child.wait_with_output().expect("it ends");

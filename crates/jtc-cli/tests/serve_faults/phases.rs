@@ -192,8 +192,8 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
         assert_eq!(kept.0, 200, "{}", kept.1);
     }
 
-    // The client has received the start of the trajectory check or the start of the upload. The speed of this computer determines which
-    // of these starts the client has received.
+    // The last event that the client received is the start of the check or the start of the upload, depending on the
+    // speed of this computer. In both cases, the job must be stopped.
     let job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");

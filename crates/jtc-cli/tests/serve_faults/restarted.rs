@@ -8,8 +8,9 @@ use test_kit::patience::{Patience, until};
 use super::cell::{Cell, moves, trajectory};
 use super::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
-/// Checks that the file contains the policy and the cause of the motion. The test kills the agent after this check, because a separate
-/// thread of the agent writes the file.
+/// Checks that the stored file contains this policy, and what the controller was doing (`what`): upload, motion or
+/// teaching. The test must wait for the file before it kills the agent, because a separate thread of the agent writes
+/// the file.
 fn is_left(cell: &Cell, policy: &str, what: &str) {
     let mut patience = Patience::begin();
     loop {
@@ -83,7 +84,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
         if policy == "pause" {
-            // The motion can be resumed, so the agent also stores the policy for its successor.
+            // The motion can be resumed, so the agent also stores the policy for the next agent.
             is_left(&cell, policy, "motion");
             let found = next(&mut cell);
             assert_eq!(done(&found), "the motion stays paused");

@@ -56,7 +56,7 @@ fn changes(warnings: &[Warning]) -> String {
     for (change, lines) in kinds {
         text += &format!("{}\n", change.heading());
         for (problem, places) in lines {
-            // The list contains the word "joint" only once, as in "joint a, b, c".
+            // After the first place, the word "joint" is removed, so that the list reads "joint a, b, c".
             let rest = |place: &&str| place.strip_prefix("joint ").unwrap_or(place).to_owned();
             let more: Vec<String> = places[1..].iter().map(rest).collect();
             let all = [vec![places[0].to_owned()], more].concat();

@@ -68,7 +68,7 @@ fn in_degrees(v: &mut ArmValue) {
 
 /// Formats a number with five significant digits, without trailing zeros.
 pub(super) fn number(value: f64) -> String {
-    // Rotated frames have rounding errors, so the table shows such small values as 0.
+    // Values from rotated frames contain rounding errors, so values below 1e-11 are shown as 0.
     if value.abs() < 1e-11 {
         return "0".into();
     }

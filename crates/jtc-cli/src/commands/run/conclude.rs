@@ -85,8 +85,8 @@ pub(super) fn conclude(
     info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
-    // A lost file is reported even if the run failed. If the run was successful, the first lost file is skipped here,
-    // because it becomes the failure of the command.
+    // All lost files are reported, even after a failed run. After a successful run, the first lost file becomes the
+    // failure of the command, so it is not printed here.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }

@@ -32,8 +32,9 @@ pub(super) struct Reel {
     pub tape: Option<Tape>,
     /// Start of the first motion in the recording, on the clock of the session.
     start: Duration,
-    /// Earliest time that the next sample may have, s. This time is directly after the last sample. The limit is
-    /// needed because the clock of a fast simulator runs ahead of the clock of the computer.
+    /// Earliest time that the next sample may have, s; directly after the last sample. Without this limit, times
+    /// could decrease between two motions, because the clock of a fast simulator runs ahead of the clock of the
+    /// computer.
     until_s: f64,
 }
 
@@ -105,7 +106,8 @@ impl<'a, 'o> Terminal<'a, 'o> {
     /// Returns the recording and the results of the run.
     pub(super) fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
-        // The recording is missing only if the run ended before its first motion.
+        // If the run ended before its first motion, the recording has not begun. The result then contains a recording
+        // without samples.
         let reel = reel.unwrap_or_else(|| Reel::new(RecordingInfo::of(&job.arm), None, Duration::ZERO));
         Taken { done, samples, reel, outputs }
     }
@@ -247,8 +249,8 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
         }
         if leg.phase == Phase::Approach && leg.is_finished() {
             self.keep_figures(leg.phase);
-            // The recording must contain only the motion of the runs, so the command restarts the recording before the
-            // first run.
+            // The recording must contain only the runs, not the approach. Therefore the command discards the
+            // recording of the approach before the first run.
             if self.runs == 0
                 && let Some(tape) = take(&mut self.reel).and_then(|reel| reel.tape)
             {

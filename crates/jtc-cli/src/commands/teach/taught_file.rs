@@ -26,14 +26,15 @@ struct Row {
     end: usize,
 }
 
-/// File with the rows of the motion, one row at rest before the motion, and one row at rest after the motion.
+/// Trajectory file of a motion: one row at rest, the rows of the motion, and one row at rest.
 pub(super) struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// First pose of the time at rest before the motion, and the number of the last grid interval of this time.
+    /// First pose of the arm at rest before the motion, and the number of the last interval of the grid (`GRID_S`) in
+    /// which the arm was at rest.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,
@@ -104,7 +105,7 @@ impl TaughtFile {
         self.rows.push(Row { position, end: self.text.len() });
     }
 
-    /// Returns the number of rows up to the end of the motion, including one row at rest.
+    /// Returns the number of rows up to the end of the motion, plus one row at rest.
     fn in_motion(&self) -> usize {
         let Some(last) = self.rows.last() else { return 0 };
         let moving = self.rows.iter().rposition(|row| moved(&row.position, &last.position));

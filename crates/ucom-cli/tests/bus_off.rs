@@ -12,7 +12,8 @@ fn bus_off_is_not_for_ever() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
     let mut peer = sim.peer();
     sim.fault("disturbed share=1 for_s=2");
-    // Each frame of the client and of the boards is repeated until the controller of the sender is bus-off.
+    // For 2 s, the bus is disturbed. Each frame is repeated until the CAN controller of its sender is bus-off, so the
+    // scan must fail.
     let during = sim.ucom(&["scan"]);
     assert_ne!(during.code, 0, "{}", during.out);
     std::thread::sleep(std::time::Duration::from_millis(2_000));

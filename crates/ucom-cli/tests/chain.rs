@@ -61,7 +61,8 @@ fn p2_init_of_chains_and_their_inventory() {
     assert_eq!(first["flash_date"], "2008-03-14");
     let inventory = std::fs::read_to_string(sim.path("inventory.toml")).unwrap();
     assert!(inventory.contains("flash_number = 0x0023"), "{inventory}");
-    // The changed inventory looks as if two boards had been swapped.
+    // In the changed inventory, one board has another flash number, as if the board had been exchanged. The finding
+    // of `init` must contain both flash numbers.
     std::fs::write(sim.path("inventory.toml"), inventory.replace("0x0023", "0x0055")).unwrap();
     let output = sim.ucom(&["--json", "init"]).ends(1);
     let text = output.json()["findings"][0].as_str().unwrap().to_owned();
@@ -145,11 +146,11 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
     let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
     let mut peer = sim.peer();
     peer.wait("601#01010000");
-    // The second PC may listen to the outputs of the boards. The names were requested before the control loop started, or are already
-    // known.
+    // The second PC is allowed to listen to the outputs of the boards. The names were requested before the control
+    // loop started, or are already known.
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["position"].is_i64(), "{so}");
-    // The second PC may also request identities, because the first PC interprets the answers correctly.
+    // The second PC is also allowed to request identities, because the first PC does not misinterpret the answers.
     let scan = sim.json(&["scan"], 0);
     assert_eq!(
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
@@ -283,7 +284,8 @@ fn d36_one_image_on_boards_that_differ() {
     let other = io(&["--json", "io", "7"]);
     assert_ne!(first["ci"], other["ci"], "the simulator's boards differ");
     assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
-    // The test copies the names of another board to the cache file of a board with the same program and date.
+    // The test copies the cached names of board 1 to the cache file of board 7, which has the same program and date.
+    // The command must still read the names of board 7 from board 7.
     let kept = |board: &str| {
         let info = sim.json(&["info", board], 0)["boards"][0].clone();
         let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
@@ -326,8 +328,8 @@ fn several_boards_are_changed_only_when_all_answer() {
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
 
-/// D-T21: two boards with the same flash number send their reports at the same time with the same bits. On the bus, the two reports are a
-/// single frame.
+/// D-T21: two boards with the same flash number send identical reports at the same time, which are a single frame on
+/// the bus. `init` detects that there are more boards than reports.
 #[test]
 fn d_t21_reports_that_are_alike_are_one_frame() {
     let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x21"]);

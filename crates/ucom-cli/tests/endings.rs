@@ -98,7 +98,8 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     }
 }
 
-/// Signals that arrive almost at the same time count as one signal, so the command is cancelled in the normal order.
+/// Signals that arrive almost at the same time count as one signal. The command is then cancelled, and does not end
+/// at once as after a second Ctrl-C.
 #[test]
 fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -334,8 +335,8 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // The reader of the output does not read, and its pipe is full. Therefore the first signal has no visible
-        // effect.
+        // The reader of the output does not read, and the pipe is full. The command is blocked, so the first signal
+        // has no visible effect.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();

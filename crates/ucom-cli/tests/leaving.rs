@@ -1,5 +1,6 @@
 //! Tests of boards that leave their control loop while `ucom run` supervises them (D-37). The command `run` reports
-//! each such board at once, with an event of `--json` and with outdated values. At the end, the exit code is 5.
+//! each such board at once, as an event of `--json`, and marks its values as outdated. At the end, the exit code is
+//! 5.
 
 use crate::common;
 
@@ -50,7 +51,7 @@ impl Running {
         self.ended()
     }
 
-    /// Waits until the command ends by itself, without a signal.
+    /// Waits until the command ends by itself, without a signal. Returns the exit code and the text on stderr.
     fn ended(mut self) -> (i32, String) {
         let mut err = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut err).unwrap();

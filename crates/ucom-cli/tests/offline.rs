@@ -118,7 +118,8 @@ fn files_are_kept_and_nothing_is_made_up() {
         &["--json", "dbc", "none", "--out", &dbc],
         &["--json", "record", &log, "--for", "0.1"],
         &["--json", "record", &mcap, "--for", "0.1"],
-        // The command `record` also writes its profile to a file, and the profile file already exists.
+        // The command `record` also writes a profile file. In this case, the profile file already exists, and the
+        // recording does not.
         &["--json", "record", &new, "--for", "0.1"],
     ] {
         let output = ucom(&[words, &bus].concat()).ends(4);

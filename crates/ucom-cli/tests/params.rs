@@ -54,8 +54,8 @@ fn d11_values_have_the_units_of_the_signal_table() {
     for words in [["par", "1", "kd=2mA s/deg"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
-    // The table contains a scale but no unit for `min_position`. A bare number is refused, because it would be a raw
-    // word if the table were missing.
+    // The table contains a scale but no unit for `min_position`. The command refuses a bare number, because its
+    // meaning would depend on the table: with the table it would be a scaled value, without the table a raw word.
     let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
     assert!(output["error"]["message"].as_str().unwrap().contains("but no unit for this signal"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
@@ -206,7 +206,8 @@ fn a_file_is_applied_whole_or_not_at_all() {
     );
     assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
     assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
-    // Without quotation marks, a line that selects a signal by its number (`#0`) is a comment.
+    // Without quotation marks, YAML reads the line that begins with `#0` (selection of a signal by its number) as a
+    // comment. The file then contains no value.
     let empty = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      #0: 5\n";
     assert!(apply(empty).ends(2).err.contains("the file contains no value"));
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);
@@ -241,7 +242,8 @@ fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     assert_eq!(output.json()["error"]["code"], "params");
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["301", "341", "3C1", "541"].contains(&&f[..3])), "{received:?}");
-    // If the signal names are unknown, the command starts the application to read them, and then stops it.
+    // With `--fresh`, the signal names are unknown. The command starts the application to read them, refuses the
+    // invalid value in the file, and stops the application again.
     let words = ["--json", "run", "1", "--fresh", "--params", &file("70000"), "--for", "1"];
     assert_eq!(sim.ucom(&words).ends(4).json()["error"]["code"], "params");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));

@@ -12,7 +12,8 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::http::Http;
 
-/// Starts an agent with the arguments `words`, and returns its first output line.
+/// Starts an agent with the arguments `words`. Returns the process and its first output line, which it prints when it
+/// is ready.
 fn serve(dir: &Path, words: &[&str]) -> (Child, Value) {
     let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
     command.args(["--json", "serve", "--listen", "127.0.0.1:0"]).args(words);

@@ -161,8 +161,8 @@ fn firmware(page: &mut Page) {
     });
 }
 
-/// Two threads write to the same pipe, so the result may come before or after the last note. The error always comes after the result and
-/// the note.
+/// Moves the result directly before the error, which always comes last. Two threads write the result and the notes to
+/// the same pipe, so their order varies.
 fn result_last(mut printed: Printed) -> Printed {
     let result = "not stopped for certain: 1\n";
     if let Some(before) = printed.text.find(&format!("\n{result}")) {

@@ -59,7 +59,7 @@ fn d46_refusals_change_nothing() {
     let sim = chain("3");
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
-    // The flash number of the board is 0x21, but the user expects 0x77.
+    // The flash number of the board is 0x21, but the user expects 0x77. The update must therefore not start.
     let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
@@ -71,7 +71,7 @@ fn d46_refusals_change_nothing() {
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
-    // While a board runs, the command updates no board.
+    // While board 3 runs, the command updates no board, not even board 1.
     let run = sim.spawn(&["--json", "run", "3"]);
     sim.peer().wait("603#01000000");
     sim.ucom(&["update", "1", &file]).ends(4);
@@ -97,8 +97,8 @@ fn d46_errors_before_and_after_the_erase() {
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
-/// The test updates all boards in the inventory: one board fails, and the other boards succeed. The next run of the command updates
-/// only the board that failed.
+/// If one of several boards does not answer, the update ends with exit code 3. A later update of all boards writes
+/// only the board that does not have the program yet.
 #[test]
 fn an_update_session_goes_on_and_is_resumed() {
     let mut sim = chain("3");
@@ -107,7 +107,8 @@ fn an_update_session_goes_on_and_is_resumed() {
     sim.ucom(&["update", "1-3", &file]).ends(3);
     let infos = sim.json(&["scan"], 0);
     assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
-    // After a power cycle, board 2 has no number. The update or the command `init` assigns the number to board 2 again.
+    // The second part of the test uses a new chain. The test first updates only boards 1 and 3. The update of all
+    // boards must then write only board 2.
     drop(sim);
     let sim = chain("3");
     // The test uses a fixed date, because U-3 also compares dates. Around midnight, the two runs would have different dates.
@@ -316,7 +317,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = profile.path().to_str().unwrap();
     let sim = Sim::start(&["--boards", "1", "--profile", profile]);
     sim.ucom(&["--profile", profile, "init"]).ends(0);
-    // In this test, a tool chain has written the header and the data of each cycle to separate files.
+    // The test builds the files that a tool chain would write: one file per cycle, each with its header and the data.
     let golden = golden();
     let cycle = |cycle, date| {
         let header = ucom::Header {

@@ -1,5 +1,5 @@
-//! Tests of `ucom update` with boards that already have the program. The record in the inventory decides whether a
-//! program is written again (D-62, U-3).
+//! Tests of `ucom update` with boards that already have the program. The record of the last update in the inventory
+//! shows whether the command must write the program again (D-62, U-3).
 #![cfg(unix)]
 
 use crate::common;
@@ -58,12 +58,13 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
     let text = sim.ucom(&["update", "1", &high]).ends(0).out;
     assert!(text.contains("same Program ID and date"), "{text}");
-    // After `init`, each record still belongs to the same board, so the image is still up to date.
+    // The inventory contains the record of the image. `init` keeps this record, so the image is still up to date.
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept.contains("# cabinet 3") && kept.contains("address = 0x200"), "{kept}");
     sim.ucom(&["init"]).ends(0);
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
-    // The test restores the old inventory, which has no record of the image.
+    // The test restores the old inventory, which has no record of the image. The board then only counts as
+    // `program-up-to-date`, which is not verified.
     std::fs::write(&path, &commented).unwrap();
     let mut peer = sim.peer();
     for (more, code) in [(&[][..], 4), (&["--unverified"], 0), (&["--dry-run"], 4)] {
@@ -75,7 +76,7 @@ fn d62_another_address_is_written() {
     let text = sim.ucom(&["update", "1", &high]).ends(4).out;
     assert!(text.contains("--rewrite") && !text.contains("--force"), "{text}");
     assert_eq!(of(&sim.json(&["update", "1", &high, "--rewrite"], 0)), ("verified", true));
-    // Without an inventory file, there is no record of the image.
+    // Without an inventory file, there is no record of the image, so the update is not verified either.
     let nowhere = sim.path("nowhere.toml");
     let words = ["update", "1", &high, "--inventory", &nowhere];
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));
@@ -100,7 +101,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert_eq!(of(&sim.json(&["update", "1", &first], 4)), ("program-up-to-date", false));
 }
 
-/// D-62: if the command cannot remove the record, it does not erase the memory.
+/// D-62: if the command cannot remove the record of the old program from the inventory, it does not erase the memory.
 #[test]
 fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -109,8 +110,8 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &next]);
-    // At this frame, the command has already read the inventory, but has not yet checked for another PC. The test
-    // then removes the inventory.
+    // When the command sends this frame, it has read the inventory but has not yet checked for another PC. The test
+    // removes the inventory now, so that the command cannot remove the record in it later.
     peer.wait("201#");
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);

@@ -14,8 +14,8 @@ fn with(sim: &Sim, (name, value): (&str, &str), words: &[&str]) -> CommandOutput
     run(command, words, "")
 }
 
-/// Checks that no frame in `frames` resets, numbers, programs, starts or moves a board. For this check, `ucom send` must accept
-/// the frames without `--intrusive`.
+/// Checks that no frame in `frames` resets, numbers, programs, starts or moves a board. `ucom send` accepts such
+/// frames only with `--intrusive`, so it must accept all of `frames` without this option.
 fn only_questions(frames: &[String]) {
     let words: Vec<&str> = frames.iter().map(String::as_str).collect();
     if !words.is_empty() {
@@ -38,7 +38,7 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let before = (sim.status_byte("1"), sim.status_byte("2"));
     let mut peer = sim.peer();
     for (variable, value, words, code) in [
-        // In earlier versions, this variable would have moved the board, even if the user had set it only for `ucom record`.
+        // In earlier versions, this variable moved the board, even if the user had set it only for `ucom record`.
         ("UCOM_FOR", "2", &["ci", "1", "set_position=1500"][..], 0),
         ("UCOM_FORCE", "1", &["ci", "1", "set_position=1500"], 0),
         ("UCOM_SET", "ASTART", &["status", "2"], 0),
@@ -54,8 +54,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
         let output = with(&sim, (variable, value), words).ends(code);
         let line = format!("{variable}={value} is ignored: `ucom");
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
-        // `frames` contains neither heartbeats nor the frames of `ci`. The command `ci` checks whether the control
-        // loop runs, and writes its input. If the control loop does not run, these frames do not move the board.
+        // `frames` omits heartbeats and the frames of `ci`. The command `ci` checks whether the control loop runs,
+        // and writes its input. Without a running control loop, these frames do not move the board.
         let of_ci = |f: &String| {
             f == "601#00000000" || ["680#", "681#", "341#"].iter().any(|start| f.starts_with(start))
         };

@@ -64,7 +64,7 @@ mod tests {
     use crate::args::Cli;
 
     /// A new option must not get a variable that changes boards. Therefore this list contains each permitted
-    /// variable, with the reason why it may exist.
+    /// variable, with the reason why it is permitted.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};
@@ -101,8 +101,8 @@ mod tests {
             ("UCOM_TLS_CERT", File),
             ("UCOM_TLS_KEY", File),
         ];
-        // The options in this list select files that are programmed, change a query into a command, or contain the inputs of a
-        // board.
+        // These options have no variable: they select files that are programmed or that contain the inputs of a
+        // board, or they change a query into a command.
         let without = [
             "update --exloader",
             "update --data",

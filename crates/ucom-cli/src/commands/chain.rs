@@ -44,8 +44,7 @@ pub(super) fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
         }
-        // The command reports missing numbers and errors elsewhere in its output, so this list
-        // omits them.
+        // The command reports boards without a number, and errors, elsewhere in its output, so this list omits them.
         let reported = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
         text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });

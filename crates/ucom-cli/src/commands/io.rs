@@ -23,7 +23,8 @@ pub(super) fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file =
         args.template.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
-    // If the file exists, it is probably a signal table that a user has edited.
+    // The existing file is probably a signal table that a user has edited. Therefore the hint suggests to print the
+    // template and to add it to the file by hand.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
         true => Failure::nothing_sent(e).next(
             "--template - prints the table, so that you can add it by hand; --overwrite writes over it",
@@ -200,7 +201,7 @@ fn move_for(
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
         driver.master.watch(board, None, true);
-        // A failed run has already undone its own changes. Only the earlier changes are undone here.
+        // A failed run undoes its own changes. After that, only the changes from before the run must be undone.
         driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
         Ok(prepared)
     })?;
@@ -223,8 +224,8 @@ fn move_for(
         }
     }
     followed.ask_no_more(&mut driver.master);
-    // The following stop is not part of a procedure, because Ctrl-C would cancel a procedure, and the user may have
-    // pressed Ctrl-C to stop the board.
+    // This stop is sent outside of a procedure, because Ctrl-C cancels procedures. The user may have pressed Ctrl-C
+    // to stop the board, so the stop must still be sent.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();

@@ -159,7 +159,8 @@ mod tests {
 
     use super::*;
 
-    /// The command `ucom explain` knows the letters and words of the view, and explains each of them as the name of its bit.
+    /// The command `ucom explain` accepts each letter and word of a status bit in the view, and gives the same
+    /// explanation as for the name of this bit.
     #[test]
     fn every_letter_and_word_of_a_bit_is_explained() {
         let all = words();

@@ -9,12 +9,12 @@ use super::*;
 /// Terminal sizes for the tests, smallest first.
 const SIZES: [(u16, u16); 6] = [(40, 12), (50, 15), (60, 20), (80, 24), (120, 40), (200, 60)];
 
-/// Returns a chain of ten boards that have answered an identity request.
+/// Returns the master of a chain of ten boards that have answered an identity request, and the present time, µs.
 fn ten() -> (Master, u64) {
     chain(None)
 }
 
-/// Returns a chain in which the application of one board is started.
+/// Like [`ten`]. If `started` is a board number, the application of this board is started.
 fn chain(started: Option<u8>) -> (Master, u64) {
     let (mut master, mut now) = (Master::new(Profile::default()), 0);
     for number in 1..=10_u8 {
@@ -47,7 +47,7 @@ fn chain(started: Option<u8>) -> (Master, u64) {
     (master, now)
 }
 
-/// Returns a chain in which board 3 sent heartbeats and then stopped sending them.
+/// Returns the master of a chain in which board 3 has sent heartbeats and then stopped, and the present time, µs.
 fn one_lost() -> (Master, u64) {
     let (mut master, now) = chain(Some(3));
     master.watch(3, Some(3), true);

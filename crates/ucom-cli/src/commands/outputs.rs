@@ -12,8 +12,8 @@ use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
 
-/// Waits until the reader of stdout has read all lines. Stops waiting if the reader of stdout no longer
-/// reads.
+/// Prints the remaining lines, as long as the reader of stdout reads them. Reports the number of lines that were
+/// dropped because the reader was too slow.
 pub(super) fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
@@ -43,8 +43,8 @@ pub(super) fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Fai
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
             match event {
-                // This command starts no control loop, so another PC normally runs the boards. This event is
-                // therefore not reported.
+                // Another PC normally runs the boards, because this command starts no control loop. Therefore the
+                // command does not report another PC on the bus.
                 Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;

@@ -49,7 +49,7 @@ pub(super) fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), F
     let (report, prepared) = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
-        // A failed run has already undone its own changes. Only the earlier changes are undone here.
+        // A failed run undoes its own changes. After that, only the changes from before the run must be undone.
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
     })?;

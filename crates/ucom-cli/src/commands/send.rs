@@ -11,8 +11,8 @@ use ucom_host::session::{is_intrusive, replayed};
 use super::decode::parsed;
 use crate::args::{LinkArgs, SendArgs};
 
-/// Time for which the command listens after it has sent its last frame. A CAN controller makes up to about 32
-/// attempts to send a frame before it is bus-off.
+/// Time for which the command listens after it has sent its last frame. The time is sufficient for the up to about 32
+/// attempts that a CAN controller makes to send a frame before it is bus-off.
 const SENT: Duration = Duration::from_millis(50);
 
 /// Sends frames in the order of the command line. The command checks all frames before it sends the first frame.

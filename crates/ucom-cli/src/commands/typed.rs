@@ -17,8 +17,9 @@ pub(super) fn typed() -> Receiver<String> {
     receiver
 }
 
-/// Passes each line of the input to `take` until the input ends, or until `take` returns `false`. If a line contains a
-/// byte that is not text, the line is reported as invalid. A `stop` in a later line still takes effect.
+/// Passes each line of the input to `take` until the input ends, or until `take` returns `false`. A line with bytes
+/// that are not text is also passed, and is later reported as invalid. Therefore a `stop` in a later line still takes
+/// effect.
 fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     let mut line = Vec::new();
     loop {

@@ -60,7 +60,8 @@ fn boards(report: &UpdateReport, profile: &Profile) -> String {
     table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows)
 }
 
-/// Returns `true` if only the answer of the board itself shows that the update is complete.
+/// Returns `true` if the update of a board is complete but could not be verified, so that only the answer of the
+/// board shows that it is complete.
 fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
     let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
     report.unverifiable.is_some() && done && b.failure.is_none()
@@ -107,7 +108,8 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     format!("{lines}{why};\n{}{accept}\n", why.hint())
 }
 
-/// Returns `true` if PC_INFO reports another program after the update than before.
+/// Returns `true` if PC_INFO reports another program after the update than before. Returns `None` if one of the two
+/// reports is missing.
 fn changed(b: &UpdateResult) -> Option<bool> {
     let program = |info: BoardInfo| (info.program_id, info.date);
     Some(program(b.before?) != program(b.after?))

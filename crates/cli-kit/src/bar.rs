@@ -42,8 +42,8 @@ pub(crate) fn stderr_width() -> Option<u16> {
         .map(|(columns, _)| columns)
 }
 
-/// Returns `Ok` if stderr is a terminal that is wide enough for progress bars. If the terminal is too small, the error
-/// is its size. If stderr is not a terminal, the error is `None`.
+/// Returns `Ok` if stderr is a terminal that is large enough for progress bars. If the terminal is too small, the
+/// error contains its size. If stderr is not a terminal, the error is `None`.
 pub fn draws_bars() -> Result<(), Option<(u16, u16)>> {
     if !std::io::stderr().is_terminal() {
         return Err(None);

@@ -1,4 +1,4 @@
-//! Exit codes of the commands. Scripts may rely on these codes.
+//! Exit codes of the commands. Scripts can rely on these codes.
 use host_kit::ErrorKind;
 
 /// A device reported an error.

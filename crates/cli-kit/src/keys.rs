@@ -29,7 +29,8 @@ pub enum Key {
     Escape,
 }
 
-/// Converts bytes of a terminal to keys, and returns the remaining bytes, which may be the start of a key.
+/// Converts bytes of a terminal to keys, and returns the remaining bytes. They are the possible start of a key whose
+/// other bytes have not arrived yet.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
     let (mut keys, mut rest) = (Vec::new(), bytes);
@@ -112,7 +113,8 @@ mod terminal {
             if !std::io::stdin().is_terminal() {
                 return None;
             }
-            // Only a foreground process may change the terminal mode. The system would suspend a background process.
+            // Only a foreground process is allowed to change the terminal mode. If a background process changed it,
+            // the system would suspend the process.
             if tcgetpgrp(stdin()).is_ok_and(|foreground| foreground != getpgrp()) {
                 return None;
             }
@@ -140,8 +142,8 @@ mod terminal {
                 return Vec::new();
             }
             if !matches!(waited, Ok(1..)) {
-                // All bytes of a key arrive together. If no further byte has arrived, the first byte is the Escape
-                // key itself.
+                // All bytes of a key arrive together. Therefore an Escape byte that no other byte follows is the
+                // Escape key, not the start of another key.
                 return if std::mem::take(&mut self.begun).is_empty() {
                     Vec::new()
                 } else {

@@ -160,7 +160,8 @@ mod tests {
 
     use super::*;
 
-    /// Output that accepts a line only when the test permits it. A write fails after the reader has disconnected.
+    /// Output for the tests. Each write waits until the test receives the line. A write fails after the test has
+    /// disconnected.
     struct Slow(SyncSender<Vec<u8>>);
 
     impl Write for Slow {
@@ -178,8 +179,8 @@ mod tests {
         (Lines::to(Slow(sender), false).unwrap(), receiver)
     }
 
-    /// With a blocked reader, the command can still push lines, and the queue counts excess lines. The wait at the end
-    /// of the command is limited.
+    /// If the reader does not read, the command can still add lines, and the queue counts the lines that nobody has
+    /// read. The wait at the end of the command is limited.
     #[test]
     fn a_reader_that_does_not_read_stops_nothing() {
         let (mut lines, _reader) = slow();

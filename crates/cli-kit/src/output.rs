@@ -104,7 +104,7 @@ impl Output {
         stdout::lose(why);
     }
 
-    /// Returns `true` if no reader accepts further output. A command that only prints may then end.
+    /// Returns `true` if no reader accepts further output. A command that only prints can then end.
     pub fn gone() -> bool {
         stdout::is_gone()
     }
@@ -115,8 +115,8 @@ impl Output {
         stdout::lost()
     }
 
-    /// Prints one line of a log. Drops text that cannot be printed, because a lost terminal must not leave a machine
-    /// without control.
+    /// Prints one line of a log. If the terminal is lost, the line is dropped without an error, so that the command
+    /// continues to control its machine.
     pub fn note(&self, text: impl std::fmt::Display) {
         if STREAM.get().is_some() {
             self.event("note", json!({ "text": text.to_string().trim() }));
@@ -126,8 +126,8 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
-    /// Prints one line of a log before the command begins. With JSON, the log line is an event `note`, because the
-    /// command may stream events.
+    /// Prints one line of a log before the command begins. With JSON, the line has the form of an event `note`,
+    /// because the command may print events later.
     pub(crate) fn log(&self, text: &str) {
         if !self.json {
             return self.note(text);
@@ -146,8 +146,8 @@ impl Output {
         bar::of_bytes(total, what)
     }
 
-    /// Creates a progress bar on stderr for a motion of `total_ms` milliseconds. The text that the caller sets is below
-    /// the bar, and the keys are below this text.
+    /// Creates a progress bar on stderr for a motion of `total_ms` milliseconds. Below the bar are the text that the
+    /// caller sets, and the key help `keys`.
     pub fn motion_bar(&self, total_ms: u64, what: &str, keys: &str) -> ProgressBar {
         bar::of_motion(total_ms, what, keys)
     }

@@ -73,7 +73,8 @@ impl Diagnose for OutputError {
 /// Paths of output files that this process has created but not written yet.
 static UNWRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes output files that were created and never written, before the process ends without any `Drop`.
+/// Removes output files that were created and never written. Must be called before the process ends at once, because
+/// no destructor (`Drop`) runs in this case.
 pub fn abandon() {
     for path in UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
         let _ = std::fs::remove_file(path);

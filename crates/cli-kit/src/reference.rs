@@ -22,8 +22,8 @@ fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|sub| !sub.is_hide_set() && sub.get_name() != "help" || has_options(sub))
 }
 
-/// Returns `true` for a `help` command that the program defines, which has arguments. The `help` command that clap adds
-/// has no arguments.
+/// Returns `true` if the program itself defines this `help` command, so that it has arguments. The `help` command
+/// that clap adds has no arguments.
 fn has_options(command: &Command) -> bool {
     command.get_name() == "help"
         && command.get_subcommands().next().is_none()
@@ -51,7 +51,7 @@ fn one(command: &Command, top: bool, page: &mut String) {
     let usage = usage.trim_start_matches("Usage:").trim();
     let lines: Vec<&str> = usage.lines().map(str::trim).collect();
     let _ = write!(page, "```text\n{}\n```\n\n", lines.join("\n"));
-    // The page lists the options that every command has only once, at the top.
+    // Options that every command has are listed only once, at the top of the page.
     let shown = |arg: &&Arg| {
         !arg.is_hide_set()
             && !["help", "version"].contains(&arg.get_id().as_str())

@@ -37,8 +37,9 @@ impl Stop {
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         for signal in signals() {
-            // The second Ctrl-C ends the process in every state. This handler is registered first, because it must
-            // check the flag before the other handler sets the flag.
+            // If the flag is already set, this handler ends the process; therefore the second Ctrl-C always ends the
+            // process. The handler must be registered before the one that sets the flag. Otherwise the first Ctrl-C
+            // would end the process.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))?;
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
         }

@@ -34,12 +34,12 @@ pub fn check_help_is_wrapped_once(command: &clap::Command) {
     command.get_subcommands().for_each(check_help_is_wrapped_once);
 }
 
-/// Checks that the command line has each command that a next step names. Words in capitals stand for a value that the
-/// user chooses.
+/// Checks that the command line has every command and option that the next step of an error can name ([`Action`]). In
+/// these names, words in capitals stand for a value that the user chooses.
 ///
 /// # Panics
 ///
-/// Panics if the command line does not have a command or an option that a next step names.
+/// Panics if the command line does not have such a command or option.
 pub fn check_commands_of_next_steps(program: &clap::Command) {
     let own = format!("{} ", program.get_name());
     let commands = Action::ALL.iter().map(|action| action.name(FrontEnd::Command));

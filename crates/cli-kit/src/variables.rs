@@ -55,10 +55,10 @@ pub struct Retired {
 /// Effect of an ignored variable on the command.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Without {
-    /// Without the variable, the command does less: the command continues, with a note.
+    /// Without the variable, the command does less. Therefore the command continues, and prints a note.
     Less,
-    /// Without the variable, the command does more or something else, such as a motion at another speed: the command is
-    /// rejected.
+    /// Without the variable, the command does more or something else, such as a motion at another speed. Therefore
+    /// the command is rejected.
     Other,
 }
 
@@ -186,7 +186,8 @@ impl Variables {
         lines
     }
 
-    /// Returns the retired variables that are set for options of this command, unless the user has typed the option.
+    /// Returns the retired variables that are set for options of this command. Omits variables that are empty or off,
+    /// and variables of options that the user has typed.
     fn unread(
         &self,
         chosen: &Chosen<'_>,
@@ -256,7 +257,7 @@ fn is_set_by_variable(arg: &Arg, matches: &ArgMatches) -> bool {
         && (arg.get_action().takes_values() || matches.get_flag(id))
 }
 
-/// Returns the command that the user typed, up to the first word that is not a command.
+/// Returns the command that the user typed. Other words, such as options, are skipped. The search ends at `--`.
 fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> Chosen<'a> {
     let (mut command, mut words) = (root, Vec::new());
     for word in typed.iter().take_while(|word| *word != "--") {

@@ -70,9 +70,9 @@ pub struct Trouble {
 }
 
 impl Trouble {
-    /// Returns the lines for the head of a live view, about `most` lines at most. The lines contain as many complete
-    /// causes as fit, the next command, and the result of the last key press. The second list contains the causes
-    /// that do not fit, which are the first rows of the scrolled part.
+    /// Returns the lines for the head of a live view, if possible at most `most` lines. The lines contain the
+    /// complete causes and warnings that fit, the next command, and the result of the last key press. The second list
+    /// contains the causes that do not fit. The view shows them as the first rows of the scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
         let yellow = |text: String| Line::from(text).style(Style::new().fg(Color::Yellow));

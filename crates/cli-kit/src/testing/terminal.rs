@@ -133,7 +133,8 @@ impl Terminal {
     /// terminal open.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
-        // The reading thread owns the last handle of the user's side. The terminal hangs up when this thread ends.
+        // The reading thread ends when `closed` is set. It owns the last handle of the user's side, so the terminal
+        // then hangs up.
         self.closed.store(true, Ordering::Relaxed);
         self.reader.take().map(JoinHandle::join);
     }

@@ -6,7 +6,7 @@ use clap::{Arg, ArgAction, Command, CommandFactory};
 
 use super::Variables;
 
-/// Reason why an option may have an environment variable.
+/// Reason why an option is allowed to have an environment variable.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Kind {
     /// Name of a port, a bus, an address, a host or a folder.
@@ -43,8 +43,8 @@ const PLACES: [&str; 11] = [
 ];
 
 /// Returns all faults of the environment variables of a command line. The list is empty if there are no faults.
-/// `allowed` lists each variable with the reason why it may exist. `without` lists options that name a file and still
-/// have no variable, for example `update --data`.
+/// `allowed` lists each variable with the reason why it is allowed. `without` lists options that name a file and
+/// still have no variable, for example `update --data`.
 pub fn faults<Cli: CommandFactory>(
     prefix: &str,
     variables: &Variables,
@@ -138,7 +138,7 @@ fn lists(
     faults
 }
 
-/// Returns the reason why an option does not belong to this kind. Returns `None` if the option belongs to the kind.
+/// Returns the reason why the variable of an option cannot be of this kind. Returns `None` if it can.
 fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
     match kind {

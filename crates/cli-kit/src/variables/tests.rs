@@ -110,8 +110,8 @@ fn where_a_command_line_is_wrong_the_variable_behind_it_is_named() {
         let typed: Vec<OsString> = words.iter().map(OsString::from).collect();
         VARIABLES.report_error("try", &root, &error, &typed, of(environment))
     };
-    // The test passes the variables as an argument, and sets no variable of its own process. Therefore clap reads no
-    // variable. The wrong option causes the error, and the report still contains the variable.
+    // The variables are passed as an argument and are not set in the process, so clap does not read them. The parser
+    // rejects the wrong option `--sped`. The report must still list the variable.
     assert_eq!(lines(&["go", "--sped", "3"], &[("TRY_ACTIVE", "1")]).len(), 1);
     assert!(lines(&["go", "--bus"], &[("TRY_BUS", "x")]).is_empty(), "it is typed");
 }

@@ -166,7 +166,7 @@ enum Part {
     /// Action, for which each front end shows its own name.
     Action {
         action: Action,
-        /// Command with all arguments, which the command line shows instead of the name.
+        /// Complete command with all arguments. The command-line tool shows it instead of the name of the action.
         command: Option<String>,
         /// Boards whose numbers replace the placeholder in the name; empty if they are not known.
         boards: Vec<u8>,
@@ -249,7 +249,8 @@ impl Next {
         self
     }
 
-    /// Creates a next step from an action and its command with all arguments.
+    /// Creates a next step that consists of one action. The command-line tool shows `command`, which contains all
+    /// arguments.
     pub fn typed(action: Action, command: impl Into<String>) -> Self {
         Self(vec![Part::Action { action, command: Some(command.into()), boards: Vec::new() }])
     }
@@ -270,7 +271,7 @@ impl Next {
                     (boards, _) => boards.iter().map(u8::to_string).collect::<Vec<_>>().join(","),
                 };
                 let name = action.name(front_end).replace(NUMBER, &numbers);
-                // Some names already contain an expression in backticks.
+                // Some names already contain an expression in backticks, so they get no further backticks.
                 if name.contains('`') { name.into() } else { format!("`{name}`").into() }
             }
         });

@@ -39,20 +39,19 @@ pub enum Refused {
 /// Function of a request. The function is called once, with the device `D` or with the reason why the request is
 /// refused.
 ///
-/// If the request is refused, the thread that refuses the request calls the function. The refusing thread is the owner,
-/// or a thread that cancels a request, requests a Stop or adds a request. The calling thread must not hold a lock that
-/// the function needs.
+/// If the request is refused, the function runs in the thread that refuses it: the owner, or a thread that cancels a
+/// request, requests a Stop or adds a request. This thread must not hold a lock that the function needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
-/// Value of [`Request::after`] for a request that no Stop may refuse.
+/// Value of [`Request::after`] for a request that is never refused because of a Stop.
 pub const NEVER_LATE: u64 = u64::MAX;
 
 /// Request to the owner of a device `D`, with a tag of the front end.
 pub struct Request<D, T> {
     /// Kind of the request.
     pub kind: Kind,
-    /// Number of the last Stop before the request was made: see [`Queue::stops`]. With [`NEVER_LATE`], no Stop refuses
-    /// the request. Queries do not use this number.
+    /// Number of the last Stop when the request was made: see [`Queue::stops`]. A later Stop refuses the request.
+    /// With [`NEVER_LATE`], no Stop refuses the request. Queries do not use this number.
     pub after: u64,
     /// Data of the front end about the request.
     pub tag: T,
@@ -231,7 +230,8 @@ impl<D, T: Clone> Queue<D, T> {
         let (stopping, waiting) = {
             let mut state = self.lock();
             state.closed = true;
-            // If the owner panicked while it carried out a request, this request is still the current request.
+            // If the owner panicked while it carried out a request, this request would otherwise stay the current
+            // request.
             state.current = None;
             (std::mem::take(&mut state.stopping), std::mem::take(&mut state.waiting))
         };
@@ -376,8 +376,7 @@ mod tests {
         let stop = |bench: &Bench, tag| bench.queue.stop_alike(tag, bench.act(tag));
         assert_eq!((stop(&bench, 1), stop(&bench, 2)), (1, 2));
         let turn = bench.queue.take().expect("the first waits");
-        // The first Stop has begun. Its function may have checked for further Stops before the third Stop was
-        // requested. Therefore the queue keeps the function of the third Stop.
+        // The first Stop has begun and no longer waits. Therefore the queue must keep the function of the third Stop.
         assert_eq!(stop(&bench, 3), 3);
         turn.run(&mut bench.device);
         bench.serve();
@@ -392,7 +391,7 @@ mod tests {
         bench.request(Kind::Update, before, 2);
         bench.request(Kind::Question, before, 3);
         assert_eq!(bench.stop(6), before + 1);
-        // The request was made before the Stop but was added to the queue after the Stop.
+        // This command was made before the Stop and is added after the Stop, so it must be refused.
         bench.request(Kind::Command, before, 4);
         bench.request(Kind::Command, bench.queue.stops(), 5);
         bench.serve();
@@ -486,7 +485,7 @@ mod tests {
         assert!(bench.queue.has(|tag| *tag == 1) && bench.queue.has(|tag| *tag == 2));
         assert!(bench.queue.cancel(|tag| *tag == 2));
         assert!(!bench.queue.is_cancelled() && !bench.queue.has(|tag| *tag == 2));
-        // A Stop does not cancel an update that has begun, but a user may cancel it.
+        // A Stop does not cancel an update that has begun, but a user can cancel it.
         assert!(bench.queue.cancel(|tag| *tag == 1));
         assert!(bench.queue.is_cancelled());
         turn.run(&mut bench.device);
@@ -499,7 +498,8 @@ mod tests {
     fn a_closed_queue_refuses_all_requests() {
         let mut bench = Bench::default();
         bench.request(Kind::Command, 0, 1);
-        // The owner takes a request and drops it without carrying it out.
+        // The owner takes a request and drops it without carrying it out. After `close`, the queue must not contain
+        // this request.
         drop(bench.queue.take());
         bench.request(Kind::Command, 0, 2);
         bench.stop(3);

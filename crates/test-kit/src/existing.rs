@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Returns the content of a data file. If the file is missing, prints a line and returns `None`.
+/// Returns the path of a data file. If the file is missing, prints a line and returns `None`.
 pub fn file(name: &str) -> Option<PathBuf> {
     let directory = std::env::var("OPENJTC_DATA")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());

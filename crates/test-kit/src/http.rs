@@ -27,7 +27,8 @@ impl Http {
         self.ask(request, &[&format!("Host: {}", self.address)])
     }
 
-    /// Sends a request with the operator's token. A lease key and a body are optional.
+    /// Sends a request with the operator's token, and returns the status and the JSON body of the answer. A lease key
+    /// and a body are optional.
     pub fn api(&self, request: &str, key: Option<&str>, body: Option<Value>) -> (u16, Value) {
         self.api_as(Some(&self.operator), request, key, body)
     }

@@ -11,7 +11,8 @@ const SHOWN: (usize, usize) = (5, 4);
 /// changed.
 const TRIES: usize = 4;
 
-/// Words after which a number stays unchanged, because this number identifies an item.
+/// Words before a number that identifies an item, such as a joint. The comparison does not replace such a number by
+/// `…`.
 const KEPT: [&str; 9] =
     ["joint ", "joints ", "board ", "boards ", "number ", "code ", "stop ", "certain: ", "localhost:"];
 

@@ -9,10 +9,11 @@ const TIME: Duration = Duration::from_secs(60);
 pub const LONGEST: Duration = Duration::from_secs(300);
 /// Time between two checks of a condition.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Seconds that are added to the timeout for each second of delay of the waiting thread.
+/// Seconds by which the timeout grows for each second by which the computer delays the waiting thread.
 const GROWTH: u32 = 4;
 
-/// Wait of a test for a condition. If the computer delays the waiting thread, it also delays the programs for which the test waits.
+/// Wait of a test for a condition. If the computer delays the waiting thread, the timeout grows, because the awaited
+/// programs are then delayed too.
 #[derive(Debug)]
 pub struct Patience {
     begun: Instant,

@@ -103,7 +103,7 @@ pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
         if new != text {
             std::fs::write(page, new).expect("the page can be written");
         }
-        // The differences are now on the page, so only commands that failed remain as errors.
+        // The page now contains the real output, so only commands with a wrong exit code remain as errors.
         run.done.wrong.retain(|text| text.contains("exit code"));
     }
     std::mem::take(&mut run.done)
@@ -165,7 +165,8 @@ impl Run {
         }
         let mut steps = block.steps();
         if steps.is_empty() {
-            // If the block is empty, its output is not on the page yet.
+            // A block without lines does not have its output on the page yet. It is handled as one step without a
+            // command.
             steps.push(Step { command: String::new(), shown: Vec::new() });
         }
         let name = block.note("terminal").unwrap_or(OWN).to_owned();

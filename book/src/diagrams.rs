@@ -1,5 +1,5 @@
-//! Diagrams that pages contain as text. Mermaid draws them in the browser. Its script is a file of the book, so that a reader's browser fetches
-//! nothing from elsewhere.
+//! Diagrams, which pages contain as Mermaid source text. The browser draws them with the Mermaid script. The book
+//! contains this script, so that the browser loads nothing from other servers.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,11 +8,11 @@ use anyhow::{Context, Result, ensure};
 use mdbook_driver::book::Book;
 use serde_json::Value;
 
-/// File name of the script in the book.
+/// File name of the Mermaid script in the book.
 const SCRIPT: &str = "mermaid.min.js";
 
-/// Adds the script to the end of each page that has a diagram, and returns the number of these pages. The preprocessor of mdbook-mermaid
-/// handles the diagrams themselves.
+/// Adds the Mermaid script to the end of each page that has a diagram, and returns the number of these pages. The
+/// preprocessor of mdbook-mermaid converts the diagrams themselves.
 pub fn with_script(book: &mut Book) -> usize {
     let mut pages = 0;
     book.for_each_chapter_mut(|chapter| {
@@ -27,11 +27,11 @@ pub fn with_script(book: &mut Book) -> usize {
     pages
 }
 
-/// Copies the script, which is a part of the source of mdbook-mermaid, into the book.
+/// Copies the Mermaid script from the source of mdbook-mermaid into the book.
 pub fn copy_script(root: &Path, out: &Path) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    // The option `--offline` is missing on purpose: `cargo metadata` reads the manifests for every platform, and the
-    // build for this computer may have fetched only some of them.
+    // The option `--offline` is omitted on purpose: `cargo metadata` reads the manifests of the packages for every
+    // platform, and a build for this computer downloads only some of these packages.
     let words = ["metadata", "--format-version", "1", "--locked", "--manifest-path"];
     let asked = Command::new(cargo).args(words).arg(root.join("book/Cargo.toml")).output()?;
     ensure!(asked.status.success(), "cargo metadata: {}", String::from_utf8_lossy(&asked.stderr));

@@ -1,4 +1,4 @@
-//! The links of a page of Markdown.
+//! Replaces the targets of the links in a page of Markdown.
 
 /// Returns the page with the targets of its links replaced by those that `change` returns. If the new target is
 /// empty, the words stay without a link. Fenced blocks are not changed.

@@ -1,4 +1,4 @@
-//! Links that lead out of docs/: to files of the repository.
+//! Links from docs/ to other files of the repository.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -80,7 +80,8 @@ fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapte
     Ok(Chapter::new(&name, content, Path::new(FOLDER).join(shown(file)), Vec::new()))
 }
 
-/// Returns the name of a file in the book. Pictures keep their names. Every other file becomes a page.
+/// Returns the name of a file in the book. Pictures and Markdown files keep their names, except `README.md`. Every
+/// other file becomes a page whose name has `.md` at the end.
 fn shown(file: &Path) -> PathBuf {
     // mdbook turns `README.md` into an index page, and does not adjust links to it from other folders.
     if file.file_name() == Some(OsStr::new("README.md")) {

@@ -115,8 +115,8 @@ fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     Ok((top, 0x2000_0000))
 }
 
-/// Prints the instruction count, the latency and the stack use of each handler. The count of a handler does not include
-/// the instructions of other handlers that interrupt it.
+/// Prints the instruction count and the latency of each handler. The count does not include the instructions of other
+/// handlers that interrupt the handler. Returns an error if the tick begins too late.
 fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     for (name, number) in HANDLERS {
         let (count, latency) = (observers.handlers[number], observers.latencies[number]);
@@ -136,8 +136,8 @@ fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Prints the stack use of each context (main program and handlers), including the exception frames. Handlers of a
-/// higher priority can interrupt each context.
+/// Prints the stack use of each context (main program and handlers), including the exception frames, and the sum. The
+/// sum is the worst case, because a handler of a higher priority can interrupt each context.
 fn stacks(observers: &Observers, (top, bottom): (u32, u32)) -> Result<(), Box<dyn Error>> {
     let size = top - bottom;
     let mut sum = top - observers.lowest_sp[0];

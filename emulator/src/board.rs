@@ -72,7 +72,7 @@ impl CanPeers for Nodes {
         for (delay, answer) in self.answers.drain(..) {
             let frame =
                 Id::standard(u32::from(answer.id)).and_then(|id| CanFrame::fd_padded(id, answer.data()));
-            // This cannot fail, because every frame of the joint bus has a valid identifier and length.
+            // The conversion cannot fail, because every frame of the joint bus has a valid identifier and length.
             let Ok(frame) = frame else { continue };
             answers.push((end + u64::from(delay) * MICROSECOND, frame.with_brs(true)));
         }

@@ -184,7 +184,7 @@ impl Chip {
         }
     }
 
-    /// Passes the clock frequencies that the RCC registers configure to the peripherals.
+    /// Passes the clock frequencies, as configured in the RCC registers, to the peripherals.
     fn update_clocks(&mut self) {
         let clocks = self.rcc.clocks();
         let now = self.now();

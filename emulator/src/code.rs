@@ -20,8 +20,8 @@ pub const WATCHED: u16 = 8;
 pub const IT: u16 = 16;
 /// Mark of an instruction inside an IT block.
 pub const MEMBER: u16 = 32;
-/// Bit positions of two numbers in the class of an IT instruction: the number of instructions in the block, and the
-/// number of half-words of these instructions.
+/// Positions of two numbers within the class of an IT instruction: the number of instructions in the block, and their
+/// length in half-words.
 const MEMBERS: u32 = 8;
 const HALF_WORDS: u32 = 12;
 

@@ -29,7 +29,7 @@ pub trait Memory {
 #[derive(Clone, Copy, Default)]
 struct Stream {
     cr: u32,
-    /// Value written to NDTR, and number of remaining transfers.
+    /// Value that was written to NDTR. The next field is the number of remaining transfers.
     total: u32,
     left: u32,
     par: u32,

@@ -232,8 +232,8 @@ impl Fdcan {
         self.psr & 0x80 != 0
     }
 
-    /// Returns the time from which the CAN controller sends and receives. The time is `NEVER` in INIT, clock stop or
-    /// bus-off, otherwise `online`.
+    /// Returns the time from which the CAN controller sends and receives: `online`, or `NEVER` in INIT, clock stop or
+    /// bus-off.
     fn takes_part(&self) -> Time {
         if self.bus_off() || self.cccr & (cccr::INIT | cccr::CSR) != 0 { NEVER } else { self.online }
     }

@@ -12,7 +12,7 @@ pub struct Iwdg {
     window: u32,
     unlocked: bool,
     bites: Time,
-    /// Shortest remaining time until a reset at which the firmware has fed the watchdog.
+    /// Shortest time to the watchdog reset that remained when the firmware fed the watchdog.
     pub least_left: Time,
 }
 

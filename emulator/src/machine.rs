@@ -109,8 +109,8 @@ impl Machine {
         }
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
-            // The call of `ctl_flush_tb` is necessary, because Unicorn would continue to execute its translation of
-            // the old code.
+            // Unicorn would otherwise continue to execute its translation of the old code. `ctl_flush_tb` discards
+            // this translation.
             self.chip().core.it_block = 0..0;
             let _ = self.uc.ctl_flush_tb();
         }

@@ -84,7 +84,7 @@ impl Timer {
         self.count + (now.saturating_sub(self.at) / self.tick()) as u32
     }
 
-    /// Updates `count` and `at` without losing the elapsed part of a timer tick.
+    /// Advances `count` to `now` by whole timer ticks, and `at` by the same time, so that a started tick is not lost.
     fn settle(&mut self, now: Time) {
         if self.runs() {
             let ticks = now.saturating_sub(self.at) / self.tick();
@@ -126,16 +126,16 @@ impl Timer {
         if !self.runs() {
             return NEVER;
         }
-        // Only flags whose interrupt is enabled need an event. The model computes all other flags when the program
-        // reads a register.
+        // The model needs an event only for flags whose interrupt is enabled. It computes all other flags when the
+        // program reads a register.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();
         }
         if !self.basic {
             for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
-                // If the counter overflows before the match, the overflow is the next event. The model computes the
-                // time of the match after the overflow.
+                // If the counter overflows before the match, the overflow is the next event. Afterwards, the model
+                // computes the time of the match again.
                 ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
             }
         }

@@ -69,8 +69,9 @@ fn j12_tim7_ticks_a_thousand_times_a_second() {
     }
 }
 
-/// Memory that DMA and the core share is not cached, and an access through a null pointer causes a fault. ARMv7-M
-/// B3.5.9: RASR contains XN in bit 28, AP in bits 26..24, TEX S C B in bits 21..16, and the size in bits 5..1.
+/// Memory that DMA and the core share is not cached, and an access through a null pointer causes a fault. In the
+/// register RASR, XN is bit 28, AP is bits 26..24, TEX S C B are bits 21..16, and the size is bits 5..1 (ARMv7-M
+/// B3.5.9).
 #[test]
 fn memory_is_protected_and_shared_memory_is_not_cached() {
     for board in BOARDS {

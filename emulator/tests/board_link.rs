@@ -41,7 +41,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
         // The second part of the frame is long, so that the line does not become idle right after the gap. Therefore
-        // no idle interrupt wakes the links at that time.
+        // no idle interrupt makes the firmware check the line at that time.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
         // The first bytes take part of the time `ms`, so the line is silent for 0.26 ms less. The test sends
@@ -154,7 +154,7 @@ fn j04_every_port_gets_its_own_records() {
     }
 }
 
-/// J-04: "at once" means in the tick after the last byte of the frame.
+/// J-04: the board sends a response record "at once", that is, in the tick after the last byte of the frame.
 #[test]
 fn j04_a_record_waits_for_nothing_but_the_tick() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -167,8 +167,8 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // Without waiting, the record takes six received bytes and 175 sent bytes at 87 µs each, and about one tick.
-        // If the board sent a periodic status just before the record, the record takes up to 15.3 ms longer.
+        // The expected time consists of six received bytes and 175 sent bytes at 87 µs each, and about one tick. If
+        // the board has just begun to send a periodic status, the record comes up to 15.3 ms later.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");
@@ -209,8 +209,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     no_losses(&mut rig);
 }
 
-/// J-07: a port with continuous traffic does not delay the tick (the rig checks this in every millisecond). A record of
-/// the other port waits only for records that were queued before it.
+/// J-07: continuous traffic on one port does not delay the tick (the rig checks this in every millisecond). A record
+/// on the other port waits only for records that were queued before it.
 #[test]
 fn j07_a_flooding_port_does_not_starve_the_other() {
     for (flood, other) in [(A, B), (B, A)] {
@@ -293,8 +293,8 @@ fn j04_a_stop_waits_for_nothing() {
                     break;
                 }
             }
-            // The last byte of the Stop frame is transmitted in this millisecond, so one of the next two ticks finds
-            // it.
+            // The last byte of the Stop frame is transmitted within this millisecond. Depending on the exact time,
+            // the next tick or the tick after it finds the byte.
             let mut ticks = 0;
             while rig.flight.urgent[index(port)].is_empty() {
                 ticks += 1;

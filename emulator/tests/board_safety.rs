@@ -161,9 +161,9 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     panic!("no reset");
 }
 
-/// Checks the state after the program has failed and restarted. From the first status on, the error is present, the
-/// torque is zero and the safety output is at 0, until the host clears the error. The arm does not continue a motion
-/// without a command.
+/// Checks the state after the program has failed and restarted. From the first status on, the controller reports the
+/// error, with zero torque and the safety output at 0, until the host clears the error. Afterwards, the arm does not
+/// move without a command.
 fn latched_until_cleared(mut rig: Rig, cause: u32) {
     rig.wait("the first tick", 10, |rig| rig.ticks > 0);
     assert_eq!(rig.flight.cause, cause);

@@ -66,13 +66,11 @@ fn a_whole_session() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(HOST);
     let limit = Config::default().joints.map(|j| j.position_error_max).into_iter().fold(f64::MAX, f64::min);
-    // J-51: the request GetInfo before segment 0 permits all data status values in the records of this upload,
-    // including 7 and 8.
+    // J-51: after GetInfo, the controller may use every data status in the records of this upload, including 7 and 8.
     rig.ask(HOST, &fixed::GET_INFO);
     rig.upload(&motion(), 4);
 
-    // J-33: after Pause, the arm slows down on the path and is at rest after a ramp. The test then sends Resume and
-    // Stop.
+    // J-33: after Pause, the arm slows down along the path and comes to rest. The test then sends Resume and Stop.
     assert!(accepted(rig.exec(ExecCommand::Execute)));
     rig.run(1_000);
     assert_eq!(rig.state(), ControllerState::Operate);
@@ -126,9 +124,9 @@ fn a_whole_session() {
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
-/// J-33: a Stop brings an arm with a load of 3.3 kg at the last link to rest within about half a second. The arm
-/// model of the controller includes this load. The Stop arrives while the arm lowers the load, in the position that
-/// requires 95 % of the torque limit of the shoulder.
+/// J-33: after a Stop, an arm with a load of 3.3 kg at the last link comes to rest within about half a second. The
+/// arm model of the controller includes this load. At the Stop, the arm lowers the load, and the shoulder needs 95 %
+/// of its torque limit.
 #[test]
 fn j33_a_loaded_arm_stands_within_half_a_second() {
     const SHOULDER: usize = 1;
@@ -228,7 +226,7 @@ fn a_short_session_at_15_mbd() {
 }
 
 /// J-12: the board enables and holds an arm with older drives, without errors. Older drives use another velocity
-/// scale, handle one message per interrupt and answer during transitions.
+/// scale, handle one message per interrupt, and answer ChangeFsm with the code of the state transition.
 #[test]
 fn j12_older_drives_are_not_left_behind() {
     let sim = SimConfig {
@@ -273,8 +271,8 @@ fn j12_one_broadcast_a_tick_and_its_answers() {
     }
     let period = openjtc_emulator::clock::MILLISECOND;
     for pair in starts.windows(2) {
-        // The number of instructions between the start of the tick and the transmit request varies. Therefore the
-        // period between two broadcasts may differ from 1 ms by up to 30 µs.
+        // The time from the start of the tick to the transmit request depends on the number of executed instructions.
+        // Therefore the period between two broadcasts may differ from 1 ms by up to 30 µs.
         let off = (pair[1] - pair[0]).abs_diff(period);
         assert!(off < 30 * openjtc_emulator::clock::MICROSECOND, "{off}");
     }

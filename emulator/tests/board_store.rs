@@ -130,7 +130,7 @@ fn j54_a_stored_image_outlasts_the_power() {
         assert_eq!(loaded(&rig.board.machine), Some((image.clone(), sequence)));
         clean(&mut rig);
     }
-    // Stores two images in a row, without a restart between them.
+    // If two images are stored without a restart between them, the board starts with the image that was stored last.
     store(&mut rig, &images[2]);
     store(&mut rig, &images[1]);
     let rig = board(rig.board.machine.cut_power(9));
@@ -165,7 +165,7 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     rig.ask(HOST, &fixed::STORE_ARM);
     rig.wait("the arm is stored", 4_000, |rig| !working(rig));
     assert_eq!(mailbox(&rig.board.machine).state, DONE);
-    // The next tick detects that the links have stored the image.
+    // The next tick detects that the image is stored.
     rig.run(2);
     rig.ask(HOST, &fixed::GET_INFO);
     rig.run(60);
@@ -189,8 +189,8 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     clean(&mut rig);
 }
 
-/// J-12: erasing a sector takes at least two seconds. During this time, every tick is on time and executes as many
-/// instructions as a tick without a flash operation.
+/// J-12: while a sector is erased, which takes seconds, every tick is on time. The number of instructions of a tick
+/// changes by at most 32.
 #[test]
 fn j12_no_tick_is_late_while_the_flash_works() {
     let run = |ask_for: Option<&[u8]>| {
@@ -208,7 +208,8 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     let (idle, none) = run(None);
     let (storing, operations) = run(Some(&image(IMAGE_MAX, 5)));
     assert_eq!((none, operations), (0, 1 + IMAGE_MAX / WORD + 1), "all is stored in that time");
-    // The tick reads the progress of storing, which slightly changes the number of its instructions.
+    // The number of ticks must be equal. The number of instructions in a tick may differ slightly, because the tick
+    // reads the progress of the store.
     assert_eq!(idle.calls, storing.calls);
     for (idle, storing) in [(idle.min, storing.min), (idle.max, storing.max)] {
         assert!(idle.abs_diff(storing) <= 32, "instructions of the tick: {idle} and {storing}");
@@ -254,9 +255,9 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
         let Some(operation) = operations.get(seen).copied() else { continue };
         seen += 1;
         let what = operation.kind;
-        // Most power losses of this test occur during the first operation (erasing) and the last operation. A
-        // half-erased sector can have many different contents, and the last word, the header, determines if an image is
-        // valid. Tests of a few of the many data words are sufficient.
+        // The power fails most often during the first operation (erasing) and the last operation (writing the
+        // header). A half-erased sector can have many different contents, and the header determines if an image is
+        // valid. For the data words between, a few power losses are sufficient.
         let last = 1 + 1 + new.len().div_ceil(WORD);
         let times = match seen {
             1 => 24,
@@ -277,7 +278,7 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     (rig.board.machine.cut_power(0), cuts)
 }
 
-/// J-54: after a reset by the button or the watchdog during a flash operation, the board finds the old image, as
+/// J-54: the button or the watchdog resets the board during a flash operation. The board then finds the old image, as
 /// after a loss of power.
 #[test]
 fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
@@ -340,8 +341,9 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // The error must hit an erase operation while it is running. For programming, one started operation is
-            // sufficient: the writing of the current word or the next word then fails.
+            // The error must occur during a flash operation. An erase must therefore still be running. For
+            // programming, it is sufficient that one word was started: the error then occurs at this word or at the
+            // next word.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
         });
@@ -356,8 +358,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// J-54: the firmware detects failures that the flash does not report: the flash no longer accepts keys, a word reads
-/// back differently, or an erase operation never ends.
+/// J-54: the firmware detects failures that the flash does not report. The test covers three cases: the flash no
+/// longer accepts keys, a word reads back differently, and an erase operation never ends.
 #[test]
 fn j54_a_store_that_cannot_work_ends() {
     let fails = |mut rig: Rig, failure: u32| {

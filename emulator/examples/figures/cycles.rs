@@ -39,7 +39,8 @@ pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns the addresses of the instructions that the tick executes in the next call of a function.
+/// Runs the machine until the tick calls the function, and returns the addresses of the instructions that this call
+/// executes.
 fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
     let entry = rig.board.machine.elf().symbol(symbol)?.address;
     let flight = rig.board.machine.elf().symbol("FLIGHT")?.address;
@@ -88,9 +89,9 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// Returns the executed instructions in order, with jumps as branches to a nearby address, as input for an assembler.
-/// The machine executes an IT block in one step. The result includes all instructions of the block, because the
-/// hardware fetches all of them.
+/// Returns the executed instructions in order, as assembler input for llvm-mca. Each jump becomes a branch to a
+/// nearby address. The machine executes an IT block in one step, but the result contains all instructions of the
+/// block, because the hardware fetches all of them.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -99,7 +100,8 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
         let code = code.ok_or_else(|| format!("no instruction at {at:#010x}"))?;
         let name = code.split(' ').next().unwrap_or_default();
         if name.starts_with("it") {
-            // The model of llvm-mca does not contain IT, which the core executes together with the next instruction.
+            // The model of llvm-mca does not contain IT, so the code omits it. The core executes IT together with the
+            // next instruction.
             lines.extend(following.take(name.len() - 1).map(|code| unconditional(code)));
         } else {
             lines.push(without_target(code));
@@ -121,8 +123,8 @@ fn without_target(code: &str) -> String {
         let register = operands.split(',').next().unwrap_or_default();
         return format!("{name} {register}, #4");
     }
-    // The model of llvm-mca does not contain the floating-point comparison with zero. A comparison of two registers
-    // takes equally long.
+    // The model of llvm-mca does not contain the floating-point comparison with zero. The code replaces it by a
+    // comparison of two registers, which takes equally long.
     if let Some(register) = operands.strip_suffix(", #0").filter(|_| name.starts_with("vcmp")) {
         return format!("{name} {register}, {}", register.trim());
     }

@@ -40,7 +40,7 @@ impl Steps {
     }
 }
 
-/// Time longer than any ramp of a start, pause or stop of a trajectory, ms.
+/// Time longer than the acceleration or braking at any start, pause or stop of a trajectory, ms.
 const RAMP: u32 = 250;
 
 /// A test rig that counts the instructions of control steps.
@@ -53,7 +53,8 @@ pub struct Session {
     recorded: Steps,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
-    /// Instruction counts of steps along the path at full speed, without a status and without a host event.
+    /// Instruction counts of steps along the path at full speed in which the board sends no status and no host event
+    /// occurs.
     on_path: Steps,
     /// Index of the trajectory point of the last step. The next field is the number of consecutive steps in which the
     /// path time advanced by exactly 1 ms.
@@ -73,8 +74,8 @@ impl Session {
         // (J-30).
         let n = trajectory(&mut long, (1, 1, 2), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
         long.truncate(n);
-        // Traffic that a host could send at any time: a rejected segment, valid frames, and invalid bytes that
-        // contain many frame headers.
+        // Traffic that can arrive at any time: a segment that the controller rejects, valid frames, and invalid bytes
+        // that contain many frame headers.
         let traffic = vec![
             long,
             fixed::CLEAR_OCCURRED_ERRORS.to_vec(),
@@ -124,8 +125,8 @@ impl Session {
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
-    /// Pushes a joint with 100 N·m during Teaching. The controller then ends Teaching and stops the arm without a
-    /// command (J-25).
+    /// Pushes a joint with 100 N·m during Teaching. The joint moves too fast, so the controller ends Teaching and
+    /// stops the arm by itself (J-25).
     fn lead_too_fast(&mut self) {
         let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
         self.rig.board.inject(push);
@@ -208,16 +209,16 @@ impl Session {
         panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
     }
 
-    /// Returns the instruction counts of steps without a host event. Each entry also contains the name of the state,
-    /// and `true` if a status was sent.
+    /// Returns the instruction counts of steps without a host event. Each entry contains the name of the controller
+    /// state, and `true` if the board sent a status in these steps.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
         self.steps
             .iter()
             .map(|((state, status), steps)| (Code::<ControllerState>::new(*state).name(), *status, *steps))
     }
 
-    /// Returns the instruction counts of steps along the path at full speed, without a status and without a host
-    /// event.
+    /// Returns the instruction counts of steps along the path at full speed in which the board sends no status and no
+    /// host event occurs.
     pub fn on_path(&self) -> Steps {
         self.on_path
     }
@@ -227,7 +228,8 @@ impl Session {
         self.recorded
     }
 
-    /// Returns the instruction counts of steps that handle a host event, with the names of the event and the state.
+    /// Returns the instruction counts of steps that handle a host event. Each entry contains the name of the event
+    /// and the name of the controller state.
     pub fn serving(&self) -> impl Iterator<Item = (String, &'static str, Steps)> {
         self.serving.iter().map(|((frame_type, state), steps)| {
             let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
@@ -235,8 +237,8 @@ impl Session {
         })
     }
 
-    /// Runs one instruction at a time. Returns the largest number of consecutive instructions outside the tick during
-    /// which interrupts were masked.
+    /// Runs the machine in single steps. Returns the largest number of consecutive instructions outside the tick
+    /// during which interrupts were masked.
     pub fn longest_mask(&mut self, ms: u64) -> u64 {
         let (mut masked, mut longest) = (0, 0);
         for _ in 0..ms {

@@ -56,7 +56,7 @@ pub fn place(address: u32) -> Option<(Gate, Place)> {
     })
 }
 
-/// Returns `true` for blocks of registers that are plain memory for the firmware: CRS, the other registers of SYSCFG,
+/// Returns `true` for blocks of registers that are plain memory for the firmware: CRS, SYSCFG (except EXTICR1..4),
 /// RTC, PWR, HSEM, DBGMCU.
 pub fn is_plain(address: u32) -> bool {
     matches!(
@@ -75,7 +75,7 @@ pub fn ready_bits(address: u32, plain: &Plain) -> u32 {
         0x5802_480C => 1 << 16,
         0x5802_4818 => 1 << 13,
         0x5800_0420 => 1 << 8,
-        // The registers HSEM_RLR return that core 1 (ID 3) has locked the semaphore, so every read-lock succeeds.
+        // Every register HSEM_RLR reads as "locked by core 1" (ID 3), so every read-lock succeeds.
         0x5802_6480..0x5802_6500 => 0x8000_0300,
         _ => 0,
     }

@@ -51,7 +51,7 @@ pub struct BusEntry {
 /// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFault {
-    /// Number of frames that an error still destroys, beginning with the next frame on the bus.
+    /// Number of frames that errors will destroy, beginning with the next frame on the bus.
     pub destroy_next: u32,
     /// `true` if errors destroy all frames.
     pub destroy_all: bool,
@@ -145,7 +145,7 @@ impl Wire {
     }
 
     /// Returns the time at which the next frame starts. Returns `None` if the bus is busy, or if no frame can start
-    /// at or before `now`. `own` is the time at which the CAN controller could start its own frame.
+    /// by `now`. `own` is the earliest time at which the CAN controller can start its own frame.
     pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
         let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
         let start = first.max(self.free);

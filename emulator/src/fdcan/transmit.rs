@@ -96,8 +96,8 @@ impl Fdcan {
         match outcome {
             Outcome::NoAcknowledge => {
                 self.last_error(lec::ACK);
-                // If no node acknowledges a frame, an error-passive node does not increase its error counter. Such a
-                // node may be the only node on the bus.
+                // An error-passive node does not increase its error counter if no node acknowledges its frame,
+                // because it could be the only node on the bus.
                 if self.tec < 128 {
                     self.tec += 8;
                 }

@@ -23,8 +23,8 @@ impl Usart {
             idle.min(timeout)
         };
         let Some(first) = self.rx_wire.front() else {
-            // The idle line and the timeout count only if their interrupts are enabled. Otherwise, their times could
-            // be in the past, and the machine would check for these events in every cycle.
+            // An idle line and a timeout are events only if their interrupts are enabled. Otherwise, their times
+            // could be in the past, and the machine would check for these events in every cycle.
             let idle = self.idle_from.filter(|_| idle_on).map_or(NEVER, |from| from.saturating_add(frame));
             let timeout = self.timeout_from.filter(|_| self.cr1 & cr1::RTOIE != 0);
             return idle.min(timeout.map_or(NEVER, |from| from.saturating_add(self.timeout())));

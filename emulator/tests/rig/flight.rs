@@ -81,9 +81,9 @@ impl Bytes<'_> {
 }
 
 impl Flight {
-    /// The inputs in the record belong to the tick, and the outputs still belong to the previous tick.
+    /// Phase of the record: it contains the inputs of this tick, but still the outputs of the previous tick.
     pub const PHASE_INPUTS: u32 = 1;
-    /// Inputs and outputs in the record belong to the tick.
+    /// Phase of the record: it contains the inputs and the outputs of this tick.
     pub const PHASE_COMPLETE: u32 = 2;
 
     /// Decodes a flight record. Returns `None` if the bytes are not a flight record, for example after power-on.

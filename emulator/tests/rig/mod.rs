@@ -111,8 +111,8 @@ impl Rig {
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // The program of the board restarts. The shadow controller and the receivers of the hosts restart, too; the
-            // rig keeps the log.
+            // The program of the board restarts. Therefore the shadow controller and the receivers of the hosts also
+            // restart. The rig keeps the memory of the flight recorder.
             if let Some(shadow) = self.shadow.take() {
                 self.log = shadow.into_log();
             }
@@ -204,7 +204,8 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // The frame belongs to the current tick, whose record the rig reads later.
+                // This frame is not in the list yet. It belongs to the current tick, whose flight record the rig
+                // reads later.
                 continue;
             };
             self.to_pass.drain(..=at);
@@ -217,8 +218,8 @@ impl Rig {
         // 80 steps of 5 µs are enough for the longest tick, which takes a third of a millisecond. In this tick, the
         // controller receives an arm model and computes all values that depend on the model.
         for _ in 0..80 {
-            // During a tick, the flight record may be only half written. The record is also too old if the next tick
-            // is already due.
+            // During a tick, the flight record may be only half written. If the next tick is already due, the record
+            // is too old.
             if !self.in_tick() {
                 let flight = self.read_flight()?;
                 let due = self.ticks > 0 && !self.may_hang && flight.tick == self.ticks;

@@ -13,7 +13,8 @@ use crate::pty::{Pty, PtyError};
 
 /// Largest number of host bytes that may wait for transmission on the serial line.
 const WAITING_MAX: usize = 4096;
-/// Longest time for which the loop waits until the host reads, if virtual time runs as fast as possible.
+/// Longest time for which the loop waits until the host reads bytes. The loop waits only if virtual time runs as fast
+/// as possible.
 const READER_WAIT: Duration = Duration::from_millis(100);
 /// Largest delay of virtual time, relative to the real-time clock, that the loop makes up. After a larger delay,
 /// virtual time stays late.
@@ -93,8 +94,8 @@ impl Live {
                     continue;
                 }
                 if due > CATCH_UP {
-                    // Virtual time is more than `CATCH_UP` late. The loop does not make up this delay, and continues
-                    // from this moment at normal speed.
+                    // Virtual time is more than `CATCH_UP` late. The loop accepts this delay, and continues at normal
+                    // speed from this moment.
                     (start, start_ms) = (Instant::now(), self.board.now_ms());
                 }
             }
@@ -138,9 +139,9 @@ impl Live {
         }
     }
 
-    /// Pauses virtual time briefly if the operating system may still delay bytes of a frame. Without the pause, the
-    /// board would measure the delay as a gap in the frame. Does not pause while bytes of the host still wait for
-    /// transmission on the serial line. Returns `true` after a pause.
+    /// Pauses virtual time briefly while the operating system could still deliver more bytes of a frame. Without the
+    /// pause, the board would measure this delay as a gap in the frame. The function does not pause while bytes of
+    /// the host still wait for transmission on the serial line. Returns `true` after a pause.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);

@@ -47,7 +47,7 @@ fn main() {
 }
 
 /// Returns the commit that is built, followed by `+` if files were changed after the commit. The text always has
-/// thirteen characters. Therefore logging takes the same time in every build, and measurements of different builds are
+/// thirteen characters, so logging it takes the same time in every build, and measurements of different builds are
 /// comparable.
 fn build_id() -> String {
     let git = |args: &[&str]| {

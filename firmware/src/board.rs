@@ -84,8 +84,8 @@ fn receive(pin: Peri<'static, impl Pin>, function: u8) {
 /// Bit of the safety output in port D; all boards use this pin.
 const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
 
-/// Drives the safety output to 0 as the first action after a reset, even if the clocks do not start. The drives may
-/// still apply the torque that the program commanded before the reset.
+/// Drives the safety output to 0 as the first action after a reset, even if the clocks do not start. This is urgent,
+/// because the drives may still apply the torque that the program commanded before the reset.
 pub fn safety_output_low_at_start() {
     pac::RCC.ahb4enr().modify(|w| w.set_gpioden(true));
     // The read of the clock enable register ensures that the clock of the port is running.

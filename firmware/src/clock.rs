@@ -24,12 +24,12 @@ pub struct Pll {
 }
 
 impl Pll {
-    /// Frequency of the oscillator, Hz.
+    /// Returns the frequency of the PLL's oscillator, Hz.
     pub const fn vco(&self) -> u32 {
         HSE_HZ / self.m * self.n
     }
 
-    /// Frequency of the PLL's output, Hz.
+    /// Returns the frequency of the PLL's output, Hz.
     pub const fn hz(&self) -> u32 {
         self.vco() / self.divide
     }

@@ -21,8 +21,8 @@ const CAN: Registers = FDCAN1;
 /// Largest number of reads of a register while the driver waits for a change. The change should take a few clock
 /// periods.
 const PATIENCE: u32 = 10_000;
-/// Like `PATIENCE`, for waits within a tick, which must be short. The next tick checks the register again one
-/// millisecond later.
+/// Largest number of reads of a register within a tick, where waits must be short. If the change has not occurred by
+/// then, the next tick checks the register again.
 const PATIENCE_IN_TICK: u32 = 100;
 
 /// Frames that the joint bus received since the last tick.
@@ -100,7 +100,8 @@ impl Fdcan {
         });
         set_timing();
 
-        // The contents of the message memory and its check bits are random after power-on.
+        // The contents of the message memory and its check bits are random after power-on, so the driver writes the
+        // complete memory first.
         for word in 0..ram::BYTES / 4 {
             FDCANRAM.ram(word).write_value(0);
         }

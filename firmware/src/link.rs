@@ -1,10 +1,10 @@
 //! The links, which convert received bytes to frames. Each serial line has its own parser. The link loop passes the
 //! events of the parsers to the tick in batches, through one slot.
 //!
-//! A batch is a copy of the events, so that a parser can accept more bytes while the tick executes a long frame in
-//! slices. If bytes arrive faster than the tick executes frames, first the buffer of the parser becomes full, then the
-//! DMA ring. When the ring is full, bytes are lost. Stop and Pause are not lost, because the tick itself searches the
-//! received bytes for these commands.
+//! A batch is a copy of the events. Therefore a parser can accept more bytes while the controller executes a long
+//! frame over several ticks. If bytes arrive faster than the tick executes frames, first the buffer of the parser
+//! becomes full, then the DMA ring. When the ring is full, bytes are lost. Stop and Pause are not lost, because the
+//! tick itself searches the received bytes for these commands.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -24,8 +24,8 @@ pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
 const CHUNK: usize = 1024;
 /// Largest number of passes of the link loop before the loop waits for the next tick.
 const ROUNDS: usize = 64;
-/// Largest number of bytes by which DMA may be ahead of the link loop. DMA overwrites bytes that are older than the
-/// length of the ring, and DMA continues while the link loop reads.
+/// Largest number of bytes that DMA may have written and the link loop has not read yet. DMA overwrites bytes that
+/// are older than the length of the ring, and DMA continues while the link loop reads.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
 /// Number of wake-ups of the link loop. The tick reads this number to detect that the link loop has stopped.
@@ -143,7 +143,8 @@ impl Link {
     fn catch_up(&mut self) {
         let received = RECEIVED[self.line].load(Ordering::Relaxed);
         let behind = received.wrapping_sub(self.taken as u32);
-        // The difference is negative if the link loop took bytes after the last tick.
+        // If the link loop took bytes after the last tick, the difference is negative, which appears here as a value
+        // of at least 2³¹.
         if behind > BEHIND && behind < 1 << 31 {
             self.lost += u64::from(behind);
             self.taken += u64::from(behind);
@@ -181,8 +182,8 @@ fn duration_us(bytes: usize) -> u64 {
 /// Serves both serial lines, stores arms, and computes the checksum of the program in flash. This function never
 /// returns.
 pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
-    // Line that is served next. The loop alternates between the lines, so that a line that fills the slot does not
-    // block the other line.
+    // Line that the loop serves next. The loop alternates between the lines, so that a line whose events fill the
+    // slot does not block the other line.
     let mut turn = 0;
     let mut report = Report::new();
     let mut program = program::Reader::new();

@@ -165,7 +165,7 @@ const NORMAL_UNCACHED: u32 = 1 << 19 | 1 << 18;
 
 /// Enables the memories, the memory protection and the caches.
 pub fn init() {
-    // The HAL does not enable the clocks of the memories in domain D2.
+    // The HAL does not enable the clocks of the memories in domain D2, so this code enables them.
     pac::RCC.ahb2enr().modify(|w| {
         w.set_sram1en(true);
         w.set_sram2en(true);

@@ -157,12 +157,13 @@ pub fn start(parts: Parts) {
     rcc::enable_and_reset::<TIM7>();
     pac::TIM7.psc().write_value((clock::TICK_PRESCALER - 1) as u16);
     pac::TIM7.arr().write(|w| w.set_arr((clock::TICK_US - 1) as u16));
-    // Prescaler and period of the timer take effect at an update event, which must not cause a tick.
+    // Prescaler and period of the timer take effect at an update event. The flag of this event is then cleared, so
+    // that the event does not cause a tick.
     pac::TIM7.egr().write(|w| w.set_ug(true));
     pac::TIM7.sr().write(|w| w.set_uif(false));
     pac::TIM7.dier().write(|w| w.set_uie(true));
     interrupt::TIM7.set_priority(Priority::P0);
-    // By default, the interrupt of the HAL's time driver has the same priority as the tick.
+    // By default, the interrupt of the HAL's time driver has the same priority as the tick, and could delay the tick.
     interrupt::TIM5.set_priority(crate::clocks::LOW);
     // SAFETY: everything that the interrupt handler uses is initialised.
     unsafe { interrupt::TIM7.enable() };

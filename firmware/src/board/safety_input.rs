@@ -35,8 +35,8 @@ impl SafetyInput {
 
     /// Returns `true` if the level of the safety input is 1 and has been 1 since the last call.
     pub fn is_safe(&mut self) -> bool {
-        // The edge is read before the level. If a falling edge occurs between the two reads, the read of the level or
-        // the next call detects it.
+        // The edge is read before the level. A falling edge between these two reads is not lost: the read of the
+        // level or the next call detects it.
         let edge = self.take_edge();
         !edge && self.pin.is_high()
     }

@@ -60,7 +60,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
-    // The command measures the Stops only once, because the best of several worst cases would not be a worst case.
+    // The time until a Stop is a worst case, so the command measures it only once. The best of several worst cases
+    // would not be a worst case.
     figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
@@ -197,7 +198,8 @@ impl Example {
     }
 }
 
-/// Measures how many of the `frames` python-can and cantools decode in a second.
+/// Measures the number of frames from the file `frames` that the Python libraries python-can and cantools decode per
+/// second.
 fn cantools(frames: &Path) -> Result<Figures> {
     let mut script = command(python::environment("requirements.txt")?);
     script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(frames);
@@ -214,7 +216,8 @@ fn planned() -> Result<Figures> {
     object(&shell::read(&mut script)?)
 }
 
-/// Measures the time until an agent has sent a Stop on its serial line, under each load.
+/// Measures the time until an agent has sent a Stop on its serial line: while the agent is idle, with viewers, and
+/// during an upload.
 fn stops(quick: bool, failed: &mut Failed) -> Figures {
     const LOADS: [(&str, &[&str]); 3] = [
         ("idle", &["stop.idle_", "bare.idle_"]),

@@ -17,8 +17,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns a cargo command for the program that builds the book. This program is in a separate workspace, so that a build
-/// of the project does not include mdbook.
+/// Returns a cargo command for the program that builds the book. This program has its own workspace, so that a build
+/// of the project does not compile mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));

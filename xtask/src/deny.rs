@@ -85,7 +85,7 @@ pub(crate) fn with_cargo_deny() -> Result<()> {
     }
     for manifest in SHIPPED {
         // cargo-deny reads the source code for every target, but builds for this computer have downloaded only a part
-        // of this source code.
+        // of it. The missing part must be downloaded first.
         run(&mut shell::cargo(&["fetch", "--quiet", "--locked", "--manifest-path", manifest]))?;
         let mut deny = shell::command(&program);
         deny.args(["--offline", "--manifest-path", manifest, "--config"]).arg(root().join("deny.toml"));
@@ -146,8 +146,8 @@ fn sources(rules: &Table, lock: &Table) -> Vec<String> {
     packages.filter_map(elsewhere).collect()
 }
 
-/// Adds the dependencies of a manifest that have no version. The function does not add path dependencies, because they
-/// are crates of this project.
+/// Adds those dependencies of a manifest that have no version. Path dependencies are not added, because they are
+/// crates of this project.
 fn wildcards(table: &Table, found: &mut Vec<String>) {
     for (key, value) in table {
         let Some(inner) = value.as_table() else { continue };

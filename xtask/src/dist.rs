@@ -149,8 +149,8 @@ fn empty(out: &Path) -> Result<()> {
     earlier.iter().try_for_each(|path| std::fs::remove_file(path).with_context(|| path.display().to_string()))
 }
 
-/// Builds the packages and archives twice from the existing programs in `folder`. Both builds use one commit and one set of
-/// board images.
+/// Builds the packages and archives twice from the existing programs in `folder`, so that the caller can compare both
+/// builds. Both builds use the same commit and the same board images.
 fn assembled_twice(folder: &Path) -> Result<[Vec<Made>; 2]> {
     let (time, own) = (programs::time()?, programs::own()?);
     let mut images = images::build()?;

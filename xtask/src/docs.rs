@@ -22,7 +22,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         cargo(&["test", "--release", "--package", "jtc-core", "--test", "suite", "reactions::"]);
     run(reactions.env("UPDATE_DOCS", "1"))?;
     println!("wrote the table of reactions of docs/safety.md");
-    // The tests of the next command write to the same page, so they run one after the other.
+    // The tests that this command runs write to the same page, so they run one after the other.
     let drawn =
         ["test", "--release", "--package", "jtc-core", "--lib", "--", "the_diagram_is", "--test-threads=1"];
     let mut drawn = cargo(&drawn);

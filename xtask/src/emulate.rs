@@ -68,8 +68,8 @@ fn has_libclang() -> bool {
     std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
 }
 
-/// Returns a cargo command in `emulator/`. Warnings are errors, also for the crates of `crates/`. These crates have
-/// other features here than in the workspace, so they may cause other warnings.
+/// Returns a cargo command in `emulator/`. Warnings are errors. This also applies to the crates of `crates/`, because
+/// they have other features here than in the workspace and could cause other warnings.
 fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = shell::cargo(arguments);
     cargo.current_dir(shell::root().join("emulator"));
@@ -152,9 +152,9 @@ fn compare(kept: &Path, text: &str) -> Result<()> {
     bail!("the figures are not those of {FIGURES}; if that is meant: cargo xtask emulate --update")
 }
 
-/// Returns the lines that are equal in every build. The latency of an interrupt depends on the exact time of bytes
-/// relative to ticks, so this function removes the line with the latency. The program that measures the latency
-/// compares it with its limit.
+/// Returns the text without the values that can differ between builds: the line about masked interrupts, and the
+/// latencies of the handlers. A latency depends on the exact time of bytes relative to ticks. The measuring program
+/// compares the latency of the tick with its limit.
 fn lasting(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().filter(|line| !line.contains("interrupts are masked"));
     lines.map(|line| line.split(", begins at most").next().unwrap_or_default())

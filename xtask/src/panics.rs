@@ -218,7 +218,8 @@ impl<'a> Program<'a> {
         pieces
     }
 
-    /// Calls `found` for each instruction or address through which the execution may leave the function.
+    /// Calls `found` for each instruction through which the execution may leave the function, and for each address of
+    /// a function that the code contains.
     fn scan(&self, start: u32, function: &Function, count: &mut usize, mut found: impl FnMut(u32, End)) {
         let whole = start..function.end;
         let mut halves = [None; 16];

@@ -27,7 +27,8 @@ pub(crate) fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
             path.display()
         );
     }
-    // A checkout that is opened through a symbolic link has two paths.
+    // If the checkout was opened through a symbolic link, a folder has two paths. The list then also contains the
+    // real path.
     for at in 0..folders.len() {
         let (path, name) = folders[at].clone();
         if let Ok(real) = path.canonicalize()

@@ -29,8 +29,9 @@ impl Prebuild {
         Self { workspace_is_built: Some(sender), making: Some(std::thread::spawn(make)) }
     }
 
-    /// Permits the build of the Python package. Cargo allows only one build at a time in a target folder. If the low-priority
-    /// build began earlier, it would delay the steps.
+    /// Tells the background thread that the workspace is built, so that it builds the Python package. Cargo allows
+    /// only one build at a time in a target folder. An earlier start of this low-priority build would delay the
+    /// steps.
     pub(crate) fn workspace_is_built(&self) {
         if let Some(sender) = &self.workspace_is_built {
             // This call fails only if an earlier build has failed and the thread has ended.

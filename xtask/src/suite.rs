@@ -130,9 +130,9 @@ fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
     files
 }
 
-/// Number of tests of one UCoM program that run in parallel, per processor. Tests of UCoM boards spend nearly all of their time
-/// waiting. Other programs use the default of one test per processor, because a simulated controller needs much processor time to
-/// be on time.
+/// Number of tests per processor that one UCoM program runs in parallel. Tests of UCoM boards spend nearly all of
+/// their time waiting. Other programs use the default of one test per processor, because a simulated controller must
+/// run in real time and needs much processor time.
 const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
 /// Argument of the GNU program `env` that sets these signals to their default handling.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
@@ -158,8 +158,8 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
         // The code flushes the output so that a reader of a pipe sees the progress.
         std::io::stdout().flush().ok();
     };
-    // If xtask runs under `nohup` or in the background of a script, it ignores signals that tests send to their programs. The
-    // test programs inherit this signal setting.
+    // If xtask runs under `nohup` or in the background of a script, it ignores some signals. The test programs would
+    // inherit this setting, and would ignore the signals that tests send.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
     let threads = (BOARD_TESTS_FOR_A_PROCESSOR * parallel::processors()).to_string();
     // Each test program runs in the folder of its package, as with cargo.

@@ -123,8 +123,8 @@ impl Tally {
     }
 }
 
-/// Returns the output from the first line that begins with `heading`. After this line, test runners describe the
-/// failures.
+/// Returns the output from the first line that begins with `heading`. Test runners describe the failures after this
+/// line.
 pub(crate) fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();

@@ -54,7 +54,8 @@ pub(crate) fn main(arguments: &[String]) -> Result<ExitCode> {
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
         let references = python::checks(&mut tally, scratch.path());
-        // The longest checks are first in the list, because most of them wait for simulated arms and browsers.
+        // The check that takes longest is first in the list. The other checks run in parallel while it waits for
+        // simulated arms and browsers.
         let all = [web::browser()].into_iter().chain(references);
         parallel::steps(&mut tally, all.collect());
         package::steps(&mut tally);
@@ -143,8 +144,8 @@ fn check_demo_files(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the file contains a header with names, and at least one second of rows. The number of finite numbers in
-/// each row must equal the number of names.
+/// Checks that the file contains a header and at least one second of rows. Each row must have as many columns as the
+/// header, and every number must be finite.
 fn check_csv(csv: &str) -> Result<()> {
     let mut lines = csv.lines();
     let header = lines.next().context("recording.csv is empty")?;

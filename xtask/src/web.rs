@@ -1,5 +1,5 @@
-//! Checks of the dashboard: checks its source, builds it again, compares the result with the files in the agents, and
-//! tests the dashboard in a browser.
+//! Checks of the dashboard. They check its source, build it again, compare the result with the built files in
+//! web/dist, and test the dashboard in a browser.
 //!
 //! A build of the programs needs none of these steps, because the built dashboard files are in the repository.
 use std::path::{Path, PathBuf};
@@ -15,8 +15,8 @@ use crate::tally::{self, Counts, Outcome, Tally};
 /// Path of the browser that Debian installs.
 pub(crate) const BROWSER: &str = "/usr/bin/chromium";
 
-/// Returns a command for `program` of Node.js in `web/`. Node.js is part of the environment of the references, so that
-/// it does not need to be installed on the system.
+/// Returns a command for `program` of Node.js in `web/`. Node.js is installed in the Python environment of the
+/// reference checks, so the system does not need Node.js.
 fn command(program: &str) -> Result<Command> {
     let python = python::environment("requirements.txt")?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -55,7 +55,7 @@ pub(crate) fn steps(tally: &mut Tally) {
     });
 }
 
-/// Builds the dashboard in a temporary folder, and compares each built file with the file in the agents.
+/// Builds the dashboard in a temporary folder, and compares the built files with the files in web/dist.
 fn same_build() -> Result<()> {
     let (kept, scratch) = (shell::root().join("web/dist"), Scratch::new("web-dist")?);
     let built = scratch.path().join("dist");

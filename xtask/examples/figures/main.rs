@@ -1,9 +1,9 @@
-//! Measures performance figures that need several crates. The program prints lines `name value`, which `cargo xtask bench`
-//! adds to the figures of the crates.
+//! Measures performance figures that need several crates. The program prints lines `name value`, which `cargo xtask
+//! bench` adds to the figures of the crates.
 //!
-//! Run `figures` for all groups, or `figures libm|tick|line|tracking|ucom|recording` for one group. Figures in virtual time do not
-//! change between runs. `figures recording-file FILE SECONDS` writes a recording of this duration. Its contents are like the contents
-//! of the recording in the group `recording`.
+//! Run `figures` for all groups, or `figures libm|tick|line|tracking|ucom|recording` for one group. Figures in
+//! virtual time are the same in every run. `figures recording-file FILE SECONDS` writes a recording of this duration,
+//! with the same kind of data as the recording that the group `recording` measures.
 
 mod libm;
 mod line;

@@ -1,4 +1,5 @@
-//! Time and memory for the report of a long recording, which contains one hour at 1 kHz.
+//! Time and memory for the report of a long recording. The program measures a recording of five minutes at 1 kHz, and
+//! extrapolates the times to one hour.
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -18,8 +19,8 @@ use crate::world::Result;
 const SECONDS: u32 = 300;
 const IN_AN_HOUR: f64 = 3600.0 / SECONDS as f64;
 
-/// Prints three figures for both file formats: the time to make a report, the time to read the file, and the memory of a program
-/// that only makes the report.
+/// Prints three figures for each file format: the time to make a report, the time to read the file, and the memory
+/// that a report needs.
 pub(crate) fn figures() -> Result<()> {
     let dir = tempfile::tempdir()?;
     for format in ["mcap", "csv"] {

@@ -64,8 +64,8 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
 }
 
 /// Records the inputs of a complete session: start-up, parameters, upload, motion. The simulated drives answer the
-/// simulator's own controller. A second controller receives the same inputs. Its state determines when the host must
-/// send the next frame.
+/// simulator's own controller. A second controller receives the same inputs, and the host sends each frame when the
+/// second controller is in the required state.
 fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
     let mut shadow = controller();

@@ -1,4 +1,5 @@
-//! Position errors of the arm with the model errors of the demo, and without feed-forward.
+//! Position errors of the arm, with and without feed-forward. The arm model of the controller has the same errors as
+//! in the demo.
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;

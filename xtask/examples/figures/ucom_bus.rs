@@ -1,5 +1,6 @@
-//! UCoM figures: the time to number 31 boards and the time to update one board with 60 KiB, compared with the time of the frames on
-//! the bus. The program also measures the speed of decoding, and the memory of a board.
+//! UCoM figures: the time to number 31 boards, and the time to update one board with 60 KiB. Both times are compared
+//! with the time in which the frames occupy the bus. The program also measures the speed of decoding, and the memory
+//! of a board.
 use std::hint::black_box;
 
 use can_link::{BusEvent, CanFrame, Id, MemberId, TimedBus};
@@ -167,7 +168,7 @@ pub(crate) fn figures() -> Result<()> {
     Ok(())
 }
 
-/// Updates one board with 60 KiB. The measured time begins at the start of the procedure and ends at the last
+/// Updates one board with 60 KiB. The measured time is the duration of the complete procedure, including the last
 /// read-back.
 fn update(name: &str, profile: Profile) -> Result<()> {
     let mut bench = Bench::new(1, profile);
@@ -183,8 +184,8 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     print(&format!("{name}_s"), cost.seconds);
     print(&format!("{name}_bus_s"), cost.busy_seconds);
     print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
-    // The share is the duration of the update divided by its bus time. The duration excludes the response times of
-    // the boards and the wait for the restart.
+    // The share is the duration of the update, divided by the time in which its frames occupy the bus. The duration
+    // does not include the response times of the boards and the wait after PC_XRESET.
     let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
     print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
     Ok(())

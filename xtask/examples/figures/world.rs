@@ -17,8 +17,8 @@ pub(crate) fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     Ok(session)
 }
 
-/// Uploads and starts `points` with the host of the simulator. Some measurements need points that fail the check of
-/// the library's session, such as points without velocities. That session does not upload such points.
+/// Uploads `points` with the host of the simulator and starts the motion. Some measurements use points that the check
+/// of the library's session would refuse, such as points without velocities.
 pub(crate) fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;

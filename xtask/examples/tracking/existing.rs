@@ -191,7 +191,8 @@ impl Existing {
     }
 }
 
-/// Friction torque (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), N·m; s is the sign of v, and 0 at v = 0.
+/// Returns the friction torque (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), N·m; s is the sign of v, and 0 at v
+/// = 0.
 fn friction([c0, c1, c2, c3, c4, c5]: &[f64; 6], v: f64, celsius: f64) -> f64 {
     let s = if v == 0.0 { 0.0 } else { v.signum() };
     (1.0 + c4 * (celsius - c5)) * (c0 * s + c1 * v + c2 * v * v * s + c3 * v * v * v)

@@ -192,8 +192,9 @@ fn median(all: &[Figures]) -> Figures {
     }
 }
 
-/// Returns the errors of our controller with an inaccurate model, with correct friction, with correct masses, and
-/// with both correct. Each entry contains a heading, and the error of each joint in mrad.
+/// Returns the errors of our controller with better and better models of the arm: masses and friction wrong, only
+/// masses wrong, only friction wrong, and both correct. In the last variant, the width of the friction sign also
+/// equals the width in the arm. Each entry contains a heading, and the error of each joint in mrad.
 fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
     let sharp = match condition.friction {
         FrictionModel::Smooth { width } => width,

@@ -1,4 +1,5 @@
-//! Load of the computer by other programs. The load determines if `cargo xtask bench` can judge the measurements.
+//! Load of the computer by other programs. If this load is too high, `cargo xtask bench` does not judge the
+//! measurements.
 use std::time::Instant;
 
 /// Largest share of one processor that other programs may use while the command judges figures.

@@ -263,8 +263,8 @@ pub(super) fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
-/// Prints every row of the table, and the cause if a measurement failed. Returns the number of missed targets. If the
-/// computer was not `quiet`, the function does not judge the measurements.
+/// Prints every row of the table, and the cause of each failed measurement. Returns the number of missed targets. If
+/// the computer was not `quiet`, the function does not compare the measurements with their targets.
 pub(super) fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
@@ -332,8 +332,8 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The table contains all figures, except the figures of one failed measurement. The rows of these figures show
-    /// the cause, and all other rows show their values.
+    /// If one measurement fails, the table still contains all rows. The rows of the failed measurement show its
+    /// cause, and all other rows show their values.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));

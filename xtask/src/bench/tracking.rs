@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::shell::{cargo, nothing_left, root, run};
 
-/// Runs the comparison of the control laws, which is in virtual time, and writes the page.
+/// Compares the control laws in virtual time and writes the page.
 pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
     nothing_left(arguments)?;
     let mut example = cargo(&["run", "--quiet", "--package", "xtask", "--example", "tracking", "--"]);

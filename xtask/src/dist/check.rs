@@ -92,7 +92,8 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Runs the programs as a user without privileges, and checks their pages and completions.
+/// Runs the programs as a user without privileges. Checks that their manual pages, completions and other files are
+/// installed, and that the images of boards match firmware.json.
 fn used(root: &Root) -> Result<()> {
     for name in ["jtc", "ucom"] {
         print!("{}", shell::read(root.as_nobody(name).arg("--version"))?);

@@ -206,8 +206,8 @@ fn installed() -> Result<BTreeMap<String, Installed>> {
         packages.insert(name.to_owned(), Installed { essential: essential == "yes", depends });
         provided.extend(provides.split(',').flat_map(names).map(|other| (other, name.to_owned())));
     }
-    // A package may provide other names. The function treats such a name as a package that depends on the providing
-    // package.
+    // A package may provide other package names. The function adds such a name as a package that depends on the
+    // providing package.
     for (other, by) in provided {
         packages.entry(other).or_insert(Installed { essential: false, depends: vec![vec![by]] });
     }

@@ -59,7 +59,7 @@ fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     let version = version.split(' ').nth(1).unwrap_or_default().to_owned();
     let label = format!("Rust's standard library {version}");
     writeln!(list, "{label}: MIT OR Apache-2.0")?;
-    // The Apache licence of this project has the same text as the Apache licence of Rust.
+    // For the Apache licence of Rust, the code uses the licence file of this project, which has the same text.
     let apache = std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?;
     texts.add(&label, &apache);
     for (name, licence) in RUNTIME {

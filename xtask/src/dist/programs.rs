@@ -78,7 +78,7 @@ pub(super) fn tools() -> Result<PathBuf> {
 /// Adds switches for `triple` to a cargo command, so that the output does not contain paths of this computer.
 pub(super) fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
-    // The next options do the same for C code and its assembler code.
+    // These options remove the paths of this computer from compiled C code and assembler code.
     let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();

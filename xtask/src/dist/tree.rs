@@ -153,7 +153,8 @@ mod tests {
                 (path, header.mode().unwrap())
             })
             .collect();
-        // The archiver omits a `./` at the beginning of a name. dpkg and tar accept both forms.
+        // The archiver omits the `./` at the beginning of all names except the root folder. dpkg and tar accept both
+        // forms.
         let expected = [
             ("./", 0o755),
             ("etc/", 0o755),

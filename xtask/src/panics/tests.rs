@@ -73,8 +73,8 @@ fn what_is_not_called_does_not_count() {
     assert_eq!((report.functions, report.instructions), (2, 5));
 }
 
-/// Returns the report for a program whose function `tick` is at addresses 0 to 8. `tick` contains a return and then two
-/// halfwords of data or code. The panicking function is at address 8.
+/// Returns the report for a program with two functions. `tick` is at addresses 0 to 8, and contains a return followed
+/// by two halfwords of data or code. The panicking function is at address 8.
 fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);

@@ -57,8 +57,8 @@ fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<
     texts
 }
 
-/// Returns the comment text after `mark`. Also returns a line without `mark` that may belong to a longer comment or a
-/// docstring.
+/// Returns the text after `mark` in a line. If the line has no `mark` but looks like prose, returns the complete
+/// line, because it may belong to a longer comment or a docstring.
 fn comment_or_prose<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
     let line = line.trim();
     match line.split_once(mark) {

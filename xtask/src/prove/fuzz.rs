@@ -13,8 +13,8 @@ use crate::shell::{self, command, root, run, works};
 
 const RUNS: &str = "20000000";
 const PORTION: u64 = 500_000;
-/// Number of executions of a fuzz target that are also guided by comparisons, in order to find keywords and constants.
-/// All other executions are guided only by code coverage, and run two to three times as fast.
+/// Number of executions of a fuzz target that are also guided by comparisons in the code, which finds keywords and
+/// constants. The later executions are guided only by code coverage, and are two to three times as fast.
 const COMPARING: u64 = 1_000_000;
 /// Name of the table in docs/evidence.md.
 const TABLE: &str = "fuzz";
@@ -53,8 +53,8 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
         let directories: Vec<&str> = directories.iter().map(String::as_str).collect();
         let mut done = done;
         while done < wanted {
-            // The executions run in portions, so that the command counts finished portions even if the user interrupts
-            // it.
+            // The command runs the executions in portions, and counts each finished portion. So these executions
+            // count even if the user interrupts the command.
             let portion = (wanted - done).min(PORTION);
             let build = if done < COMPARING { &COMPARISONS[..] } else { &COVERAGE[..] };
             run(&mut fuzz(&target, build, &directories, &[&format!("-runs={portion}"), LENGTH]))?;
@@ -62,7 +62,7 @@ pub(super) fn main(arguments: &[String]) -> Result<ExitCode> {
             done += portion;
         }
         if keep {
-            // The merge ignores how often inputs execute the code, so that only few inputs are kept.
+            // The merge compares only which code an input executes, not how often. So it keeps only few inputs.
             let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }

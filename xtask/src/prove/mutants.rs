@@ -27,8 +27,8 @@ const PACKAGES: [(&str, &[&str]); 5] = [
 ];
 /// Largest share of the mutants of a crate that may survive, including explained mutants.
 const SURVIVING_MAX: f64 = 0.03;
-/// Default duration of the longest test that runs on a mutant, s. Mistakes should be found by short tests, and long
-/// tests would take days for all mutants.
+/// Default limit for the duration of the tests that run on a mutant, s. Short tests should find mistakes, and running
+/// the longer tests on all mutants would take days.
 const LONGEST: f64 = 0.2;
 
 /// Results of the mutation test of a crate.

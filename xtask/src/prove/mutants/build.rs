@@ -13,13 +13,13 @@ use crate::shell::{self, cargo, command, files, run, target, works};
 
 /// Version of cargo-gamma that the command installs. The files that this module reads may differ in other versions.
 const VERSION: &str = "0.4.0";
-/// Filter that no test passes. cargo-gamma prepares all mutants, but runs no test.
+/// Test filter that matches no test. With this filter, cargo-gamma prepares all mutants but runs no test.
 const NO_TEST: &str = "this_filter_selects_no_test";
 /// First line of the function that the programs call at each mutant, and that returns `true` for the enabled mutant.
 const GUARD: &str = "pub fn a(id: u32) -> bool {\n";
 /// Last line of a function.
 const END: &str = "\n}\n";
-/// Body of the function [`GUARD`] in the programs that measure tests. The original body of cargo-gamma is slower.
+/// Body of the function [`GUARD`] in the programs that run the tests. The original body of cargo-gamma is slower.
 const COMPARE: &str = "    ACTIVE.load(Ordering::Relaxed) == id";
 /// Body of the function [`GUARD`] in the programs that record which mutants a test reaches. The function writes the
 /// number of each mutant to standard error when the program reaches the mutant for the first time.
@@ -57,7 +57,7 @@ pub(super) struct Program {
 /// Test programs of a crate, and the mutants in them.
 pub(super) struct Build {
     pub programs: Vec<Program>,
-    /// Test programs in the order of `programs`, built so that they record the mutants that a test reaches.
+    /// Test programs that record the mutants that a test reaches, in the same order as in `programs`.
     pub recording: Vec<Program>,
     pub mutants: Vec<Mutant>,
 }
@@ -87,7 +87,7 @@ pub(super) fn build(package: &str, judges: &[&str], results: &Path) -> Result<Bu
     gamma.args(["--", NO_TEST]);
     println!("$ cargo gamma run --package {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
-    // Exit code 2 means that too many mutants survived, because no test ran.
+    // Exit code 2 means that too many mutants survived. This is expected here, because no test ran.
     ensure!(matches!(status.code(), Some(0 | 2)), "cargo-gamma ended with {status}");
 
     let session = session()?;

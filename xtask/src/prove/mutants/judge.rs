@@ -85,7 +85,7 @@ fn groups(cases: &[Case], fit: Vec<usize>, mutant: &Mutant, finders: &Finders) -
         |n: &usize| cases[*n].name.strip_prefix(&*module).is_some_and(|rest| rest.starts_with("::"));
     let rest = fit.into_iter().filter(|n| !latest.contains(n));
     let (own, mut others): (Vec<usize>, Vec<usize>) = rest.partition(in_module);
-    // Tests that find many mutants in a short time come first.
+    // Tests that have found many mutants, relative to their duration, come first.
     let value = |n: usize| {
         let found = finders.counts.get(&n).copied().unwrap_or_default();
         (found as f64 + 0.5) / (cases[n].seconds + 0.02)
@@ -153,7 +153,8 @@ fn run_group(
             End::Failed => {
                 let failed: Vec<usize> =
                     group.iter().copied().filter(|&n| has_failed(&output, &cases[n].name)).collect();
-                // A program that crashes prints the name of its test, but no result.
+                // If the program crashed, it has printed the name of a test but no result. The mutant then counts as
+                // found.
                 let began = group.iter().any(|&n| output.contains(&format!("test {} ", cases[n].name)));
                 ensure!(began, "no test of {} ran:\n{output}", names(cases, group));
                 return Ok(Some((Outcome::Killed, failed)));

@@ -54,8 +54,9 @@ pub(super) struct Outcomes {
 }
 
 impl Outcomes {
-    /// Opens the file of outcomes in `folder`. If `left` is `false`, the function removes earlier outcomes. Otherwise, the outcomes of
-    /// mutants that tests have found remain, although the code around them and the tests may have changed.
+    /// Opens the file of outcomes in `folder`. If `left` is `false`, the function removes all earlier outcomes. If
+    /// `left` is `true`, it keeps the outcomes of mutants that tests have found, although the code and the tests
+    /// could have changed since then.
     pub(super) fn open(folder: &Path, left: bool, commit: &str) -> Result<Self> {
         let path = folder.join(OUTCOMES);
         if !left && path.exists() {

@@ -1,7 +1,8 @@
-//! Runs a simulated board on an in-memory bus: reset, number, start, control loop, and the reaction of the board when the PC stops sending.
+//! Simulates one board on an in-memory bus. The PC resets the board, assigns it a number, starts its application and
+//! its control loop, and then stops sending.
 //!
-//! `cargo run -p ucom --example one_board` prints the frames with their times. In the output, `<` marks frames of the PC, and `>` marks
-//! frames of the board.
+//! `cargo run -p ucom --example one_board` prints the frames with their times. In the output, `<` marks frames of the
+//! PC, and `>` marks frames of the board.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Admin, Frame, Profile, Sequence, ToBoard};
@@ -39,7 +40,7 @@ fn main() {
     println!("status: {}", board.status());
 }
 
-/// Advances the time until `end`, from one action of the board to the next action.
+/// Advances the simulated time by `ms` milliseconds. The time jumps from one due action of the board to the next.
 fn pass(
     board: &mut Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>,
     mut now_us: u64,

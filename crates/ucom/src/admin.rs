@@ -11,9 +11,10 @@ pub struct Admin {
     pub run: bool,
     /// `true` if the outputs of the board are enabled; never `true` without `run`.
     pub active: bool,
-    /// `true` if the board sends its debug texts.
+    /// `true` if the PC has requested debug texts with the flag *debug*.
     pub debug: bool,
-    /// `true` if the board sends all of its debug texts.
+    /// `true` if the PC has requested debug texts with the flag *global debug*. The board sends debug texts if at
+    /// least one of the two flags is set (D-38).
     pub global_debug: bool,
 }
 

@@ -121,7 +121,8 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// C-5: splits buffers of 0 to 7 words and of 65 535 words into packages. The packages restore the buffer.
+    /// C-5: splits buffers of 0 to 7 words and a buffer of 65 535 words into packages. Applying all packages to an
+    /// empty buffer gives the original contents.
     #[test]
     fn d15_c5_packages_of_a_buffer() {
         for dimension in [0u16, 1, 2, 3, 4, 6, 7, 65535] {
@@ -175,7 +176,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-15: decoding a package returns the values that were sent. Applying a package never changes a word
+        /// D-15: decoding an encoded package returns the original package. Applying a package never changes a word
         /// outside the buffer.
         #[test]
         fn d15_round_trip(offset: u16, count in 1..=3u8, mut words: [u16; 3], big: bool, size in 0..9usize) {

@@ -43,7 +43,7 @@ impl fmt::Display for Sequence {
     }
 }
 
-/// Side that sends a function.
+/// Sender of a function: the PC, a board, or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sender {
     /// Only the PC sends the function.

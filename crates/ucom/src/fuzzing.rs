@@ -2,8 +2,8 @@
 
 use crate::{Frame, FromBoard, Profile, ToBoard};
 
-/// Decodes a frame both as the PC and as a board. If the frame is a valid message, encodes the message again and
-/// compares the identifiers.
+/// Decodes a frame as a message of the PC and as a message of a board. Each valid message is encoded again, and must
+/// have the same identifier as the frame.
 pub fn frame(data: &[u8]) {
     let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
     let Some(frame) = Frame::new(u16::from_be_bytes(*id) & 0x7FF, payload) else { return };

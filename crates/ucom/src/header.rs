@@ -178,7 +178,7 @@ mod tests {
     fn d41_another_version_is_refused() {
         let header = Header { cycle: 1, memory: 0, address: 0, length: 1, program_id: 0, date: 0, target: 0 };
         let mut block = header.build(Endian::Little);
-        // The header in this test has version 2 and a correct sum.
+        // A header with version 2 is invalid even if its sum is correct.
         (block[2], block[62]) = (2, block[62].wrapping_sub(1));
         assert_ne!(block[62], 0xFF, "no borrow");
         assert_eq!(Header::parse(&block, Endian::Little), Err(HeaderError::Version(2)));

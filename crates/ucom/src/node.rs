@@ -87,14 +87,15 @@ pub struct Node<F, P, S, A> {
     /// Time at which the board begins to listen after a reset; `None` while the board listens.
     boot_until: Option<u64>,
     number: Option<Sequence>,
-    /// Number that the board accepts with an INITACK that is not sent yet. The status bit INIT is set when the INITACK has been sent
-    /// (D-24).
+    /// Number that the board is accepting: its INITACK has not been sent yet. When the INITACK has been sent, the
+    /// board takes the number and sets the status bit INIT (D-24).
     taking: Option<Sequence>,
     /// Level of the board's outgoing init pin.
     opinit: bool,
     prog: bool,
     app: App,
-    /// Flag of MCA_ADMIN_DATA, like the next two fields. The flag `run` has no field: it equals `app == Running`.
+    /// Flag `active` of MCA_ADMIN_DATA; the next two fields are the flags `debug` and `global_debug`. The flag `run`
+    /// has no field, because it equals `app == Running`.
     active: bool,
     debug: bool,
     global_debug: bool,
@@ -157,8 +158,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.reboot(self.now_us, true);
     }
 
-    /// Starts the board after a power loss. Everything except the contents of flash and [`Store`] is lost. The board does not send a
-    /// report.
+    /// Starts the board after a power loss. Only the contents of flash and [`Store`] are kept. The board does not
+    /// send a report.
     pub fn power_up(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, false);
@@ -197,8 +198,9 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reports that the CAN controller stopped trying to send the frame of the last [`Node::poll`] (bus-off). The node returns an INITACK
-    /// again; other frames are lost. The board sends DSP_ERROR 6 when the bus works again.
+    /// Reports that the CAN controller gave up sending the frame of the last [`Node::poll`], for example in bus-off.
+    /// An INITACK is sent again later; any other frame is lost. After the next frame that is sent, the board sends
+    /// DSP_ERROR 6.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {

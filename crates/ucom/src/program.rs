@@ -81,8 +81,8 @@ impl Digest {
         if self.checksum == Checksum::Xor16 { self.word ^ word } else { self.word.wrapping_add(word) }
     }
 
-    /// Returns the Program ID of the data that were added so far; returns 0 for [`Checksum::None`]. For an odd number of bytes, the sum
-    /// includes 0xFF as the missing byte, like the padding of the last block.
+    /// Returns the Program ID of the bytes added so far, or 0 for [`Checksum::None`]. If the number of bytes is odd,
+    /// the sum and the exclusive-or use 0xFF as the missing byte, like the padding of the last block.
     pub fn finish(&self) -> u16 {
         match self.checksum {
             Checksum::Crc16 => self.crc.clone().finalize(),
@@ -210,7 +210,8 @@ mod tests {
         assert_eq!(block_count(1000), 16);
     }
 
-    /// A sum of words does not detect two swapped frames of a block. Therefore `crc16` is the default of `prog.checksum`.
+    /// The checksums `sum16` and `xor16` do not detect two swapped frames of a block, but `crc16` does. Therefore
+    /// `crc16` is the default of `prog.checksum`.
     #[test]
     fn d44_sum_is_blind_to_swapped_frames() {
         let image = image();
@@ -266,7 +267,8 @@ mod tests {
         assert_eq!(DateForm::Days2000.encode(1999, 12, 31), None);
     }
 
-    /// All four digits of the date must be decimal, and the last two digits must be a valid month.
+    /// D-45: a date in the form `Bcd` is valid only if all four digits are decimal and the last two digits are a
+    /// month.
     #[test]
     fn d45_bcd_takes_decimal_digits_only() {
         for date in 0..=u16::MAX {
@@ -279,8 +281,8 @@ mod tests {
         }
     }
 
-    /// The test compares the dates with a calendar that counts day by day from 2000-01-01. The last value, 0xFFFE,
-    /// means 2179-06-05.
+    /// D-45: the encoded dates equal the dates of a calendar that counts day by day from 2000-01-01. The last value,
+    /// 0xFFFE, means 2179-06-05.
     #[test]
     fn d45_days_in_a_row() {
         let (mut year, mut month, mut day) = (2000, 1, 1);
@@ -317,7 +319,7 @@ mod tests {
             prop_assert_eq!(date.and_then(|date| DateForm::Bcd.decode(date)), Some((year, month, 1)));
         }
 
-        /// The Program ID does not depend on the size of the pieces in which the image is added.
+        /// D-44: the Program ID is the same for any division of the image into pieces.
         #[test]
         fn d44_pieces(bytes in proptest::collection::vec(any::<u8>(), 0..200), at in 0..200usize, i in 0..3usize) {
             let kind = [Checksum::Crc16, Checksum::Sum16, Checksum::Xor16][i];

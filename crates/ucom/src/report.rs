@@ -24,9 +24,10 @@ impl Report {
         }
     }
 
-    /// Returns the `i`-th frame (counted from 0) that a board sends after one request in this mode; returns `None` after the last frame.
+    /// Returns frame `i` (counted from 0) of the report that a board sends in this mode; returns `None` after the
+    /// last frame.
     ///
-    /// `sequence` is the number of the board, or the number that a board without a number uses instead.
+    /// `sequence` is the number of the board. A board without a number uses the number that the profile requires.
     pub const fn nth(mode: ReportMode, i: u8, flash_number: u16, sequence: Sequence) -> Option<Self> {
         let report = Self::flash7(flash_number);
         match mode {

@@ -62,8 +62,8 @@ impl Status {
         Self((self.0 & !mask) | value)
     }
 
-    /// Returns the contradiction between bits of this status; returns `None` if the status has no contradiction. No board can be in a
-    /// contradictory state.
+    /// Returns a text that explains which bits of this status contradict each other; returns `None` if there is no
+    /// contradiction. No board can be in a contradictory state.
     pub const fn contradiction(self) -> Option<&'static str> {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
             Some("EXLRUN must be the opposite of MSTART")

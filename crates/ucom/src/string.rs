@@ -1,4 +1,5 @@
-//! Transmission of strings: a header package with a count, and then packages of up to 8 characters (D-13, D-14).
+//! Transmission of strings: first a header package that contains the number of packages, and then packages of up to 8
+//! characters (D-13, D-14).
 
 use core::fmt;
 
@@ -196,7 +197,8 @@ mod tests {
         }
     }
 
-    /// C-4: the test covers strings of length 0, 1, 7, 8, 9, 16 and 512, a trailing NUL, and a character that is not ASCII.
+    /// C-4: strings of length 0, 1, 7, 8, 9, 16, 511 and 512, and strings with characters that are not ASCII, arrive
+    /// unchanged. A trailing NUL is removed.
     #[test]
     fn d13_c4_strings_of_all_lengths() {
         for profile in profiles() {
@@ -246,13 +248,13 @@ mod tests {
         assert_eq!(assembler.missing(), 1);
         assert!(!assembler.expired(199_998, &profile));
         assert!(assembler.expired(199_999, &profile));
-        // After the gap, the header of the repeated answer starts a new string. The assembler does not use the header
-        // as the missing package.
+        // The time limit for the missing package has passed, and the board repeats its answer. The assembler takes
+        // the header as the start of a new string, not as the missing package.
         assert_eq!(assembler.push(199_999, &header, &profile), Assembled::Partial);
         assert_eq!(assembler.missing(), 2);
     }
 
-    /// If a data package is empty or exceeds the buffer, the assembler drops the string.
+    /// D-13: the assembler drops a string if one of its data packages is empty or exceeds the buffer.
     #[test]
     fn d13_data_that_cannot_be_are_refused() {
         let [profile, ..] = profiles();
@@ -300,7 +302,8 @@ mod tests {
             prop_assert_eq!(through(&text, &profiles()[i]), text);
         }
 
-        /// D-14: for any packages, the assembler stays within its buffer and its package count.
+        /// D-14: for any sequence of packages, no string is longer than the buffer, and the assembler never waits for
+        /// more packages than fit into the buffer.
         #[test]
         fn d14_any_packages(packages in proptest::collection::vec((any::<[u8; 8]>(), 0..9usize), 0..200)) {
             let [profile, ..] = profiles();

@@ -11,7 +11,8 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// The test uses frames with every identifier and every length, with payloads of extreme byte values such as 0x00, 0x7F and 0xFF.
+/// Decoding and encoding work for frames with every identifier and every length, with extreme byte values such as
+/// 0x00, 0x7F and 0xFF.
 #[test]
 fn every_frame_with_extreme_payloads() {
     for id in 0..0x800_u16 {

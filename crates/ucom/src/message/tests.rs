@@ -46,8 +46,9 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: if both sides send a function, the two messages have the same identifier. The sender determines which
-/// message a frame contains, and the lengths also differ if possible.
+/// D-05: the PC and the boards send functions 22, 24 and 26 with the same identifier. The receiver decodes the same
+/// frame as a message of the PC or of a board, depending on the sender. For function 22, the length also tells the
+/// two messages apart.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));
@@ -60,7 +61,7 @@ fn d05_shared_functions() {
     assert_eq!(from("681#"), Ok(FromBoard::Alive));
 }
 
-/// D-04: the PC reacts only to messages of boards, and a board only to messages of the PC.
+/// D-04: the PC decodes only functions that boards send, and a board decodes only functions that the PC sends.
 #[test]
 fn d04_direction() {
     for function in Function::ALL {

@@ -40,8 +40,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         };
         match made {
             Some((_, next @ Place::String { string: 0, .. })) => self.jobs.info = Some(next),
-            // Either the answer is complete, or the description became shorter during the answer. If the description became shorter, the PC
-            // requests it again.
+            // The next package does not exist. Either the answer is complete, or the description became shorter
+            // during the answer; the PC must then request it again.
             _ => self.jobs.info_done(),
         }
         made.map(|(payload, _)| FromBoard::Info(payload))
@@ -80,8 +80,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Some((_, next @ Place::String { string, .. })) if string < dimensions.strings() => {
                 self.jobs.dump_io = Some(next);
             }
-            // Either the answer is complete, or a text became shorter during the answer. If a text became shorter, the PC requests the
-            // answer again.
+            // The next package does not exist. Either the answer is complete, or a text became shorter during the
+            // answer; the PC must then request the answer again.
             _ => self.jobs.dump_io_done(),
         }
         made.map(|(payload, _)| FromBoard::IoDescription(payload))
@@ -118,7 +118,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             && (self.jobs.own_text.is_some() || self.application.debug_text().is_some())
     }
 
-    /// Returns the next package of a debug text. The board sends texts only if the PC requests them, and at a limited rate (D-38).
+    /// Returns the next package of a debug text. The board sends texts only if the PC has set a debug flag, and at a
+    /// limited rate (D-38).
     fn next_of_text(&mut self) -> Option<FromBoard> {
         if self.wants_text() {
             let own = self.jobs.own_text.is_some();

@@ -6,7 +6,8 @@ use crate::buffer::BufferPackage;
 use crate::error_code::ErrorCode;
 use crate::profile::CiLatch;
 
-/// Text that reports the loss of the PC's heartbeat; the board sends it if the PC requests texts.
+/// Debug text that reports the loss of the PC's heartbeat. The board sends this text only if the PC has requested
+/// debug texts.
 pub(super) const PC_LOST: &[u8] = b"PC alive lost";
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {

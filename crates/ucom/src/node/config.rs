@@ -41,7 +41,8 @@ impl NodeConfig {
 pub struct Counters {
     /// Number of received frames that do not belong to the UCoM protocol (D-02).
     pub foreign: u32,
-    /// Number of messages to this board that the board did not answer because its state does not allow them.
+    /// Number of messages that were addressed to this board, but had no effect because the state of the board does
+    /// not allow them.
     pub ignored: u32,
     /// Number of messages that were too short or had a wrong length (D-12).
     pub wrong_length: u32,

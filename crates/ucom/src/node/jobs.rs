@@ -4,8 +4,8 @@ use crate::frame::Payload;
 use crate::profile::Profile;
 use crate::string::string_package;
 
-/// Position in an answer of several frames: either before the first frame, or at a package of the string with the
-/// index `string`.
+/// Position in an answer of several frames. The position is either before the first frame, or at a package of the
+/// string with the index `string`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     First,
@@ -20,15 +20,16 @@ pub(super) struct Jobs {
     pub dump_io: Option<Place>,
     /// Earliest time at which the next frame of the IO description may be sent.
     pub dump_io_at: u64,
-    /// Earliest time of a second IO description; `None` if the PC has not requested another one during the current
-    /// answer.
+    /// Earliest time of a second IO description, which the PC has requested during the current one; `None` without
+    /// such a request.
     pub dump_io_again: Option<u64>,
     /// Offset of the next package of the initial controller inputs.
     pub dump_ci: Option<u16>,
     pub dump_ci_again: bool,
     /// Offset of the next package of the sensor outputs.
     pub so: Option<u16>,
-    /// Index of the next package of the debug text in progress. The second value is `true` if the node itself wrote the text.
+    /// Index of the next package of the debug text that is being sent. The second value is `true` if the text comes
+    /// from the node itself, and `false` if it comes from the application.
     pub text: Option<(u16, bool)>,
     /// Debug text that the node itself wrote.
     pub own_text: Option<&'static [u8]>,

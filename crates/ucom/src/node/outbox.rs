@@ -23,7 +23,8 @@ pub(super) struct Outbox {
     pub block_taken: bool,
     /// `true` if a DSP_PROGFINISHED waits for the bus.
     pub finished: bool,
-    /// Due time of each report, and the index of the next frame of the report.
+    /// Reports that wait for the bus. Each entry contains the time at which the report is due, and the index of its
+    /// next frame.
     pub reports: [Option<(u64, u8)>; REPORTS],
     /// `true` if the board must send a report after the boot.
     pub report_after_boot: bool,
@@ -52,7 +53,7 @@ impl Outbox {
         }
     }
 
-    /// Drops the waiting answers of a transfer that has ended.
+    /// Drops the waiting answers (DSP_READY and DSP_PROGFINISHED) of a transfer of program data that has ended.
     pub(super) fn forget_transfer(&mut self) {
         self.block_taken = false;
         self.finished = false;

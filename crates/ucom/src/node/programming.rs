@@ -30,8 +30,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             return;
         }
         if !self.prog {
-            // If program data arrive by broadcast, they are for a group of boards (D-46). A board without PROG is not
-            // in this group and ignores the data.
+            // Program data that arrive by broadcast are for a group of boards (D-46). A board whose bit PROG is 0
+            // does not belong to this group, and ignores the data without an error.
             if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
@@ -156,8 +156,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        // The header of the second cycle gets the Program ID of the first cycle. If the second cycle contains another
-        // image, its own Program ID replaces this value later.
+        // The second header preliminarily gets the Program ID of the first cycle. If the second cycle contains
+        // another image, the Program ID of that image replaces this value later.
         let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })

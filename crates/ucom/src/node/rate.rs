@@ -5,7 +5,7 @@ const SECOND_US: u64 = 1_000_000;
 /// Times of the last events, at most `N` in any second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RateLimit<const N: usize> {
-    /// Times of the events, the oldest time at index `next`; `None` for entries without an event.
+    /// Times of the last events in a ring; index `next` is the oldest. An entry without an event is `None`.
     times: [Option<u64>; N],
     next: usize,
 }
@@ -51,8 +51,8 @@ mod tests {
         assert!(!RateLimit::<10>::new().allow(0, 0));
     }
 
-    /// Section 9: an event that occurred 1 s ago is not counted, and an event that occurred 999 999 µs ago is counted. The rate limit never
-    /// allows more than `N` events in a second.
+    /// Section 9: the rate limit counts an event that occurred 999 999 µs ago, but not an event that occurred 1 s
+    /// ago. It never allows more than `N` events in a second.
     #[test]
     fn a_second_is_a_second() {
         let mut limit = RateLimit::<2>::new();

@@ -25,8 +25,9 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
-    /// Queues MCA_ADMIN_DATA that the PC did not request. The board waits a random time, because the PC may send the same identifier
-    /// soon (D-05). If MCA_ADMIN_DATA is already queued, no second frame is queued.
+    /// Queues MCA_ADMIN_DATA that the PC did not request. The board waits a random time, because the PC could send a
+    /// frame with the same identifier at the same time (D-05). If MCA_ADMIN_DATA is already queued, no second frame
+    /// is queued.
     pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);

@@ -33,8 +33,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.boot_until = Some(now_us.saturating_add(self.config.boot_us));
     }
 
-    /// Ends the boot, so that the exloader listens for frames. The function reads the validity record of the application that is in flash
-    /// at this time.
+    /// Ends the boot: from now on, the exloader listens for frames. Reads the validity record of the application from
+    /// flash.
     pub(super) fn booted(&mut self) {
         self.boot_until = None;
         self.record = Record::parse(&self.flash.record());

@@ -95,7 +95,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Returns the next due time after `at` that is later than `now`, and skips due times that were missed.
+/// Returns the next due time of a periodic action: the first time after `now` that is a whole number of periods after
+/// `at`. Missed due times are skipped.
 fn next_beat(at: Option<u64>, period_us: u64, now: u64) -> u64 {
     let period = period_us.max(1);
     let at = at.unwrap_or(now);

@@ -36,7 +36,8 @@ pub(super) struct Cycle {
     pub writes: bool,
     /// Number of bytes of the image that were received so far.
     pub done: u32,
-    /// Digest of the received data; later, digest of the data that the board reads back from flash.
+    /// Checksum of the data received so far. During the verification, the checksum of the data that the board reads
+    /// back from flash.
     pub digest: Digest,
 }
 
@@ -90,7 +91,7 @@ impl Programming {
         self.discard
     }
 
-    /// Allows the PC to send the next block. The node calls this function when DSP_READY has been sent.
+    /// Enables the reception of the next block. The node calls this function when DSP_READY has been sent.
     pub(super) fn answered(&mut self) {
         if self.work == Work::Answer {
             self.work = Work::None;

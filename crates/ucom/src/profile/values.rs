@@ -80,7 +80,7 @@ words! {
         Zero = "0",
         /// The broadcast number is 31.
         ThirtyOne = "31",
-        /// There is no broadcast number for numbered boards; number 0 addresses the boards without a number.
+        /// Boards with a number accept no broadcast. Number 0 addresses only the boards without a number.
         None = "none",
     }
 }

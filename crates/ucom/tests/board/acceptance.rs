@@ -1,5 +1,5 @@
-//! Tests of the acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. The tests use both byte orders for rows of the table that
-//! transmit 16-bit words.
+//! Tests of the acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. Rows that transmit 16-bit words are
+//! tested with both byte orders.
 
 use ucom::profile::Endian;
 use ucom::{Frame, Profile, Sequence, Status};
@@ -153,7 +153,8 @@ fn d_t10_io_description() {
             "581#020004000300 581#0200 581#55436F4D32206865 581#61642070616E 581#0100 581#706F735F736F6C6C"
         )
     );
-    // Counts the packages without the board's code. A package with a header of 2 bytes precedes each string.
+    // The test counts the packages itself, without code of the board. Each string begins with a header package of 2
+    // bytes.
     let mut strings = 0;
     let mut rest = received[1..].iter();
     while let Some(header) = rest.next() {

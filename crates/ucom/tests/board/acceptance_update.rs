@@ -4,7 +4,8 @@ use ucom::{Frame, Profile, Status};
 
 use super::bus::{Bus, blocks, frames, header, image, sorted};
 
-/// D-T17, D-40, D-42: the test performs a complete update with raw frames and the golden header.
+/// D-T17, D-40, D-42: a board accepts a complete update that consists of raw frames with the header of the protocol
+/// page.
 #[test]
 fn d_t17_update() {
     let mut bus = Bus::initialised();

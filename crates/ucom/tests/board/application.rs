@@ -1,4 +1,4 @@
-//! Tests of the times and rates of a running board that the acceptance table does not contain.
+//! Tests of times and rates of a running board. The acceptance table does not contain these times and rates.
 
 use ucom::profile::CiLatch;
 use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: on a shared identifier, a board sends an answer 2 ms after the request, and a message without a request
-/// after a random time of 1 to 8 ms. The random times of different boards differ.
+/// D-05: on an identifier that the PC and the boards share, a board sends an answer 2 ms after the request. It sends
+/// a message without a request after a random time of 1 to 8 ms, which differs between boards.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();
@@ -76,7 +76,8 @@ fn d33_outputs_on_a_blocked_bus() {
     assert!(bus.take().len() <= 6);
 }
 
-/// D-34, D-50: a start of the application sets the initial inputs, even if the PC set inputs before.
+/// D-34, D-50: each start of the application sets the inputs to their initial values, even if the PC has changed the
+/// inputs before.
 #[test]
 fn d34_initial_inputs_at_the_start() {
     let mut bus = Bus::initialised();
@@ -238,7 +239,8 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     board.sent(now, &acknowledge);
     assert_eq!(board.poll(now), Some("081#07".parse().unwrap()), "and no DSP_ERROR 6 before it");
     assert_eq!(board.counters().not_sent, 0);
-    // The frame has been sent, so the board does not send it a second time.
+    // The CAN controller has sent the frame. A later `not_sent` for the same frame must not make the board send it
+    // again.
     board.sent(now, &acknowledge);
     board.not_sent(now, &acknowledge);
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
@@ -279,8 +281,8 @@ fn d37_repeated_flags_enable_nothing() {
 fn a_program_is_stopped_once() {
     for text in ["000#", "041#", "1C1#0800", "1C1#0404"] {
         let mut bus = Bus::initialised();
-        // The application is not running, but the test sets the field `running`. A wrong call of `stop` would clear
-        // this field.
+        // The application is not running, but the test sets the field `running`. If the node wrongly called `stop`,
+        // this field would become `false`.
         bus.boards[0].application.running = true;
         bus.send(text);
         assert!(bus.boards[0].application.running, "{text}");
@@ -304,8 +306,8 @@ fn d50_a_repeated_start_is_no_heartbeat() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-14, D-36: the end of the application ends its dumps, but the board still completes its own description
-/// (DSP_INFO).
+/// D-14, D-36: when the application ends, the board stops sending the dumps of the application, but still completes
+/// its own description (DSP_INFO).
 #[test]
 fn d14_info_survives_the_application() {
     let mut bus = Bus::started();
@@ -324,8 +326,8 @@ fn d14_info_survives_the_application() {
     assert!(received.iter().all(|frame| frame.id() == first.id()));
 }
 
-/// D-14, D-36: a second request during a dump of the inputs causes one further dump after the first dump. If the application has no inputs,
-/// the board does not send a dump.
+/// D-14, D-36: if the PC requests a dump of the inputs while the board sends one, the board sends one more dump
+/// afterwards. If the application has no inputs, the board sends no dump.
 #[test]
 fn d14_dump_of_inputs_twice() {
     for (dimension, packages) in [(0, 0), (3, 1), (7, 3)] {

@@ -16,15 +16,15 @@ pub(super) struct Bus {
     pub received: Vec<(u64, Frame)>,
     /// All DSP_ERROR frames since the start of the test.
     pub errors: Vec<Frame>,
-    /// Function that returns `true` for frames that the bus delays. The boards that sent these frames wait for
-    /// `sent`.
+    /// Function that returns `true` for frames that the bus delays. The bus calls `sent` for such a frame only after
+    /// [`Bus::release`].
     pub hold: fn(&Frame) -> bool,
     pub held: Vec<(usize, Frame)>,
-    /// Index (from 0) of the frame that is lost between the PC and the boards.
+    /// Index (from 0) of a frame of the PC that the boards do not receive.
     pub lose_to_boards: Option<usize>,
     pub frames_to_boards: usize,
-    /// Index (from 0) of the frame that is lost between the boards and the PC. The bus calls `sent` for the board although this frame is
-    /// lost.
+    /// Index (from 0) of a frame of the boards that the PC does not receive. The board gets a call of `sent` as if
+    /// the frame had arrived.
     pub lose_from_boards: Option<usize>,
     pub frames_from_boards: usize,
 }
@@ -137,8 +137,8 @@ impl Bus {
 
     pub(super) fn run_us(&mut self, us: u64) {
         let end = self.now + us;
-        // Number of consecutive steps without a frame on the bus. The test fails at a limit that is much larger than
-        // the number of wake-ups that can be due at one time.
+        // Number of consecutive steps without a frame on the bus. A large number means that a board is always due but
+        // never sends; the test then fails.
         let mut quiet = 0;
         loop {
             let now = self.now;
@@ -253,7 +253,7 @@ pub(super) fn frames(text: &str) -> Vec<Frame> {
     text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
 }
 
-/// Returns the image in the examples of the protocol page, which has 1000 bytes.
+/// Returns the image of 1000 bytes that the examples of the protocol page use.
 pub(super) fn image() -> Vec<u8> {
     (0..1000).map(|i| (37 * i + 11) as u8).collect()
 }
@@ -271,7 +271,7 @@ pub(super) fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     }
 }
 
-/// Returns all blocks of both cycles of an update, including the headers.
+/// Returns all blocks of both cycles of an update: the header block and the data blocks of each cycle.
 pub(super) fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     let mut all = Vec::new();
     for cycle in 1..=2 {

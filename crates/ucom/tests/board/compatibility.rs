@@ -22,8 +22,8 @@ fn d07_report_modes() {
     assert_eq!(bus.ask("240#", 100), frames("401#21 400#42"));
 }
 
-/// Section 5.3: two boards get the same number under two conditions. A board activates its pin without a command, and
-/// the PC repeats PC_INIT without a check.
+/// Section 5.3: two boards get the same number only if two conditions are true. Each board activates its outgoing pin
+/// without a command, and the PC repeats PC_INIT without a check.
 #[test]
 fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
@@ -44,7 +44,8 @@ fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     assert_eq!(numbers(true, true), [1, 2, 2]);
 }
 
-/// D-23: a board that loses its number at PC_XRESET can get this number again.
+/// D-23: if the profile requires it, PC_XRESET deletes the number of the board. The PC can then assign the same
+/// number again.
 #[test]
 fn d23_xreset_forgets_the_number() {
     let mut bus = Bus::new(&[0x21], with(|p| p.xreset_keeps_init = false));
@@ -61,7 +62,8 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.status(1), 0x5D);
 }
 
-/// D-10, D-13: the test uses boards with big-endian words and with a string count that includes the header.
+/// D-10, D-13: a board sends words in big-endian order, and includes the header in the package count of a string, if
+/// its profile requires this.
 #[test]
 fn d10_d13_words_and_counts() {
     let profile = with(|p| {
@@ -84,7 +86,8 @@ fn d15_short_last_package() {
     assert_eq!(bus.ask("5C1#", 20), frames("6C1#000000000000"));
 }
 
-/// D-04: the test uses a profile whose numbers begin at 0 and whose broadcast number is 31, and a profile without a broadcast number.
+/// D-04: boards use the addresses of their profile. The test covers a profile with the first number 0 and the
+/// broadcast number 31, and a profile without a broadcast number.
 #[test]
 fn d04_other_addresses() {
     let profile = with(|p| {
@@ -106,7 +109,8 @@ fn d04_other_addresses() {
     assert_eq!(bus.ask("241#", 300), frames("441#21"));
 }
 
-/// D-04, D-50: `alive_mode` selects the heartbeats that keep a board running.
+/// D-04, D-50: the key `alive.mode` determines which heartbeats keep the control loop running: broadcast heartbeats,
+/// heartbeats to the single board, or both.
 #[test]
 fn d50_unicast_heartbeat() {
     let runs = |mode, text: &str| {
@@ -165,7 +169,7 @@ fn d02_foreign_frames() {
     assert_eq!(bus.take(), []);
 }
 
-/// D-04: a board ignores frames of other boards with any number, and does not count them.
+/// D-04: a board ignores the frames of other boards, even frames with its own number, and does not count them.
 #[test]
 fn d04_boards_do_not_listen_to_boards() {
     let mut bus = Bus::initialised();
@@ -181,7 +185,7 @@ fn d04_boards_do_not_listen_to_boards() {
     assert_eq!((board.status(), board.poll(now)), (Status(0x1B), None));
 }
 
-/// A board counts a message that its state does not allow, and does not answer it.
+/// A board counts each message that its state does not allow, and does not answer the message.
 #[test]
 fn ignored_messages_are_counted() {
     let mut bus = Bus::initialised();

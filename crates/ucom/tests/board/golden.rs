@@ -1,4 +1,4 @@
-//! Tests that compare the golden bytes of the protocol document frame by frame.
+//! Tests that compare the frames of boards with the golden bytes of the protocol document, frame by frame.
 
 use ucom::Profile;
 

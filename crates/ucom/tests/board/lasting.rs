@@ -1,4 +1,4 @@
-//! Tests of how the board uses its non-volatile memory.
+//! Tests of how often a board writes its non-volatile memory.
 
 use ucom::Frame;
 use ucom::node::{Node, NodeConfig, Store};
@@ -47,7 +47,8 @@ fn d22_autostart_is_kept_on_changes_only() {
         ("1C1#0200", true, 1),
         ("1C1#4000", false, 2),
         ("1C1#4000", false, 2),
-        // This PC_SETSTATUS clears INIT (mask 0x08) and sets ASTART (value 0x40). The board also stores ASTART.
+        // This PC_SETSTATUS clears INIT (mask 0x08) and sets ASTART (value 0x40). The board stores ASTART although it
+        // loses its number.
         ("1C1#0840", true, 3),
     ] {
         board.receive(now, &text.parse::<Frame>().unwrap());

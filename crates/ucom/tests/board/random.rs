@@ -22,9 +22,9 @@ impl Random {
     }
 }
 
-/// D-20: the test sends random frames at any time. The status byte of a board is always consistent, and no two boards
-/// get the same number. Outputs are active only while the control loop runs, and boards send only frames of the
-/// protocol.
+/// D-20: a million random frames arrive at any time. The status byte of a board is always consistent, and no two
+/// boards have the same number. Outputs are active only while the control loop runs, and boards send only frames of
+/// the protocol.
 #[test]
 fn d20_a_million_random_frames() {
     let seed = std::env::var("UCOM_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(2026);

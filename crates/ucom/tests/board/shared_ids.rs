@@ -45,16 +45,16 @@ proptest! {
                 Act::Send(text) => {
                     bus.send(text);
                     let id = u16::from_str_radix(&text[..3], 16).unwrap();
-                    // The test also records MCA_PC_START, whose identifier only the PC uses. The board answers
-                    // MCA_PC_START with MCA_ADMIN_DATA.
+                    // The test also sends MCA_PC_START, because the board answers it with MCA_ADMIN_DATA. Recording
+                    // this frame has no effect on the check, because boards never send this identifier.
                     asked.push((bus.now, id));
                 }
             }
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // The minimum time applies to the flags and to the first frame of an IO description, which contains the
-            // dimensions. The remaining frames of an answer in progress follow at once (D-14).
+            // The minimum delay applies to the flags, and to the first frame of an IO description, which contains the
+            // dimensions. The other frames of an IO description follow without this delay (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());

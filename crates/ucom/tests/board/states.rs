@@ -187,7 +187,8 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
-/// D-12, D-06: a board reports a frame that is too short, unless it ignores messages of this kind.
+/// D-12, D-06: a board reports a frame that is too short, unless the board would also ignore the frame with the
+/// correct length.
 #[test]
 fn d12_short_frames_in_every_state() {
     row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
@@ -322,7 +323,8 @@ fn d21_pin_of_the_next_board() {
     assert!(!out(&bus));
 }
 
-/// D-42, D-43: between the cycles of an update, and after a cancelled transfer, the board is in one of the states of the table.
+/// D-42, D-43: a cancelled transfer leaves no trace: the board is idle and sends nothing, and a new transfer
+/// succeeds.
 #[test]
 fn d43_cancel_and_again() {
     let mut bus = in_state(Programming);
@@ -342,8 +344,8 @@ fn d43_cancel_and_again() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
 }
 
-/// D-24: the board loses its number while the acknowledgement is in the CAN controller. If the controller fails to send the
-/// acknowledgement, the board does not send it again, and no action of the board is due.
+/// D-24: the board loses its number while its acknowledgement is in the CAN controller, and the controller fails to
+/// send it. The board does not send the acknowledgement again, and has nothing else to do.
 #[test]
 fn d24_no_acknowledge_without_a_number() {
     let mut bus = in_state(Idle);

@@ -125,8 +125,8 @@ fn d25_hold_off() {
     assert_eq!((flush(&mut board, start), board.phase()), (vec![], Phase::Idle));
 }
 
-/// D-33, D-35, D-50, D-51: times of the periodic actions of a running board, and of its stop when the PC's heartbeat
-/// is missing.
+/// D-33, D-35, D-50, D-51: a running board performs its periodic actions at exact times. If the PC's heartbeat is
+/// missing, the board stops its control loop at the exact time limit.
 #[test]
 fn d33_d35_d50_d51_beats() {
     let (mut board, start) = board(Bus::started());
@@ -170,8 +170,8 @@ fn d50_heartbeat_of_the_pc() {
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// A frame becomes due while another frame is in the CAN controller. The board returns the due frame as soon as the
-/// other frame has been sent.
+/// If frames become due while the CAN controller is sending another frame, the board returns them as soon as the
+/// controller has sent this frame.
 #[test]
 fn what_waits_goes_when_the_frame_before_has_left() {
     let programming = || {
@@ -337,8 +337,8 @@ fn d44_steps_after_the_last_block() {
         }
     };
     assert_eq!(finished, frame("101#"));
-    // Waits in µs: 400 before the block is processed, 500 to write the block, three pieces of the image read back
-    // without a wait, and twice 500 until the record is complete.
+    // Waits in µs: 400 until the block is processed, and 500 to write the block. The three pieces of the image are
+    // read back without a wait. Two waits of 500 follow until the record is complete.
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
 }
 

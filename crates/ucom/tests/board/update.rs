@@ -1,5 +1,5 @@
-//! Tests of updates with faults: power loss during each flash operation, loss of each single frame, and flash errors. Some tests use other
-//! plans than the default plan.
+//! Tests of updates with faults: power loss during each flash operation, loss of each single frame, and flash errors.
+//! Some tests use an update plan that is not the default.
 
 use ucom::node::Phase;
 use ucom::profile::{Endian, HeaderForm, Plan};
@@ -28,7 +28,8 @@ pub(super) fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     finished
 }
 
-/// Checks that the record of a valid application belongs to a complete image, either the old image or the new image.
+/// Checks that no half-written image is valid: a valid record belongs to the complete old image or to the complete
+/// new image.
 pub(super) fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
@@ -39,7 +40,8 @@ pub(super) fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     }
 }
 
-/// D-45, D-46: the power fails during a flash operation; the test repeats this for each operation.
+/// D-45, D-46: after a power loss at any flash operation of an update, no half-written image is valid, and the board
+/// can be programmed again.
 #[test]
 fn d45_power_loss_at_every_flash_operation() {
     let image = small();
@@ -88,7 +90,8 @@ fn d46_power_loss_in_the_first_cycle() {
     }
 }
 
-/// D-43, D-44: the test repeats an update and loses another single frame each time, in both directions.
+/// D-43, D-44: if any single frame of an update is lost, no half-written image becomes valid. If a frame of the PC is
+/// lost, the board reports one error, and the next update succeeds.
 #[test]
 fn d43_every_frame_lost_once() {
     let image = small();
@@ -121,7 +124,7 @@ fn d43_every_frame_lost_once() {
     }
 }
 
-/// If a flash operation fails, the board sends error 3. The test also checks which application is valid after the failure.
+/// D-45: if a flash operation fails, the board sends error 3 and has no valid application. The next update succeeds.
 #[test]
 fn d45_failing_flash() {
     let all = blocks(&small(), &Profile::default());
@@ -137,7 +140,8 @@ fn d45_failing_flash() {
     }
 }
 
-/// D-43: the block buffer is in use until the CAN controller has sent DSP_READY.
+/// D-43: the block buffer is in use until the CAN controller has sent DSP_READY. If program data arrive earlier, the
+/// board sends error 4.
 #[test]
 fn d43_frame_before_ready_has_left() {
     let mut bus = Bus::initialised();
@@ -292,7 +296,7 @@ fn d41_no_header() {
     assert_eq!(bus.errors, frames("081#01"));
 }
 
-/// D-44, D-10: the test performs a complete update with each checksum and byte order that is not the default.
+/// D-44, D-10: a complete update succeeds with each checksum and each byte order that is not the default.
 #[test]
 fn d44_update_in_other_profiles() {
     for (checksum, endian) in [

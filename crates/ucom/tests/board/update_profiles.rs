@@ -1,4 +1,5 @@
-//! Tests of updates with boards that follow another interpretation of the protocol description, plan by plan.
+//! Tests of updates with profiles in which the board interprets the protocol description differently, for each update
+//! plan.
 
 use ucom::node::{Area, Node, NodeConfig};
 use ucom::profile::{HeaderForm, Plan};

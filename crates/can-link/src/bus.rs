@@ -6,8 +6,8 @@ use crate::{CanError, CanFrame, ControllerState};
 
 /// A member of a CAN bus.
 ///
-/// `receive` returns the frames of all other members in the order in which they were on the bus. It never returns the
-/// member's own frames.
+/// `receive` returns the frames of all other members in the order in which they were on the bus. The function never
+/// returns the member's own frames.
 pub trait CanBus {
     /// Sends a frame. Waits while the transmit queue is full. Returns an error if the queue stays full for several
     /// seconds, for example because no other member acknowledges frames.

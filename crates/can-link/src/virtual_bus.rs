@@ -60,8 +60,8 @@ struct Member {
     waiting: VecDeque<Received>,
     /// Maximum number of frames in the queue.
     limit: usize,
-    /// `true` if no sender waits for the member. This applies to every guest. It also applies to a member for which a
-    /// sender has waited without success, until the member takes an entry again.
+    /// `true` if no sender waits for the member. This applies to every guest. The value `true` also applies to a member
+    /// for which a sender has waited without success, until the member takes an entry again.
     stalled: bool,
     /// `true` if no sender ever waits for the member.
     guest: bool,

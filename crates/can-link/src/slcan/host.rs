@@ -142,8 +142,8 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // Of all answers, only the answer to the version request is a text. The text is therefore not a late
-                // answer to an earlier command.
+                // Only the answer to the version request is a text. The text is therefore not a late answer to an
+                // earlier command.
                 if self.got_text {
                     return Ok(());
                 }

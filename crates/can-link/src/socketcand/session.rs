@@ -1,5 +1,5 @@
-//! Session of a client of the server. One thread reads the client's requests. A second thread writes frames to the
-//! client after raw mode begins.
+//! Session of a client of the server. The first thread reads the client's requests. A second thread writes frames to
+//! the client after raw mode begins.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};

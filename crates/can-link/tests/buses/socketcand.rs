@@ -90,7 +90,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
             client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
             // A frame that the server does not delay would arrive during these 3 ms. On a busy computer, the wait can
-            // take so long that delayed frames also arrive.
+            // take longer, so delayed frames can also arrive.
             std::thread::sleep(Duration::from_millis(3));
             let first = client.read();
             assert!(first.starts_with("< ok >"), "{first}");

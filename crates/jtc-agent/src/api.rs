@@ -175,8 +175,8 @@ impl Agent {
     /// if the client holds the lease, because such requests may arrive after the Stop.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
-        // The identity of the client sets the name that is reported. It also determines the client to which the
-        // hold-off after this Stop or Pause does not apply.
+        // The identity of the client sets the name that is reported. The identity also determines the client to which
+        // the hold-off after this Stop or Pause does not apply.
         let client = self.client(asker).ok().map(|(client, _)| client);
         let name = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
         let lost = self.line.lost();

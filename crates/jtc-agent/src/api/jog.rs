@@ -114,8 +114,8 @@ pub(super) async fn jog(
     // head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
-        // This request is too late and moves nothing. It shows, however, that the jog key is still pressed, so it
-        // extends the hold-off: after a Stop, the user must release the key.
+        // This request is too late and moves nothing. The request shows, however, that the jog key is still pressed, so
+        // it extends the hold-off: after a Stop, the user must release the key.
         agent.line.with(|line, now| line.could_jog(http_session.client, now))?;
         return Err(late);
     }

@@ -27,8 +27,8 @@ pub struct Stored {
     pub trajectory: Trajectory,
     /// Notes about values that were derived or omitted when the trajectory was read.
     pub notes: Vec<String>,
-    /// Digest of the points and the time step of the trajectory. It changes if a point or the time step changes, but
-    /// does not depend on the name.
+    /// Digest of the points and the time step of the trajectory. The digest changes if a point or the time step
+    /// changes, but does not depend on the name.
     pub digest: String,
 }
 

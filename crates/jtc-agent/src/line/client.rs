@@ -204,7 +204,7 @@ impl Client {
         if self.allowance < 0.0 { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
-    /// Queues the response record of a refused frame. One of the next statuses delivers the response record.
+    /// Queues the response record of a refused frame. The response record is in one of the next statuses.
     pub(super) fn refuse(&mut self, response: Response) -> Result<(), PutOut> {
         self.refusals.push_back(response);
         if self.refusals.len() > REFUSALS_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
@@ -235,8 +235,8 @@ impl Client {
         Some(frame)
     }
 
-    /// Removes the queued frames that need the lease; the remaining frames keep their order. Returns at once if there
-    /// is no such frame, because every Stop calls this function for all clients.
+    /// Removes the queued frames that need the lease; the remaining frames keep their order. Returns at once without
+    /// such a frame, because every Stop calls this function for all clients.
     pub(super) fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();

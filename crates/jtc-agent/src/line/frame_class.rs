@@ -92,7 +92,7 @@ pub(crate) fn may_change_the_arm(frame_type: FrameType) -> bool {
     )
 }
 
-/// Returns the type of the frame with which the controller answers this request, in addition to the response
+/// Returns the type of the frame that the controller sends as the answer to this request, in addition to the response
 /// record.
 pub(super) fn returned_by(request: FrameType) -> Option<FrameType> {
     match request {

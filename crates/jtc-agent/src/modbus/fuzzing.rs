@@ -1,4 +1,4 @@
-//! Body of the fuzz target `modbus_stream`. It uses only this file and the file `pdu` of the crate.
+//! Body of the fuzz target `modbus_stream`. This target uses only this file and the file `pdu` of the crate.
 use super::pdu::{Device, Exception, HEADER_LEN, Header, Table, answer};
 
 /// Longest response, including its header, that the Modbus standard permits, in bytes.
@@ -50,7 +50,7 @@ impl Device for Sixteen {
 ///
 /// # Panics
 ///
-/// One of the checks fails.
+/// Panics if a check fails.
 pub fn modbus_stream(mut data: &[u8]) {
     let mut device = Sixteen::default();
     while let Some((head, rest)) = data.split_first_chunk::<HEADER_LEN>() {

@@ -127,7 +127,7 @@ impl View {
 /// Format of a value in Modbus registers. In a value of two registers, the first register contains the upper 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// One register, unsigned.
+    /// Single register, unsigned.
     U16,
     /// Two registers, unsigned.
     U32,

@@ -236,8 +236,8 @@ mod tests {
     fn whoever_asks_faster_than_it_may_waits() {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
-        // The simulated client sends each request as soon as its previous request was answered. The first requests do
-        // not have to wait; the later requests are limited to the permitted rate.
+        // The simulated client sends each request as soon as its previous request was answered. The first requests need
+        // not wait; the later requests are limited to the permitted rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

@@ -15,7 +15,7 @@ const BEFORE_MAX: usize = 256;
 const REST: Duration = Duration::from_millis(500);
 /// Longest time from the end of a motion to the end of its recording, even if the arm is not completely at rest.
 const OVER: Duration = Duration::from_secs(5);
-/// Time at rest in a pause, or in Teaching if no person moves the arm, after which statuses are no longer recorded. The
+/// Time at rest in a pause, or in Teaching if no person moves the arm, after which the recorder skips statuses. The
 /// recording does not end; it continues when the arm moves.
 const STANDS: Duration = Duration::from_secs(10);
 /// Time for which a Jog is effective (J-58), plus the transmission time of its frame on the serial line.

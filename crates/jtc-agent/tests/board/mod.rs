@@ -9,7 +9,8 @@ use jtc_wire::{DataStatus, FRAME_MAX, FrameType, LinkEvent, Receiver, Response, 
 
 /// Step of the virtual time, µs; at 115,200 Bd, one byte takes 86.8 µs.
 const STEP_US: u64 = 20;
-/// Interval between two calls of the shared line, µs. It equals the longest wait of the thread that owns a real port.
+/// Interval between two calls of the shared line, µs. This interval equals the longest wait of the thread that owns a
+/// real port.
 const TURN_US: u64 = 2000;
 /// Interval between two statuses, µs.
 const REPORT_US: u64 = 15_500;

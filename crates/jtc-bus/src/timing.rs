@@ -14,7 +14,7 @@ pub struct BitTiming {
     pub segment1: u8,
     /// Time quanta after the sample point.
     pub segment2: u8,
-    /// Highest number of quanta by which a resynchronisation may lengthen or shorten the bit.
+    /// Highest number of quanta that a resynchronisation may add to the bit or remove from it.
     pub jump_width: u8,
 }
 

@@ -22,7 +22,7 @@ fn every_frame_with_extreme_payloads() {
     }
 }
 
-/// Tests the number -32768, which a drive can report. It is the only number below the negative full scale.
+/// Tests the number -32768, which a drive can report. This number is the only one below the negative full scale.
 #[test]
 fn the_lowest_numbers() {
     bus_frame(b"\x00\x00\x80\x00\x80\x00\x80\x00\x80\x00\x80\x00\x80\x00\xff\x00\x00\x00");

@@ -93,7 +93,7 @@ fn what_a_client_was_asked_for_before_a_stop_moves_nothing_until_somebody_asks_a
     let served = Served::start(921_600);
     let mut anna = served.operator("anna");
     hold(&mut anna);
-    // Only a refusal by the agent is an error. Whether the controller accepts the jog does not matter.
+    // Only a refusal by the agent is an error. The controller may accept or refuse the jog.
     let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
         Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),
         _ => Ok(()),

@@ -70,7 +70,8 @@ fn a_token_in_an_address_is_the_viewers_for_sockets_that_look_and_is_written_now
         assert_eq!(served.ask(&format!("GET {path}?token={operator}"), &upgrade).0, 403, "{path}");
         let (status, _) = served.ask(&format!("GET {path}?token=0123456789abcdefghij"), &upgrade);
         assert_eq!(status, 401, "{path}");
-        // The viewer's token permits this request. It fails for another reason: it lacks the headers of a WebSocket.
+        // The viewer's token permits this request. The request fails for another reason: it lacks the headers of a
+        // WebSocket.
         assert!(
             ![401, 403].contains(&served.ask(&format!("GET {path}?token={viewer}"), &upgrade).0),
             "{path}"

@@ -1,5 +1,5 @@
 //! Tests of settings and other parameters of a controller by HTTP. The agent refuses changes by other clients, and
-//! changes in the wrong state. It applies all changes of a request, or none of them.
+//! changes in the wrong state. The agent applies all changes of a request, or none of them.
 use crate::common;
 
 use common::Served;

@@ -88,8 +88,8 @@ pub struct Config {
     /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after this
     /// time, the controller treats the moving joints as overloaded, and each of them lowers its load (J-33, J-70).
     pub braking_ms_max: u16,
-    /// Torque with which a yielding joint opposes a slow push, as a share of its torque limit (J-68). A feedback
-    /// torque above this share counts as a push (J-66).
+    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above
+    /// this share counts as a push (J-66).
     pub yield_torque_share: f64,
     /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms within any 100 ms
     /// (J-43). During this time, the controller commands the torque limit, and the integral does not change. With a

@@ -206,7 +206,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         Some(phase) => self.phase = phase,
                         None => {
                             // The controller has already accepted Execute, so it cannot refuse this command any more.
-                            // It stores the cause of the stop for the host.
+                            // The controller stores the cause of the stop for the host.
                             self.keep_cause(StopCause { kind: StopKind::Approach, ..StopCause::default() });
                             self.set_trajectory(TrajectoryState::Stop);
                         }
@@ -228,7 +228,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 } else if !arrived {
                     self.phase = Phase::Approaching { from, length_ms, clock, leave };
                 } else {
-                    // The approach has ended, so it is no longer held back. The path begins at rest.
+                    // The approach has ended, so the controller does not hold it back any more. The path begins at
+                    // rest.
                     self.motion.hold_back.end();
                     if self.clock.time == 0.0 {
                         self.phase = Phase::AtStart;

@@ -17,8 +17,8 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Delay of the derivative torque in addition to [`Config::delay_ticks`], ticks. It is half of the window over which
-/// the derivative is computed, plus half of a tick, because a torque is constant for one tick.
+/// Delay of the derivative torque in addition to [`Config::delay_ticks`], ticks. This delay is half of the window over
+/// which the derivative is computed, plus half of a tick, because a torque is constant for one tick.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Additional delay of the torque of the position error, ticks, on top of [`Config::delay_ticks`].
 const POSITION_AGE: f64 = 0.5;
@@ -38,8 +38,8 @@ const TRIAL_MS: u16 = 2_000;
 /// Time after a change of gains, ms. If a control loop becomes unstable within this time, the controller assumes that
 /// the new gains are the cause.
 const BLAMED_MS: u16 = 10_000;
-/// Factor by which the gains of a joint with an unstable control loop are reduced. If the loop is unstable again
-/// within `AGAIN_MS` (ms) after this reduction, the controller raises an error.
+/// Reduction factor for the gains of a joint with an unstable control loop. If the loop is unstable again within
+/// `AGAIN_MS` (ms) after this reduction, the controller raises an error.
 const SOFTER: f64 = 0.3;
 const AGAIN_MS: u16 = 500;
 
@@ -150,8 +150,7 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
 /// Trial of gains that a host has sent while the torque was on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
-    /// Gains before the trial, which the controller restores if the new gains fail. `None` if there are no such
-    /// gains.
+    /// Gains before the trial, which the controller restores if the new gains fail. `None` without such gains.
     before: Option<[PidGains; JOINTS]>,
     /// Time of the trial in which all joints were settled and no joint yielded, ms.
     held_ms: u16,
@@ -169,8 +168,8 @@ bit_codec!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 bit_codec!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// Begins a trial of the gains `given`, which a host has sent while the torque was on. They replace the gains
-    /// `before`.
+    /// Begins a trial of the gains `given`, which a host has sent while the torque was on. The new gains replace the
+    /// gains `before`.
     pub(crate) fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
         // If the gains in `before` have not held the arm for the whole trial, they may be unstable. The controller

@@ -383,7 +383,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Err(DataStatus::NotAllowed)
             }
             // Execute is refused after a request for Teaching was accepted, during a jog or a held stop, and while
-            // joints are absent (J-53). It is also refused until an arm that a hand has moved is at rest.
+            // joints are absent (J-53). Execute is also refused until an arm that a hand has moved is at rest.
             (_, ExecCommand::Execute)
                 if self.teaching
                     || self.motion.set.is_led()

@@ -41,8 +41,8 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// Largest amount by which rounding can increase a value between two points, rad and rad/s. It is too small to matter
-/// for any limit.
+/// Largest increase of a value between two points because of rounding, rad and rad/s. This increase is too small to
+/// matter for any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// Returns a value that rises smoothly from 0 to 1 for `u` from 0 to 1, with zero slope at both ends.
@@ -162,9 +162,9 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Returns the derivative of the interpolated position (rad/s) at the same time as [`interpolate`]. It is the
-/// velocity of the cubic polynomial plus a correction. The correction is zero if the cubic velocity, integrated from
-/// one point to the other, gives exactly the distance between both points.
+/// Returns the derivative of the interpolated position (rad/s) at the same time as [`interpolate`]. The derivative is
+/// the velocity of the cubic polynomial plus a correction. The correction is zero if the cubic velocity, integrated
+/// from one point to the other, gives exactly the distance between both points.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {

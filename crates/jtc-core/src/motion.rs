@@ -104,8 +104,8 @@ impl Motion {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Returns two flags for each joint. The first is `true` if the joint is at its torque limit. The second is
-    /// `true` if the joint is too far behind its set position.
+    /// Returns two flags for each joint. The first is `true` if the joint is at its torque limit. The second is `true`
+    /// if the joint lags its set position by too much.
     pub(crate) fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let lags = |j: usize| {
             let (error, limit) = self.lag(j, nodes, config);

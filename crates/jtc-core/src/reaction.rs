@@ -124,7 +124,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.hold_stop(&causes, kind);
         }
         if yields != lowers {
-            // If a stop has begun in this tick, the inertia of the arm is already computed. One tick has no time to
+            // If a stop has begun in this tick, the inertia of the arm is already computed. A tick has no time to
             // compute a second mass matrix.
             if self.braking_ms == before {
                 self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);

@@ -43,17 +43,17 @@ pub enum Live {
 /// Kind of a setting, which determines the storage of its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// One number for each joint, stored in the joint limits.
+    /// Number for each joint, stored in the joint limits.
     Joint,
-    /// One number for each joint, stored outside the joint limits.
+    /// Number for each joint, stored outside the joint limits.
     Each,
-    /// One switch for each joint, with the value 0 or 1.
+    /// Switch for each joint, with the value 0 or 1.
     EachSwitch,
-    /// One number for the whole arm.
+    /// Number for the whole arm.
     Number,
-    /// One whole number for the whole arm.
+    /// Whole number for the whole arm.
     Whole,
-    /// One switch for the whole arm, with the value 0 or 1.
+    /// Switch for the whole arm, with the value 0 or 1.
     Switch,
 }
 

@@ -51,8 +51,8 @@ fn is_absent(rig: &Rig, j: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
-    /// For any combination of absent joints, the controller brings up the present joints. It holds them with the
-    /// torque that the model of the whole arm requires.
+    /// For any combination of absent joints, the controller brings up the present joints. The controller holds them
+    /// with the torque that the model of the whole arm requires.
     #[test]
     fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
         let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();

@@ -137,8 +137,8 @@ fn j42_polynomial_order_and_lengths() {
     for j in &rig.controller.telemetry().joints {
         assert!((j.torque_friction - 5.0).abs() < 1e-9, "Coulomb friction only: {}", j.torque_friction);
     }
-    // The frame contains six coefficients, c5..c0. c5 is the reference temperature. It is equal to the joint
-    // temperature of 25 °C, so the temperature factor is 1.
+    // The frame contains six coefficients, c5..c0. c5 is the reference temperature. This temperature is equal to the
+    // joint temperature of 25 °C, so the temperature factor is 1.
     let mut rig = Rig::holding();
     let six = floats((0..6).flat_map(|_| [25.0, -0.02, 0.0, 0.0, 10.0, 2.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &six), DataStatus::NoError);

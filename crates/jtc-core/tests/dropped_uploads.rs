@@ -77,7 +77,7 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
     }
 }
 
-/// A Stop can arrive in any tick while segments wait or are being processed. It must drop these segments together
+/// A Stop can arrive in any tick while segments wait or are being processed. The Stop must drop these segments together
 /// with their upload.
 #[test]
 fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {

@@ -60,7 +60,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// If an encoder jumps during a motion, the arm must not follow the jump. It must come to rest on its true path.
+/// If an encoder jumps during a motion, the arm must not follow the jump. The arm must come to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -172,8 +172,8 @@ fn j35_a_speed_of_another_scale_is_a_held_stop() {
     }
 }
 
-/// If an encoder changes while the motor is at rest, the controller cannot hold this joint. It must therefore report
-/// an error of the drive.
+/// If an encoder changes while the motor is at rest, the controller cannot hold this joint. The controller must
+/// therefore report an error of the drive.
 #[test]
 fn j35_an_encoder_that_slips_is_an_external_error() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -200,8 +200,8 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump does not always occur in a single step. It can pass through an intermediate value, consist of two parts, go
-/// back, or coincide with lost answers or with a jump of another joint. In all these cases, the arm must not move.
+/// A jump does not always occur in a single step. A jump can pass through an intermediate value, consist of two parts,
+/// go back, or coincide with lost answers or with a jump of another joint. In all these cases, the arm must not move.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     // Each course contains offsets of joints 2 and 4 from the true position (rad), each with its start time (ms). The second element of a
@@ -287,8 +287,8 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
                 *last = now;
             }
         }
-        // The positions in this test contain so much noise that the controller may detect a push and end the jog.
-        // Only a detected jump or a wrong scale is a fault.
+        // The positions in this test contain much noise, so the controller may detect a push and end the jog. Only a
+        // detected jump or a wrong scale is a fault.
         let kind = cause(&mut rig).map(|cause| cause.kind);
         let alarm = matches!(kind, Some(StopKind::EncoderJump | StopKind::SpeedScale));
         assert!(!alarm && rig.state() == ControllerState::HoldPos, "seed {}: {kind:?}", seed + 1);

@@ -1,5 +1,6 @@
-//! Tests of the bounds of friction parameters from a host (J-06, J-42). The controller accepts all values that occur
-//! on arms with these drives. It refuses values with which the friction compensation itself would drive the arm.
+//! Tests of the bounds of friction parameters from a host (J-06, J-42). The controller accepts all values that occur on
+//! arms with these drives. The controller refuses values that would make the friction compensation itself drive the
+//! arm.
 use crate::rig;
 
 use jtc_core::{Config, Friction, Parameters, TableOf};

@@ -101,8 +101,8 @@ fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     }
 }
 
-/// The controller accepts gains that are in use on arms like this one. It refuses gains that are in use on a heavier
-/// arm, because they are not suitable for this arm.
+/// The controller accepts gains that are in use on arms like this one. The controller refuses gains that are in use on
+/// a heavier arm, because they are not suitable for this arm.
 #[test]
 fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
     let stronger = of([

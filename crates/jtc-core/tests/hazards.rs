@@ -26,8 +26,8 @@ fn j16_drives_that_lost_their_supply_are_configured_again() {
     rig.defaults();
     rig.until(300, |r| r.nodes[2].configured && r.nodes[2].report.state == NodeState::INIT);
     rig.run(1);
-    // An emergency stop also cuts the supply of the drives. At this time, the drives are configured but still in
-    // Init. They must be configured again afterwards.
+    // An emergency stop also cuts the supply of the drives. At this time, the drives are configured but still in Init.
+    // The drives must be configured again afterwards.
     rig.safety_input = false;
     rig.run(3);
     for node in &mut rig.nodes {

@@ -99,8 +99,8 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// While the controller catches the load of a joint that was just enabled, it tolerates a swing of this joint. It
-/// must not tolerate a swing that unstable gains cause.
+/// While the controller catches the load of a joint that was just enabled, it tolerates a swing of this joint. The
+/// controller must not tolerate a swing that unstable gains cause.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {

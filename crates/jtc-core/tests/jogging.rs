@@ -95,7 +95,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
 }
 
 /// A Stop, a Pause, a released key or missing Jog frames must bring a jog to rest within 520 ms, even at the velocity
-/// limit. The same time limit applies to a Stop on a path.
+/// limit. This time limit also applies to a Stop on a path.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {
@@ -227,8 +227,8 @@ fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
 }
 
 /// Joint 2 needs nearly all of its torque limit to hold its load. The controller must refuse each jog that increases
-/// this load: upwards, downwards to a pose with a higher load, and joint 3 outwards. It must accept a jog downwards
-/// that reduces the load. If half of the torque limit remains, it must execute every jog.
+/// this load: upwards, downwards to a pose with a higher load, and joint 3 outwards. The controller must accept a jog
+/// downwards that reduces the load. If half of the torque limit remains, it must execute every jog.
 #[test]
 fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unloads_it_is_taken() {
     let model = Parameters::avena().model;
@@ -340,8 +340,8 @@ fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     }
 }
 
-/// The controller needs time to compute the torque that remains for a jog. It therefore processes only one Jog frame
-/// per tick, even if it refuses this frame.
+/// The controller needs time to compute the torque that remains for a jog. The controller therefore processes only one
+/// Jog frame per tick, even if it refuses this frame.
 #[test]
 fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     let pose = [0.0, 1.2, 0.2, 0.0, 0.0, 0.0];

@@ -226,8 +226,8 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         let from = rig.sent.len();
         rig.until(30, |r| r.state() == ControllerState::Error);
         assert_eq!(rig.status().can_current, 1 << (8 + node));
-        // The answer to the last Move before the silence still arrives. Only after this answer do five answers have
-        // to be missing.
+        // The answer to the last Move before the silence still arrives. The five missing answers count only after this
+        // answer.
         let moves = rig.sent[from..].iter().take_while(|r| matches!(r, Request::Move { .. })).count();
         assert!(moves >= 5);
         let mut rig = Rig::holding();

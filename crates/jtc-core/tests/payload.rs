@@ -221,8 +221,8 @@ fn j60_j58_joints_are_not_jogged_on_the_way_and_a_payload_is_not_set_while_they_
     assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
 }
 
-/// The controller must refuse a payload that a joint cannot hold in its present position, or that is not a valid
-/// body. It must never apply a part of a refused payload.
+/// The controller must refuse a payload that a joint cannot hold in its present position, or that is not a valid body.
+/// The controller must never apply a part of a refused payload.
 #[test]
 fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);
@@ -385,8 +385,8 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// If the host sets a centre of mass but no mass, this is not a payload. It must not reduce the load that Teaching
-/// holds.
+/// If the host sets a centre of mass but no mass, this is not a payload. This setting must not reduce the load that
+/// Teaching holds.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -200,8 +200,8 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
 /// of 100 to 180 rad/s² accelerates such a joint to its over-speed within 12 ms, but the speed that its drive reports
 /// is 8 ms old.
 ///
-/// Of these 192 pushes, more than 80 release the arm without supervision of the speed. With supervision of the
-/// reported speed alone, 18 pushes release the arm.
+/// More than 80 of these 192 pushes release the arm without supervision of the speed. With supervision of the reported
+/// speed alone, 18 pushes release the arm.
 #[test]
 fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
     let released =

@@ -199,8 +199,8 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
     assert!(cuts > 200, "{cuts}");
 }
 
-/// After any damage of the memory, the reader must return only data that were written. It must return all data from
-/// undamaged blocks that follow a snapshot.
+/// After any damage of the memory, the reader must return only data that were written. The reader must return all data
+/// from undamaged blocks that follow a snapshot.
 #[test]
 fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     let mut rig = holding();
@@ -376,7 +376,7 @@ fn j56_a_payload_on_its_way_is_replayed() {
     let blocks = blocks(&rig);
     let first = contents(&blocks).1.into_iter().find(|tick| *tick > given).expect("a snapshot");
     assert!(first < given + 300, "it comes while the payload is on its way: {given} {first}");
-    // The controller of the replay has no payload at first. It must get the payload from the snapshot.
+    // The controller of the replay has no payload at first. This controller must get the payload from the snapshot.
     let mut other = Rig::new(Config::avena());
     other.defaults();
     let replay = Replay::new(Log::new(&blocks), other.controller, None);

@@ -163,8 +163,8 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
         }
     }
-    // The controller accepts a clear that also selects the joint with the fault. It also accepts a clear while this
-    // joint is already being cleared.
+    // The controller accepts a clear that also selects the joint with the fault. The controller also accepts a clear
+    // while this joint is already being cleared.
     for joint_first in [false, true] {
         let mut rig = Rig::holding();
         rig.nodes[4].report.state = NodeState::FAULT;
@@ -429,8 +429,8 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // The device error is latched. It sets the bit for internal errors that come neither from a joint nor from the
-    // bus.
+    // The device error is latched. This error sets the bit for internal errors that come neither from a joint nor from
+    // the bus.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

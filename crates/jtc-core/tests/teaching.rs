@@ -7,8 +7,8 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns the distances by which a hand moves the joints from a pose, rad. After this motion, no joint is so close
-/// to a position limit that the spring at the limit (soft end) acts on it.
+/// Returns how far a hand moves the joints from a pose, rad. After this motion, no joint is so close to a position
+/// limit that the spring at the limit (soft end) acts on it.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]

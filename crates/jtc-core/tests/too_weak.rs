@@ -51,8 +51,8 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
     }
 }
 
-/// The controller checks that the torque limits can hold the arm only when it begins to hold the arm. It must not
-/// check this while a hand moves the arm.
+/// The controller checks that the torque limits can hold the arm only when it begins to hold the arm. The controller
+/// must not check this while a hand moves the arm.
 #[test]
 fn j06_the_model_is_judged_where_init_ends() {
     let mut rig = Rig::new(weak());

@@ -225,8 +225,8 @@ mod tests {
 
     #[test]
     fn j43_torque_at_its_limit_counts_within_any_100_ms_whichever_sign() {
-        // One tick in every ten is above the limit, which is ten ticks in 100 ms and is allowed. One tick in every
-        // nine is more than ten ticks in 100 ms, which is an overload.
+        // If every tenth tick is above the limit, this is ten ticks in 100 ms, which is allowed. If every ninth tick is
+        // above the limit, this is more than ten ticks in 100 ms, which is an overload.
         for (period, allowed) in [(10, true), (9, false)] {
             let (l, mut saturation) = (limits(), Saturation::default());
             let mut good = true;

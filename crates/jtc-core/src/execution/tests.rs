@@ -75,7 +75,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     for (trajectory, ms, goes_on, error) in [
         (TrajectoryState::Execute, most - 1, true, 0),
         (TrajectoryState::Execute, most, false, joint_error::TORQUE),
-        // In the next cases the arm is already held, but an external force still moves it. This is no error.
+        // In the next cases the arm is already held, but an external force still moves it. This is not an error.
         (TrajectoryState::Pause, most - 1, true, 0),
         (TrajectoryState::Pause, most, false, 0),
     ] {

@@ -61,7 +61,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
             // The board could not write the arm, so its next start would use another arm. Therefore the controller
-            // discards the stored arm. It has no stored arm until a host stores one again.
+            // discards the stored arm. The controller has no stored arm until a host stores one again.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }

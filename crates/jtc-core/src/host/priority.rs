@@ -27,8 +27,8 @@ impl Priority {
     }
 
     /// Returns the data status of an execution command that arrived before an urgent Stop or Pause took effect. An
-    /// Execute is refused. A Stop or Pause succeeds if it was accepted as an urgent command. It also succeeds if an
-    /// Execute was cancelled and the `trajectory` is in the state that the command requests.
+    /// Execute is refused. A Stop or Pause succeeds if it was accepted as an urgent command. This command also succeeds
+    /// if an Execute was cancelled and the `trajectory` is in the state that the command requests.
     pub(crate) fn overtaken(
         &mut self,
         exec: ExecCommand,

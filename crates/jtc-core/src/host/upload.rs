@@ -27,8 +27,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
-            // If the controller has left HoldPos while it processes a segment, it has cleared the trajectory. It then
-            // refuses the segment.
+            // If the controller has left HoldPos while it processes a segment, it has cleared the trajectory. The
+            // controller then refuses the segment.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
         // `true` if this segment arrived before a Stop that has already taken effect.

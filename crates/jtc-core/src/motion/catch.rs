@@ -28,7 +28,7 @@ pub(crate) struct Catch {
     busy_ms: u16,
     /// `true` if the joint has been calm for `CALM_MS` at least once since it was enabled.
     settled: bool,
-    /// Total sag of the set position, rad. It can grow in one direction only.
+    /// Total sag of the set position, rad. The sag can grow in one direction only.
     sag: f64,
     /// Highest speed of the present half swing, with its sign, rad/s. `peak_before` is the highest speed of the half
     /// swing before it.
@@ -119,7 +119,7 @@ impl Catch {
     /// Returns the change of the set position, rad. `excess` is the computed torque above the limit (N·m), and
     /// `error` is the position error (rad).
     ///
-    /// The catch ends if the sag would exceed the position error limit. It also ends if the sag would change its
+    /// The catch ends if the sag would exceed the position error limit. The catch also ends if the sag would change its
     /// direction, because the joint then swings between both torque limits.
     pub(crate) fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         // The set position moves at most to the measured position of the joint.

@@ -38,8 +38,8 @@ pub(crate) struct Deceleration {
 bit_codec!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// Creates the deceleration of a joint that a hand has guided. It starts at a measured position (rad) and
-    /// velocity (rad/s) and takes `length_ms`. The start velocity is clipped to the velocity limit.
+    /// Creates the deceleration of a joint that a hand has guided. The deceleration starts at a measured position (rad)
+    /// and velocity (rad/s) and takes `length_ms`. The start velocity is clipped to the velocity limit.
     pub(crate) fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }

@@ -200,8 +200,8 @@ impl JointJog {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
             // If a joint still accelerates when its jog ends, it becomes faster until its acceleration has fallen to
-            // zero. It may then reach its earlier commanded velocity. Rounding to whole ticks can add a few µrad/s,
-            // so the velocity is limited.
+            // zero. The joint may then reach its earlier commanded velocity. Rounding to whole ticks can add a few
+            // µrad/s, so the velocity is limited.
             let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
             let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / tick };

@@ -31,10 +31,10 @@ pub(crate) enum ControlMode {
     /// Mode for a motion on the path. Gravity, PID, friction compensation, and inertia at the commanded velocity and
     /// acceleration are active.
     Follow,
-    /// Mode for the approach to the path. It is like `Follow`, but the limits of the path do not apply, because the
-    /// approach begins at the measured position.
+    /// Mode for the approach to the path. This mode is like `Follow`, but the limits of the path do not apply, because
+    /// the approach begins at the measured position.
     Approach,
-    /// Mode for an arm that a hand has moved and that comes to rest before it is held. It is like `Hold`, with
+    /// Mode for an arm that a hand has moved and that comes to rest before it is held. This mode is like `Hold`, with
     /// additional friction compensation and inertia at the commanded velocity and acceleration.
     Rest,
     /// Gravity and the torques for hand guiding are active (J-25).
@@ -88,7 +88,7 @@ pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
     /// Torque of each joint in the last tick, by parts.
     pub torque: [JointTorque; JOINTS],
-    /// State of Teaching. It exists only during Teaching, and the flight recorder does not store it.
+    /// State of Teaching. This state exists only during Teaching, and the flight recorder does not store it.
     pub(super) taught: Option<Taught>,
     transfer: Transfer,
     /// State of the joints that yield or lower a load (J-68, J-70).

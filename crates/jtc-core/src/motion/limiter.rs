@@ -19,8 +19,8 @@ const FAST: f64 = 0.2;
 /// the joint counts as pushed (J-66).
 const PUSHED_MS: u16 = 20;
 /// Excess of a joint's speed over the commanded speed, as a share of its velocity limit. `RUSH_WAY` is the distance
-/// by which the joint is ahead of its set position, rad. A joint above both values counts as pushed. With weak gains,
-/// a pushed joint with little inertia exceeds its speed limit before its feedback torque shows the push.
+/// from the set position to a joint ahead of it, rad. A joint above both values counts as pushed. With weak gains, a
+/// pushed joint with little inertia exceeds its speed limit before its feedback torque shows the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
@@ -165,7 +165,7 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // The distance is checked first. It is rarely above its limit, so the other conditions are rarely
+            // The distance is checked first. The distance is rarely above its limit, so the other conditions are rarely
             // evaluated.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
@@ -342,8 +342,8 @@ mod tests {
         }
     }
 
-    /// A joint that comes to rest after Teaching may meet a person. It counts as pushed if it is slower than 0.7
-    /// times its set velocity while its feedback torque acts along the motion. The joint need not have settled.
+    /// A joint that comes to rest after Teaching may meet a person. Such a joint counts as pushed if it is slower than
+    /// 0.7 times its set velocity while its feedback torque acts along the motion. The joint need not have settled.
     #[test]
     fn j25_j66_a_joint_that_lags_on_the_way_to_rest_is_pushed() {
         for (mode, shares, share, pushed) in [
@@ -385,8 +385,8 @@ mod tests {
         }
     }
 
-    /// A set acceleration above its limit is no error while the path is held back, or while an arm comes to rest
-    /// after hand guiding. While a commanded motion brakes, a position error is no error either.
+    /// A set acceleration above its limit is not an error while the path is held back, or while an arm comes to rest
+    /// after hand guiding. While a commanded motion brakes, a position error is not an error either.
     #[test]
     fn j33_j66_errors_of_the_set_values_are_excused_where_the_controller_causes_them() {
         let (position, acceleration) = (joint_error::POSITION_ERROR, joint_error::ACCELERATION);

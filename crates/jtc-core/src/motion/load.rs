@@ -176,8 +176,8 @@ mod tests {
         }
     }
 
-    /// The limit is 100 N·m, so a difference of 10 N·m is not a contact. One observation in 6 ms changes the load by 10 N·m · 6 ms / 1 s =
-    /// 0.06 N·m.
+    /// The limit is 100 N·m, so a difference of 10 N·m is not a contact. An observation in 6 ms changes the load by 10
+    /// N·m · 6 ms / 1 s = 0.06 N·m.
     #[test]
     fn j66_a_difference_of_exactly_ten_percent_of_the_limit_is_not_a_contact() {
         for sign in [1.0, -1.0] {

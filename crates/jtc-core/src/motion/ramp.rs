@@ -19,8 +19,8 @@ const RAMP_TORQUE: f64 = 0.95;
 /// Share of the remaining torque that a stop uses at most after a hand has moved the arm. The rest is a reserve,
 /// because the position controller produces the torque of this stop and overshoots.
 const STOP_TORQUE: f64 = 0.5;
-/// Least share of the torque limit that is available for a stop. It applies even if the holding torque leaves hardly
-/// any torque.
+/// Least share of the torque limit that is available for a stop. This share applies even if the holding torque leaves
+/// hardly any torque.
 const LEAST_LEFT: f64 = 0.1;
 
 /// Inertia of the arm at the start of a ramp.
@@ -275,8 +275,8 @@ mod tests {
             // 312.5 ms.
             (coupled, [-0.25, -0.5], [torque(60.0, 4.0), torque(0.0, 0.0)], 312.5),
             (coupled, [-0.25, -0.5], [torque(100.0, 4.0), torque(0.0, 0.0)], 312.5),
-            // Without a holding torque, half of 64 N·m is available. One joint has a momentum of 4 kg·m²/s, so the
-            // stop takes 2·4 / 32 s = 250 ms. The other joint needs less time.
+            // Without a holding torque, half of 64 N·m is available. The first joint has a momentum of 4 kg·m²/s, so
+            // the stop takes 2·4 / 32 s = 250 ms. The other joint needs less time.
             ([[2.0, 0.0], [0.0, 4.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
             ([[8.0, 0.0], [0.0, 1.0]], [0.5, -1.0], [torque(0.0, 0.0), torque(0.0, 0.0)], 250.0),
             // The motion of joint 2 causes a momentum of joint 1 that cancels the own momentum of joint 1.
@@ -320,8 +320,8 @@ mod tests {
         assert!(after_250_ms(slows).rate > 0.5);
     }
 
-    /// Joint 1 needs 60 N·m, 10 N·m above its limit of 50 N·m. It has 2 kg·m² and moves at 1 rad/s, so a slope of −5
-    /// 1/s removes these 10 N·m. In one tick, the slope of path time changes by a tenth of the difference to −5 1/s.
+    /// Joint 1 needs 60 N·m, 10 N·m above its limit of 50 N·m. Joint 1 has 2 kg·m² and moves at 1 rad/s, so a slope of
+    /// −5 1/s removes these 10 N·m. In one tick, the slope of path time changes by a tenth of the difference to −5 1/s.
     #[test]
     fn j75_path_time_that_is_held_back_follows_the_slope_at_the_torque_limit() {
         let config = limited(50.0);

@@ -212,7 +212,7 @@ impl Motion {
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
             // A joint may always use a small torque to move to a position with a lower holding torque. This does not
-            // apply if the joint would have to lift its load with more than the torque limit.
+            // apply if the joint needs more than the torque limit to lift its load.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;

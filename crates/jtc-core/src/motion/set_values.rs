@@ -148,7 +148,7 @@ impl SetValues {
                 self.decelerate(j, led, config);
                 self.led = true;
             } else {
-                // This joint is not held. It gets its set position when it is enabled.
+                // This joint is not held. The joint gets its set position when it is enabled.
                 self.commanded.begin(j, from[j], 0.0, 0);
             }
         }
@@ -264,8 +264,8 @@ impl SetValues {
         }
     }
 
-    /// Executes one tick on the path or during the approach. `at` contains the set values for full speed. They are
-    /// scaled with the `rate` of path time and with its `slope` (1/s) (J-33).
+    /// Executes one tick on the path or during the approach. `at` contains the set values for full speed. The set
+    /// values are scaled with the `rate` of path time and with its `slope` (1/s) (J-33).
     pub(crate) fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     /// Executes one tick in which the next torque is zero, and returns the remaining torque steps of the joints. `last`
-    /// is the torque of the tick before. It matters only in the first tick after a change of state.
+    /// is the torque of the tick before. This torque matters only in the first tick after a change of state.
     fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
         let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);
@@ -207,8 +207,8 @@ mod tests {
     }
 
     /// The torques change again `ms` after joint 3 has begun to yield. If the torque of joint 3 is still falling at
-    /// this time, it reaches its new value within the next 10 ms. If it is no longer falling, it is blended out like
-    /// that of the other joints. After 10 of 100 ms, 1 - 3 · 0.1² + 2 · 0.1³ = 0.972 of the step is left.
+    /// this time, it reaches its new value within the next 10 ms. If this torque does not fall any more, it is blended
+    /// out like that of the other joints. After 10 of 100 ms, 1 - 3 · 0.1² + 2 · 0.1³ = 0.972 of the step is left.
     #[test]
     fn j44_j68_a_torque_that_falls_goes_on_falling_when_another_joint_yields() {
         for (ms, falls) in [(1, true), (5, true), (9, true), (10, false), (15, false)] {

@@ -111,8 +111,7 @@ pub(crate) struct Yield {
     calm_ms: u16,
     /// Number of consecutive missing answers of the joint.
     missing: u8,
-    /// Distance by which the joint has sunk in the direction of gravity, rad. `sinks_ms` is the time of this motion,
-    /// ms.
+    /// Distance that the joint has sunk in the direction of gravity, rad. `sinks_ms` is the time of this motion, ms.
     sunk: f64,
     sinks_ms: u16,
 }
@@ -222,8 +221,8 @@ impl Yield {
         self.lowers || self.load != self.least
     }
 
-    /// Returns the torque that the position controller must produce after the yield, N·m. It is the load plus the
-    /// torque of the `spring` (N·m): a spring that opposes the load reduces it, and a spring that helps to hold the
+    /// Returns the torque that the position controller must produce after the yield, N·m. This torque is the load plus
+    /// the torque of the `spring` (N·m): a spring that opposes the load reduces it, and a spring that helps to hold the
     /// joint increases it. The result is never larger than the load at the beginning of the yield.
     pub(crate) fn left(&self, spring: f64) -> f64 {
         if self.lowers {
@@ -262,7 +261,8 @@ impl Yield {
         };
         self.damping += SETTLES * (damping - self.damping);
         // The brake has no effect in the first tick of a yield. The transfer compares the torque of this tick with the
-        // last torque. It would treat a brake torque as a part of the step and would let it act only gradually.
+        // last torque. The transfer would treat a brake torque as a part of the step and would let it act only
+        // gradually.
         let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
         let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);

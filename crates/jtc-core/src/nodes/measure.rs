@@ -6,10 +6,10 @@
 //! usable answer after missing answers differs from the prediction by an *offset*. The offset fades, so that missing
 //! and returning answers do not cause a step of the position or of the derivative of the position error.
 //!
-//! A *late* answer ([`Lateness`]) belongs to the time at which it was due. It is compared with the prediction for
-//! that time, and the new prediction starts from it. A late answer that is close to its prediction is used directly,
-//! like an answer that arrives on time. If it caused a fading offset in each tick, the offset would act as a filter
-//! in the position loop, and the loop would oscillate.
+//! A *late* answer ([`Lateness`]) belongs to the time at which it was due. The answer is compared with the prediction
+//! for that time, and the new prediction starts from it. A late answer that is close to its prediction is used
+//! directly, like an answer that arrives on time. If it caused a fading offset in each tick, the offset would act as a
+//! filter in the position loop, and the loop would oscillate.
 //!
 //! The offset is not a part of the prediction. The prediction depends only on answers and commands, so the position
 //! loop stays closed even if many answers are lost.
@@ -146,7 +146,7 @@ pub(crate) struct Measurement {
     commanded: f64,
     /// Rate at which the positions in the answers changed at the time of the last usable answer, rad/s.
     rate: f64,
-    /// Rate that the prediction uses, rad/s. It is limited to values near the reported velocity.
+    /// Rate that the prediction uses, rad/s. The rate is limited to values near the reported velocity.
     carried: f64,
     /// Last usable answers of the joint.
     history: History,
@@ -343,8 +343,8 @@ impl Measurement {
         self.take(&tick, late, config)
     }
 
-    /// Uses the answer of a tick if it is usable. The function is inlined: where no answer is late, the compiler can
-    /// then remove half of its code.
+    /// Uses the answer of a tick if it is usable. The function is inlined: if no answer is late, the compiler can then
+    /// remove half of its code.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -439,8 +439,8 @@ impl Measurement {
     /// Turns the difference between the answer of this tick and `predicted` into an offset that fades, so that the
     /// difference does not cause a step.
     ///
-    /// An answer close to its prediction (`in_its_place`) causes no step, so it adds no offset. It reduces the
-    /// remaining offset of earlier differences, which would otherwise add up.
+    /// An answer close to its prediction (`in_its_place`) causes no step, so it adds no offset. Such an answer reduces
+    /// the remaining offset of earlier differences, which would otherwise add up.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;

@@ -81,7 +81,7 @@ impl Differs {
         limits: &JointConfig,
         config: &Config,
     ) -> bool {
-        // `twist` is the angle by which the gear can have twisted since the last check, because the torque has
+        // `twist` is the possible change of the gear's twist angle since the last check, because the torque has
         // changed.
         let twist = (node.report.torque - f64::from(before)).abs() / config.gear_stiffness;
         if ways.unexplained().abs() <= ways.tolerance(config) + twist {

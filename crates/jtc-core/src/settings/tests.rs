@@ -102,7 +102,7 @@ fn j53_the_message_of_an_error_names_the_joint_of_the_setting() {
     );
 }
 
-/// One principal moment of this payload (1 kg·m²) exceeds the sum of the other two (0.2 kg·m²), so the payload is not
+/// A principal moment of this payload (1 kg·m²) exceeds the sum of the other two (0.2 kg·m²), so the payload is not
 /// valid. The check of the moments takes too long during a motion, so another setting must not cause this check.
 #[test]
 fn j07_j60_a_payload_is_checked_only_when_it_changes() {

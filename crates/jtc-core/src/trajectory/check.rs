@@ -1,11 +1,12 @@
 //! Check of a trajectory during its upload, point by point, before the arm moves (J-36).
 //!
 //! Between two points (J-32), the commanded velocity is a cubic polynomial and the commanded position is a quintic
-//! polynomial. The derivative of the position is a quartic polynomial. It differs from the commanded velocity if the
-//! distance between the points is not equal to the integral of the cubic. The difference has the shape of a bump. In
-//! Bernstein form, each curve lies within the convex hull of a few control points. An interval passes the check at
-//! once if a rough estimate of the hulls of its curves is within the limits (`screen`). For any other interval, the
-//! check halves the curves until the hull is within the limits or a point of the curve is outside (`curve`).
+//! polynomial. The derivative of the position is a quartic polynomial. This derivative differs from the commanded
+//! velocity if the distance between the points is not equal to the integral of the cubic. The difference has the shape
+//! of a bump. In Bernstein form, each curve lies within the convex hull of a few control points. An interval passes the
+//! check at once if a rough estimate of the hulls of its curves is within the limits (`screen`). For any other
+//! interval, the check halves the curves until the hull is within the limits or a point of the curve is outside
+//! (`curve`).
 //!
 //! The wire format rounds positions to steps of 96 µrad. The derivative of the rounded positions can exceed a limit
 //! that the path itself does not exceed. The check therefore reduces the distance of each interval by one rounding

@@ -43,8 +43,8 @@ pub(crate) struct SlopeBounds {
     pub full: Bounds,
 }
 
-/// Factor by which a slope can change faster than in a normal ramp. The factor applies to a slope in the wrong
-/// direction, for example if a pause begins during a resume. It also applies to a hurried stop.
+/// Factor for the change of a slope, compared with a normal ramp. The factor applies to a slope in the wrong direction,
+/// for example if a pause begins during a resume. The factor also applies to a hurried stop.
 const REVERSAL: f64 = 8.0;
 /// Filter coefficient of the slope while a path is held back: change of the slope per tick, as a fraction of its
 /// difference to the target slope.
@@ -92,8 +92,8 @@ impl PathClock {
         self.slope = 0.0;
     }
 
-    /// Sets the target rate of path time, except if path time is to stop (target rate 0). Returns `true` if the
-    /// target rate has changed.
+    /// Sets the target rate of path time, except if path time must stop (target rate 0). Returns `true` if the target
+    /// rate has changed.
     pub(crate) fn set_pace(&mut self, pace: f64) -> bool {
         let changes = self.target != 0.0 && self.target != pace;
         if changes {

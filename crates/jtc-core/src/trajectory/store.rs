@@ -359,8 +359,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         // reached. The conversion with `as` saturates, so a negative time or a time of NaN results in point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
-        // At a point and at the last point, the interpolation has no effect. It is computed nevertheless, because
-        // every tick must do the same work.
+        // At a point and at the last point, the interpolation has no effect. The interpolation is computed
+        // nevertheless, because every tick must do the same work.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),

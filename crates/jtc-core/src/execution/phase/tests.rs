@@ -35,7 +35,7 @@ fn j34_only_the_wait_before_the_approach_waits_for_the_joints() {
     assert!(!approaching(0.0, 1.0, None).waits());
 }
 
-/// A path goes on until the controller accepts a Pause or a Stop. The same applies to an approach after its first
+/// A path goes on until the controller accepts a Pause or a Stop. This also applies to an approach after its first
 /// tick. Before this tick, the arm does not move.
 #[test]
 fn j75_a_motion_goes_on_until_a_pause_or_stop() {

@@ -20,8 +20,8 @@ fn slowed(rate: f64) -> PathClock {
     clock
 }
 
-/// Returns a controller on the path at half speed, which has just begun to hold back the path. It has not computed
-/// the inertia of the arm yet.
+/// Returns a controller on the path at half speed, which has just begun to hold back the path and has not computed the
+/// inertia of the arm yet.
 fn held_back() -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
     (controller.phase, controller.clock, controller.braking_ms) =

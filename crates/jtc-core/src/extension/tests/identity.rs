@@ -129,7 +129,7 @@ fn j54_only_a_storage_that_failed_discards_the_stored_arm() {
     }
 }
 
-/// The image contains other settings, another name, a friction table and other gains. One value is not finite, so the
+/// The image contains other settings, another name, a friction table and other gains. A value is not finite, so the
 /// controller refuses the image and changes nothing.
 #[test]
 fn j54_an_image_that_is_refused_changes_nothing() {

@@ -27,8 +27,8 @@ fn arm(host: u8) -> Vec<Vec<u8>> {
 
 proptest! {
     /// Two hosts send parameters at the same time. For each kind of parameter, the controller uses the last accepted
-    /// frame of either host. It never mixes the values of two frames, although it may need many ticks for a frame.
-    /// Each host receives the response records and answers to its own frames, in their order.
+    /// frame of either host. The controller never mixes the values of two frames, although it may need many ticks for a
+    /// frame. Each host receives the response records and answers to its own frames, in their order.
     #[test]
     fn j04_j53_two_hosts_with_different_arms_do_not_mix_within_a_frame(
         first in prop::collection::vec(any::<bool>(), 1..40),

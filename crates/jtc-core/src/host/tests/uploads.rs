@@ -51,7 +51,7 @@ fn j30_a_stop_after_segment_0_refuses_the_upload_or_its_execution() {
     }
 }
 
-/// Segment 0 came on a plain line. The host has used an extension since then, so the line is no longer plain. A Stop
+/// Segment 0 came on a plain line. The host has used an extension since then, so the line is not plain any more. A Stop
 /// nevertheless does not refuse the later segment, but the controller refuses Execute.
 #[test]
 fn j30_j51_a_stop_does_not_refuse_a_later_segment_of_an_upload_that_began_plain() {

@@ -263,7 +263,7 @@ fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
     assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
 }
 
-/// The braking torque is reduced to the part that the torque limit leaves. It never changes its sign.
+/// The braking torque is reduced to the part that the torque limit leaves. The braking torque never changes its sign.
 #[test]
 fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     for (wanted, torque, taken) in [

@@ -262,8 +262,8 @@ fn j58_the_holding_torque_contains_the_load_or_the_integral() {
     }
 }
 
-/// While the integral releases the torque of a configured payload, the model already contains this torque. It must
-/// not count twice, so the holding torque is gravity alone.
+/// While the integral releases the torque of a configured payload, the model already contains this torque. The torque
+/// must not count twice, so the holding torque is gravity alone.
 #[test]
 fn j60_gravity_alone_holds_the_arm_while_the_integral_releases_torque() {
     for (ms, torque) in [(0, 15.0), (1, 10.0), (3_000, 10.0)] {

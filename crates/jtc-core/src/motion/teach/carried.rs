@@ -34,8 +34,8 @@ const MISSED: f64 = 0.1;
 pub(super) struct Carried {
     /// Part of the load torque that does not come from the estimated mass at the flange, N·m.
     pub rest: f32,
-    /// Highest load torque that can act in Teaching, N·m. It is the learned torque or the highest torque that the
-    /// controller can learn, whichever is higher.
+    /// Highest load torque that can act in Teaching, N·m. This limit is the learned torque or the highest torque that
+    /// the controller can learn, whichever is higher.
     most: f32,
     /// Share of the load that does not act because the joint moves too fast in the direction of the load.
     left_out: f32,

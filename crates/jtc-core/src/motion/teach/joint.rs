@@ -20,8 +20,8 @@ const GROWN: f64 = 1.0;
 /// Speeds between which a braking torque is added to the damping, rad/s. Without this torque, a fast joint would
 /// reach the over-speed threshold, and the arm would be released.
 ///
-/// `BRAKE` is the deceleration by the braking torque, rad/s². It is so low that a joint cannot reverse before the
-/// controller measures the reversal.
+/// `BRAKE` is the deceleration by the braking torque, rad/s². This deceleration is so low that a joint cannot reverse
+/// before the controller measures the reversal.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
 /// Speed above which Teaching ends and the controller brings the joint to rest, in rad/s and as a share of the over-speed threshold (J-35).
@@ -86,10 +86,10 @@ pub(crate) struct TaughtJoint {
     inertia: f32,
     /// Torque of damping and friction against the motion in the last tick, N·m.
     against: f32,
-    /// Filtered position of the joint, rad. It lags behind the joint by a distance that is proportional to the speed.
+    /// Filtered position of the joint, rad. The lag of this position is proportional to the speed.
     behind: f32,
-    /// Number of consecutive missing answers. `lost` counts the steps by which springs and damping have faded because
-    /// of missing answers. At 2 · [`LETS_GO`], both are zero.
+    /// Number of consecutive missing answers. `lost` counts the steps of the fading of springs and damping because of
+    /// missing answers. At 2 · [`LETS_GO`], both are zero.
     missing: u8,
     lost: u8,
 }

@@ -64,7 +64,7 @@ fn j25_friction_never_becomes_a_great_mass() {
 }
 
 proptest! {
-    /// The estimated mass becomes smaller by the given mass, at most to zero. It never changes its sign.
+    /// The estimated mass becomes smaller by the given mass, at most to zero. This mass never changes its sign.
     #[test]
     fn j60_a_mass_that_is_given_goes_from_the_one_that_was_found(found in -3.0..3.0f32, given in prop::collection::vec(-4.0..4.0f64, 1..8)) {
         let mut taught = Taught { found, mass: found, ..Taught::default() };
@@ -183,8 +183,8 @@ fn j25_a_mass_that_is_missed_comes_back() {
     assert!(driven.taught.mass > 0.0 && driven.taught.found <= 0.51, "{} kg", driven.taught.found);
 }
 
-/// In each round, Teaching computes the inertia and the friction of every joint once. It compares the load with the
-/// motion six times, and reserves one tick for the inertia of the whole arm.
+/// In each round, Teaching computes the inertia and the friction of every joint once. Teaching compares the load with
+/// the motion six times, and reserves one tick for the inertia of the whole arm.
 #[test]
 fn j25_each_round_computes_all_that_changes_slowly() {
     let of =

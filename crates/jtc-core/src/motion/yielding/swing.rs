@@ -8,7 +8,7 @@ const HALF_SPEED: f32 = 0.15;
 /// Lowest speed of the second half of a swing, as a share of the speed of the first half. When a spring moves a joint
 /// back after a sudden push, the second half is slower and does not count as a swing.
 const LASTS: f32 = 0.5;
-/// Factor by which each swing multiplies `soft`. `SOFTEST` is the lowest value of `soft`.
+/// Each swing multiplies `soft` by this factor. `SOFTEST` is the lowest value of `soft`.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
 /// Time without a swing after which `soft` increases by its first step, ms, and time between two further steps, ms.
@@ -20,7 +20,7 @@ pub(super) struct Swing {
     /// Highest speed in the present direction, with its sign, rad/s. `half_ms` is the time in this direction, ms.
     peak: f32,
     half_ms: u8,
-    /// Highest speed of the previous half swing, rad/s. It is 0 if the previous motion was not half a swing.
+    /// Highest speed of the previous half swing, rad/s. The speed is 0 if the previous motion was not half a swing.
     before: f32,
     /// Factor that makes spring, damper and brake softer. `soft_ms` is the time since the last change of this factor,
     /// ms.

@@ -29,8 +29,8 @@ fn j53_a_joint_is_absent_at_once_and_the_others_stay() {
     }
 }
 
-/// A joint that is no longer absent starts like every other joint: it must accept a configuration, and missing
-/// answers are not an error while it starts.
+/// A joint that was absent before starts like every other joint: it must accept a configuration, and missing answers
+/// are not an error while it starts.
 #[test]
 fn j53_a_joint_that_is_no_longer_absent_is_brought_up() {
     let (config, before) = (Config::avena(), without_joint_3());

@@ -145,7 +145,7 @@ fn j56_only_segment_0_of_a_trajectory_begins_an_upload_in_a_replay() {
     }
 }
 
-/// The log contains all events that the controller has completed. It also contains the next event, because the
+/// The log contains all events that the controller has completed. The log also contains the next event, because the
 /// controller may have executed a part of it.
 #[test]
 fn j56_the_events_that_the_controller_has_looked_at_are_recorded() {

@@ -110,8 +110,8 @@ fn pair() -> impl Strategy<Value = (u16, RawPoint, RawPoint)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
-    /// The check must refuse every motion with a sample outside the limits. It must accept every motion whose samples
-    /// keep a margin of 0.01 to the limits.
+    /// The check must refuse every motion with a sample outside the limits. The check must accept every motion whose
+    /// samples keep a margin of 0.01 to the limits.
     #[test]
     fn j36_the_verdict_is_that_of_dense_samples((step, a, b) in pair()) {
         let config = config();

@@ -214,8 +214,8 @@ fn j33_each_tick_of_a_resume() {
 /// When a tick covers the remaining change of the rate, path time is at full speed and its slope is zero.
 #[test]
 fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
-    // `rest` is a remaining change of the rate. It is a power of two, so it has no rounding error. `enough` is the
-    // slope that just covers this change in one tick.
+    // `rest` is a remaining change of the rate. This change is a power of two, so it has no rounding error. `enough` is
+    // the slope that just covers this change in one tick.
     let rest = 1.0 / 16_384.0;
     let enough = rest / DT;
     assert_eq!(enough * DT, rest);

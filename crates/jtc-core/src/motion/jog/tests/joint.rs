@@ -60,9 +60,9 @@ fn j58_a_joint_approaches_its_velocity_with_bounded_acceleration_and_jerk() {
     }
 }
 
-/// A joint at 0.75 rad/s accelerates with 6 rad/s². One tick can reduce this acceleration only to 4 rad/s², so the
-/// joint would reach 0.75 + 4 · 0.5 = 2.75 rad/s. The velocity limit is 1 rad/s, so the acceleration in this tick is
-/// only (1 - 0.75) / 0.5 = 0.5 rad/s².
+/// A joint at 0.75 rad/s accelerates with 6 rad/s². A tick can reduce this acceleration only to 4 rad/s², so the joint
+/// would reach 0.75 + 4 · 0.5 = 2.75 rad/s. The velocity limit is 1 rad/s, so the acceleration in this tick is only
+/// (1 - 0.75) / 0.5 = 0.5 rad/s².
 #[test]
 fn j58_a_joint_that_still_accelerates_does_not_exceed_its_velocity_limit() {
     for sign in [1.0, -1.0] {
@@ -73,8 +73,8 @@ fn j58_a_joint_that_still_accelerates_does_not_exceed_its_velocity_limit() {
     }
 }
 
-/// With the jerk of 2 rad/s³, the acceleration is 2 · 0.001 rad/s² after one tick. It is computed without the
-/// difference of two velocities, which would add a rounding error.
+/// With the jerk of 2 rad/s³, the acceleration is 2 · 0.001 rad/s² after one tick. This acceleration is computed
+/// without the difference of two velocities, which would add a rounding error.
 #[test]
 fn j58_the_acceleration_within_the_velocity_limit_has_no_rounding_error_of_the_velocity() {
     for sign in [1.0, -1.0] {
@@ -175,7 +175,7 @@ fn j58_a_joint_whose_stopping_distance_ends_exactly_at_the_end_of_its_range_slow
 }
 
 /// A joint is beyond the end of its range and moves back towards it with 0.125 rad/s. The host commands the opposite
-/// direction. With 2 rad/s², the joint would reverse to 0.125 rad/s away from its range in one tick. It stops
+/// direction. With 2 rad/s², the joint would reverse to 0.125 rad/s away from its range in one tick. The joint stops
 /// instead.
 #[test]
 fn j58_a_joint_outside_its_range_does_not_reverse_away_from_its_range() {

@@ -61,7 +61,7 @@ fn j58_half_of_the_remaining_torque_can_stop_the_jog_within_300_ms() {
 fn j58_a_jog_creeps_if_friction_leaves_no_torque_for_a_higher_speed() {
     for (inertia, viscous, wanted, velocity) in [
         // At 0.5 rad/s, the friction of 100 N·m leaves no torque. At the slow speed of 0.02 rad/s, 92 − 20 = 72 N·m
-        // remain. They would allow 0.15 · 72/10 = 1.08 rad/s, so the jog gets 0.02 rad/s.
+        // remain. This torque would allow 0.15 · 72/10 = 1.08 rad/s, so the jog gets 0.02 rad/s.
         (10.0, 200.0, 0.5, 0.02),
         (10.0, 200.0, -0.5, -0.02),
         // The torque that remains at 0.02 rad/s allows only 0.15 · 72/1080 = 0.01 rad/s.

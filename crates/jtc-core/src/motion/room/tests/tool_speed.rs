@@ -59,8 +59,8 @@ fn j58_a_tool_speed_limit_of_zero_does_not_limit_a_jog() {
 ///
 /// Joint 2 moves at 1.5 rad/s and must slow down to 1 rad/s. Its present contribution of 1.5 m/s leaves 0.5 m/s for
 /// joints 1 and 3. Their wanted contributions are 2 m/s, so their share becomes 0.25. Joint 1 would then get 0.125
-/// rad/s, but it already moves at 0.2 rad/s and may keep this speed. It contributes 0.4 m/s. So 2 − 1.5 − 0.4 = 0.1
-/// m/s remain for joint 3, which is 0.2 rad/s.
+/// rad/s, but it already moves at 0.2 rad/s and may keep this speed. Joint 1 contributes 0.4 m/s. So 2 − 1.5 − 0.4 =
+/// 0.1 m/s remain for joint 3, which is 0.2 rad/s.
 #[test]
 fn j58_joints_that_accelerate_share_the_tool_speed_that_the_other_joints_leave() {
     for sign in [1.0, -1.0] {
@@ -80,7 +80,7 @@ fn j58_joints_that_accelerate_share_the_tool_speed_that_the_other_joints_leave()
 fn j58_half_a_per_cent_of_the_tool_speed_limit_always_remains_for_joints_that_accelerate() {
     let slowed = Bench::with_tool_speed(2.0).moving([0.0, -3.0, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.0025, -1.0, 0.01]), "{slowed:?}");
-    // Joint 1 moves exactly at its share of the limit (0.5 · 0.5 rad/s), so it is not too fast. It shares the 0.01
+    // Joint 1 moves exactly at its share of the limit (0.5 · 0.5 rad/s), so it is not too fast. Joint 1 shares the 0.01
     // m/s with joint 3, but it may also keep its present speed.
     let slowed = Bench::with_tool_speed(2.0).moving([0.25, -3.0, 0.0]).slowed([0.5, -2.0, 2.0]);
     assert!(all_near(&slowed, &[0.25, -1.0, 0.01]), "{slowed:?}");

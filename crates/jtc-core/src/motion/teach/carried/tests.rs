@@ -32,7 +32,7 @@ fn j25_the_load_torque_falls_with_the_speed_in_its_direction() {
             }
         }
     }
-    // Half of the load torque is already left out. One tick at full speed removes a sixth of the other half.
+    // Half of the load torque is already left out. A tick at full speed removes a sixth of the other half.
     assert_near(carried(32.0, 0.5).step(0.0, 0.5, 0.0, 0.0), 32.0 * (0.5 - 0.5 / 6.0), "half left out");
 }
 

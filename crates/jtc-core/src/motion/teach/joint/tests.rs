@@ -183,9 +183,9 @@ fn j25_a_fifth_of_the_rotor_inertia_counts() {
     }
 }
 
-/// The joint moves at 0.5 rad/s. Before each answer, the filtered position lags behind the joint by the motion of 4
-/// ms. The filter, with a time constant of 4 ms, then moves by the motion of 1 ms, so the lag after the answer is 3
-/// ms. Missing answers and late ticks do not change this lag.
+/// The joint moves at 0.5 rad/s. Before each answer, the lag of the filtered position is the motion of 4 ms. The
+/// filter, with a time constant of 4 ms, then moves by the motion of 1 ms, so the lag after the answer is 3 ms. Missing
+/// answers and late ticks do not change this lag.
 #[test]
 fn j25_missing_answers_and_late_ticks_do_not_change_the_speed_from_positions() {
     let at = |ms: u16| 0.5 * 0.001 * f64::from(ms);
@@ -280,9 +280,9 @@ fn j25_the_balanced_share_of_a_load_is_at_most_the_whole_load() {
 }
 
 /// The damping rises from 90 to 180 N·m·s/rad between 0.4 and 0.8 rad/s, or with the excess of the flange speed,
-/// whichever is higher. Between 0.9 and 1.7 rad/s, a braking torque rises to 60 rad/s² · 3 kg·m² = 180 N·m. Both
-/// ramps are smooth: 5/32 at a quarter of the range, 1/2 at the half, and 27/32 at three quarters. The joint has so
-/// much friction of its own that it gets no dry friction.
+/// whichever is higher. Between 0.9 and 1.7 rad/s, a braking torque rises to 60 rad/s² · 3 kg·m² = 180 N·m. Both ramps
+/// are smooth: 5/32 at a quarter of the range, 1/2 at the half, and 27/32 at three quarters. The joint's own friction
+/// is high, so it gets no dry friction.
 #[test]
 fn j25_a_fast_joint_has_more_damping_and_a_braking_torque() {
     for (speed, haste, grown, braked) in [
@@ -385,8 +385,8 @@ fn j25_the_dry_friction_is_softer_for_a_joint_with_low_inertia() {
     }
 }
 
-/// The anchor of the spring moves with a joint that is too fast for dry friction. It also moves with a joint that
-/// gets no dry friction, because its own friction is high. The torque therefore has no step when the dry friction
+/// The anchor of the spring moves with a joint that is too fast for dry friction. The anchor also moves with a joint
+/// that gets no dry friction, because its own friction is high. The torque therefore has no step when the dry friction
 /// begins to act later.
 #[test]
 fn j25_the_anchor_of_the_dry_friction_moves_with_a_fast_joint_and_without_dry_friction() {

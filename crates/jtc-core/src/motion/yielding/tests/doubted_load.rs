@@ -95,8 +95,8 @@ fn j68_j25_teaching_uses_a_doubted_load_less_the_torque_of_the_spring() {
             // The spring holds a further 4 N·m of the load, so Teaching uses 23 N·m.
             (40.0, 19.0, 4.0, 23.0),
             (40.0, 5.0, -30.0, 0.0),
-            // 0.2 N·m are less than half of 0.5 N·m, so the 0.1 N·m with which the spring opposes the load are
-            // subtracted. 0.3 N·m are more than half, so nothing is subtracted.
+            // 0.2 N·m are less than half of 0.5 N·m, so the 0.1 N·m of the spring against the load are subtracted. 0.3
+            // N·m are more than half, so nothing is subtracted.
             (0.5, 0.2, -0.1, 0.1),
             (0.5, 0.3, -0.1, 0.3),
             (0.0, 0.0, -30.0, 0.0),

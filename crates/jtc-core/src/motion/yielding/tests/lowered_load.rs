@@ -6,8 +6,8 @@ fn lowering(load: f64) -> Yield {
     Yield { damping: 80.0, ..Yield::begin(true, false, 0.0, 2.0, load) }
 }
 
-/// At 0.5 rad/s, the torque of the damper is 40 N·m. It becomes load torque with a time constant of 0.5 s: 40 N·m · 1
-/// ms / 0.5 s = 0.08 N·m in each tick, and 8 N·m in 100 ticks.
+/// At 0.5 rad/s, the torque of the damper is 40 N·m. This torque becomes load torque with a time constant of 0.5 s: 40
+/// N·m · 1 ms / 0.5 s = 0.08 N·m in each tick, and 8 N·m in 100 ticks.
 #[test]
 fn j70_the_torque_of_the_damper_becomes_load_torque_within_half_a_second() {
     let limits = round_limits();

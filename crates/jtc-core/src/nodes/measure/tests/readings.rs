@@ -54,7 +54,7 @@ fn j66_the_velocity_from_positions_is_bounded_around_the_commanded_velocity() {
         (0.75, 0.0, 0.0, 0.25, 0.25),
         (0.0, 0.75, 0.0, 0.25, 0.25),
         (0.75, 0.25, 0.25, 0.25, 0.25),
-        // One of the two differences is zero, so the result is the commanded velocity.
+        // The first or the second difference is zero, so the result is the commanded velocity.
         (0.75, 0.25, 0.0, 0.25, 0.25),
         (0.25, 0.75, 0.0, 0.25, 0.25),
     ] {

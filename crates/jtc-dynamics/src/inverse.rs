@@ -80,7 +80,7 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
 /// Two vectors that are rotated together.
 pub(crate) type Pair3 = [[f64; 2]; 3];
 
-/// One component of both vectors of a pair.
+/// Component of both vectors of a pair.
 type Pair = [f64; 2];
 
 #[inline(always)]

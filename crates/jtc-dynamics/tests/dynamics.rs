@@ -401,7 +401,7 @@ fn j40_a_joint_without_inertia_stays_finite() {
 
 proptest! {
     /// The felt inertia is the largest inertia that can be subtracted from the joint in the mass matrix. If more is
-    /// subtracted, the kinetic energy of some motion is no longer positive.
+    /// subtracted, the kinetic energy of some motion becomes zero or negative.
     #[test]
     fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
         model in arms::model(),

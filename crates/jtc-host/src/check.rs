@@ -223,7 +223,7 @@ impl<'a> Checker<'a> {
             self.moment(a, i, 0.0, &places, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
             let senseless = self.step(a, b, i, h, verdict);
-            // With a step of 1 ms, there is no millisecond between two points. Then the speed of the positions is
+            // With a step of 1 ms, no whole millisecond lies between two points. Then the speed of the positions is
             // computed in the middle of the step.
             for k in 1..step_ms.max(2) {
                 let u = f64::from(k) / f64::from(step_ms.max(2));

@@ -67,12 +67,12 @@ const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Lowest bearing temperature that a plan assumes by default, °C. This is the temperature of cold bearings in a
 /// factory hall. Cold bearings have more friction than bearings at operating temperature.
 pub const COLD: f64 = 20.0;
-/// Largest factor by which the planner slows down a motion. A motion that needs a larger factor is rejected.
+/// Largest slow-down factor of the planner for a motion. A motion that needs a larger factor is rejected.
 const SLOWEST: f64 = 50.0;
 /// Smallest and largest slow-down factor in one iteration of the planner.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Smallest slow-down factor in one iteration of the planner if a motion exceeds the torque margin. It is close to 1,
-/// because a rounded motion exceeds the margin only slightly.
+/// Smallest slow-down factor in one iteration of the planner if a motion exceeds the torque margin. This factor is
+/// close to 1, because a rounded motion exceeds the margin only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
 /// Slow-down factor above which a note reports that the torque margin has slowed down a motion.
 const NOTED: f64 = 1.01;

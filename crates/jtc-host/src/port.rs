@@ -24,8 +24,8 @@ pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 
-/// Number of Stops and Pauses that other programs have sent. They send them through the port of this program, or
-/// through the agent that holds the port.
+/// Number of Stops and Pauses that other programs have sent. These programs send them through the port of this program,
+/// or through the agent that holds the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Halts {
     /// Number of Stops and Pauses.

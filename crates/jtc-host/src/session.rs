@@ -1,4 +1,4 @@
-//! Session with the controller. Only the session writes to the port. It receives the stream of statuses, and a
+//! Session with the controller. Only the session writes to the port. The session receives the stream of statuses, and a
 //! response record for each frame that it sends.
 //!
 //! The controller sends each response record only once (J-04), in exactly one status. The response records are in the
@@ -350,7 +350,7 @@ impl<P: Port> Session<P> {
         loop {
             while let Some(record) = self.records.pop_front() {
                 // A response record without an error that belongs to another frame type answers an earlier request,
-                // which has timed out. It is ignored.
+                // which has timed out. Such a record is ignored.
                 if record.status != FrameStatus::NoError || record.frame_type == kind {
                     return Ok(Some(record));
                 }

@@ -112,8 +112,8 @@ impl Diagnose for WaypointError {
             Self::Pose { source, .. } => source.diagnosis(),
             Self::Route(e) => e.diagnosis(),
             Self::Flange { source, .. } => {
-                // Values that are not finite, and quaternions whose length is not 1, are invalid for every arm. They
-                // are therefore errors in the use of the file.
+                // Values that are not finite, and quaternions whose length is not 1, are invalid for every arm. Such
+                // values are therefore errors in the use of the file.
                 let kind = match **source {
                     kinematics::PoseError::NotFinite { .. } | kinematics::PoseError::NotUnit { .. } => {
                         ErrorKind::Usage

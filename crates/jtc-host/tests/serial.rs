@@ -83,7 +83,7 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!((&got[..300], &got[300..]), (&segment[..300], &fixed::STOP[..]));
     let error = port.write_all(&segment[300..]).expect_err("it was given up");
     assert!(error.to_string().contains("a test stopped the arm after this motion was requested"), "{error}");
-    // The port blocks uploads and frames that move or release the arm. It still sends other frames.
+    // The port blocks uploads and frames that move or release the arm. The port still sends other frames.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
     // A Pause after the Stop could replace the Stop, and the motion could then be resumed. Therefore the port blocks

@@ -88,8 +88,7 @@ pub struct Checked {
     pub findings: Vec<ArmFinding>,
     /// Greatest gravity torque of each joint; empty if it cannot be computed because numbers of the arm are invalid.
     pub holding: Vec<Holding>,
-    /// Factors by which the rotor inertias may differ from the values in the file; `None` if the gains are unstable
-    /// or missing.
+    /// Permitted ratios of the rotor inertias to the values in the file; `None` if the gains are unstable or missing.
     pub rotor_margins: Option<RotorMargins>,
 }
 

@@ -218,7 +218,7 @@ fn is_arm(text: &str) -> bool {
     is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// Tables of single joints. They are collected until each of the six joints has a table.
+/// Tables of single joints. The tables are collected until each of the six joints has a table.
 #[derive(Default)]
 struct JointTables {
     friction: PerJoint<TableOf<f32>>,

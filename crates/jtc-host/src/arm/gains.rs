@@ -154,8 +154,8 @@ pub(super) fn is_light_enough(
     is_positive(a)
 }
 
-/// Returns the smallest and largest factor by which the rotor inertias of the joints `of` can change while the arm
-/// stays stable. Returns `None` if the arm is not stable with the rotor inertias `rotor`.
+/// Returns the smallest and largest factor for the rotor inertias of the joints `of` that keeps the arm stable. Returns
+/// `None` if the arm is not stable with the rotor inertias `rotor`.
 pub(super) fn rotor_margin(
     matrices: &[Matrix],
     rotor: &JointVec,

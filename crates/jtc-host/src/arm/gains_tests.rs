@@ -92,7 +92,7 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     let most = stable.iter().map(|s| s.most / 0.7).fold(f64::INFINITY, f64::min);
     assert!((margin.down - least).abs() < 1e-6 && (margin.up - most).abs() < 1e-6 * most, "{margin:?}");
     // Two fully coupled joints behave like one joint with twice the stiffness, so the margins differ. With very light
-    // rotors, the gains are unstable, and there is no margin.
+    // rotors, the gains are unstable, without any margin.
     let mut both = [[0.0; JOINTS]; JOINTS];
     (both[4][4], both[5][5], both[4][5], both[5][4]) = (0.3, 0.3, 0.3, 0.3);
     let coupled = rotor_margin(&[both], &rotor, &stable, [true; JOINTS]).unwrap();

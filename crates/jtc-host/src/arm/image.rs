@@ -158,7 +158,7 @@ impl Arm {
                     }
                 }
             }
-            // One of the two has a friction polynomial, and the other has a friction table.
+            // Only one of the two has a friction table. The other has a friction polynomial.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");

@@ -1,8 +1,8 @@
 //! Starting values for the numbers that are missing in a robot description. A documented rule computes each starting
 //! value.
 //!
-//! The starting values are not measured. They are sufficient to simulate the arm, and to commission it at low speed.
-//! An arm file marks the starting values, and `jtc arm check` lists them until the operator has replaced them.
+//! The starting values are not measured. These values are sufficient to simulate the arm, and to commission it at low
+//! speed. An arm file marks the starting values, and `jtc arm check` lists them until the operator has replaced them.
 
 use jtc_core::settings::TOOL_SPEED;
 use jtc_core::{JOINTS, PidGains};
@@ -98,7 +98,8 @@ const ERROR_PART: f64 = 0.2;
 /// Acceleration of a drive at full torque without an arm, rad/s². The proposed rotor inertia is computed from this
 /// value.
 const ROTOR_ACCELERATION: f64 = 200.0;
-/// Smallest proposed acceleration limit, rad/s². It also applies if the gravity torque needs the whole torque limit.
+/// Smallest proposed acceleration limit, rad/s². This limit also applies if the gravity torque needs the whole torque
+/// limit.
 const LEAST_ACCELERATION: f64 = 0.5;
 
 /// Rounds `value` down to `digits` significant digits. Rounding up could exceed a limit, and more digits would look

@@ -58,9 +58,8 @@ impl Problem {
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// Returns a number for sorting the problems: the worst value relative to its limit. If there is no limit,
-    /// returns the absolute value. If positions, velocities or accelerations contradict each other, returns the
-    /// difference.
+    /// Returns a number for sorting the problems: the worst value relative to its limit. Without a limit, returns the
+    /// absolute value. If positions, velocities or accelerations contradict each other, returns the difference.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {

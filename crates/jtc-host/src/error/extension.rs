@@ -36,8 +36,8 @@ pub enum ExtensionError {
         /// All values that differ between the file and the device.
         differences: Vec<Difference>,
     },
-    /// An arm can be stored only while the torque is off, because the transfer changes the parameters with which the
-    /// controller holds the arm.
+    /// An arm can be stored only while the torque is off, because the transfer changes the parameters that the
+    /// controller uses to hold the arm.
     #[error("the arm cannot be stored in the state {state}; nothing was sent")]
     Powered {
         /// State of the controller at the time of the request.

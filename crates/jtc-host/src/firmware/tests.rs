@@ -116,7 +116,7 @@ fn what_fail_txt_says_is_reported() {
     let error = verification.unwrap_err();
     assert!(error.to_string().ends_with("The target flash is write protected"), "{error}");
     assert_eq!(error.kind(), ErrorKind::Device);
-    // The failure text of an earlier attempt stays on the drive. It must not be used as the result of the next
+    // The failure text of an earlier attempt stays on the drive. This text must not be used as the result of the next
     // attempt.
     let (drive, new) = (link.drive(), image(H745, 2));
     let written = write_image(&drive, &new, &mut |_| {}).unwrap();

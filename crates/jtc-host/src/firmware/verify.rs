@@ -106,8 +106,8 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // A failure report from before the copying stays on the drive until the drive disappears. It is not about the
-        // new image, so it is ignored.
+        // A failure report from before the copying stays on the drive until the drive disappears. Such a report is not
+        // about the new image, so it is ignored.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };

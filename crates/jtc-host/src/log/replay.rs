@@ -34,8 +34,8 @@ pub struct Tick {
     pub boots: u32,
     /// Computed and measured values of the tick.
     pub sample: Sample,
-    /// Status that the controller would have reported in this tick, with the errors of the drives. It contains only
-    /// the fields that the replay can compute.
+    /// Status that the controller would have reported in this tick, with the errors of the drives. This status contains
+    /// only the fields that the replay can compute.
     pub status: Status,
     /// Inputs of the tick. `None` if the tick is a state that was read from a snapshot.
     pub inputs: Option<RecordedInputs>,

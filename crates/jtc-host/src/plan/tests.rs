@@ -222,8 +222,8 @@ fn a_pose_that_can_be_held_can_be_left() {
     assert!(masses > 0);
 }
 
-/// With a payload that is too heavy, the error contains the waypoint at which the drives cannot hold the arm. It also
-/// contains the necessary torque, and the share of the limit that may be used to hold the arm.
+/// With a payload that is too heavy, the error contains the waypoint at which the drives cannot hold the arm. The error
+/// also contains the necessary torque, and the share of the limit that may be used to hold the arm.
 #[test]
 fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let error = lowered_with(8.0).unwrap_err();

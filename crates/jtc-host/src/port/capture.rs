@@ -92,7 +92,7 @@ impl<P: Port, W: Write> Port for Capture<P, W> {
     }
 }
 
-/// One text line of a capture.
+/// Text line of a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Captured {
     /// Time, s.

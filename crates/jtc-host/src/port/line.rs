@@ -91,8 +91,8 @@ struct Output {
     free_at: Instant,
     /// `true` if the current frame was aborted because of a Stop.
     given_up: bool,
-    /// Last Stop or Pause from another program. It blocks motion frames until the next motion request of the port
-    /// owner.
+    /// Last Stop or Pause from another program. This Stop or Pause blocks motion frames until the next motion request
+    /// of the port owner.
     halted: Option<Halted>,
     /// Time of the last jog that the port owner sent.
     jogged: Option<Instant>,

@@ -30,7 +30,7 @@ pub enum PortKind {
 /// Serial port of this computer.
 #[derive(Debug)]
 pub struct PortInfo {
-    /// Name with which the port is opened.
+    /// Name used to open the port.
     pub path: String,
     /// Hardware type.
     pub kind: PortKind,

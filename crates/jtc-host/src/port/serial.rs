@@ -20,7 +20,7 @@ pub const STANDARD_RATES: [u32; 16] = [
 
 /// Open serial port.
 pub struct SerialPort {
-    /// Door (control socket) of the port. It must be dropped before the line.
+    /// Door (control socket) of the port. The door must be dropped before the line.
     #[cfg(unix)]
     _door: Option<Door>,
     line: Arc<Line>,

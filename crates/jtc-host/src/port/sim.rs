@@ -81,7 +81,7 @@ impl Port for SimPort {
     }
 }
 
-/// Longest delay behind real time that the simulation makes up for. A longer delay, for example after the computer
+/// Longest delay relative to real time that the simulation makes up for. A longer delay, for example after the computer
 /// was suspended, is skipped completely.
 const CATCH_UP: Duration = Duration::from_secs(2);
 

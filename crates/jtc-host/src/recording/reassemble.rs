@@ -8,7 +8,7 @@ use crate::sample::Sample;
 struct Reassembled {
     time_ns: u64,
     sample: Sample,
-    /// Topics of which the message of this sample was received, as a mask with one bit for each topic.
+    /// Topics whose message of this sample was received, as a mask with one bit for each topic.
     came: u8,
 }
 
@@ -104,9 +104,9 @@ mod tests {
 
     use super::*;
 
-    /// Reassembles samples from messages, with a buffer of `room` samples. Each message consists of a time and the
-    /// bit of its topic. The function checks that each sample has the messages of both topics. It returns the times
-    /// of the samples in the order of their release.
+    /// Reassembles samples from messages, with a buffer of `room` samples. Each message consists of a time and the bit
+    /// of its topic. The function checks that each sample has the messages of both topics. The function returns the
+    /// times of the samples in the order of their release.
     fn gathered(messages: &[(u64, u8)], room: usize) -> Result<Vec<u64>, Late> {
         let mut gatherer = Reassembler::new(room);
         let mut given = Vec::new();

@@ -238,7 +238,7 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
 }
 
 /// The file contains all data that a reader needs to understand the values: the arm, its gains and limits, and the
-/// identity of the controller. Poses of the links are written at most 50 times a second, at any sample rate. They are
+/// identity of the controller. Poses of the links are written at most 50 times a second, at any sample rate. Poses are
 /// written only if the position of a joint is known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {

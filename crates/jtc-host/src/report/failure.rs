@@ -335,7 +335,7 @@ fn begin(samples: &[Sample]) -> usize {
     samples.iter().position(Sample::is_operating).unwrap_or(0)
 }
 
-/// Returns the start time of the run, s. It is computed from the point index of the last sample in motion, which
+/// Returns the start time of the run, s. The time is computed from the point index of the last sample in motion, which
 /// gives the most precise result.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];

@@ -19,8 +19,8 @@ pub(super) struct Watch {
     /// Start time of the run, computed from the last sample in motion. Before a motion, the start time is the time of the first sample.
     start_s: Option<f64>,
     in_motion: bool,
-    /// First error before an execution, which is used only if there is no execution. `since` is the first error since
-    /// the start of the execution.
+    /// First error before an execution, which is used only without an execution. `since` is the first error since the
+    /// start of the execution.
     before: Option<Around>,
     since: Option<Around>,
 }

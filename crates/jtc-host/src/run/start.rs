@@ -122,8 +122,8 @@ impl Order<'_> {
         }
     }
 
-    /// Checks the trajectories of all runs after the first run. Also checks the transition to each next run: a run
-    /// ends where the next run starts, or an approach leads from its end to this start.
+    /// Checks the trajectories of all runs after the first run. Also checks the transition to each next run: a run ends
+    /// at the start of the next run, or an approach leads from its end to this start.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {

@@ -61,8 +61,8 @@ mod tests {
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
         // The statuses arrive with different delays, but the times of the clock must be exactly the path times.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // At half of the full speed, the clock is at most 0.1 s behind the arrival time. After a standstill, it
-        // equals the arrival time.
+        // At half of the full speed, the clock lags the arrival time by at most 0.1 s. After a standstill, it equals
+        // the arrival time.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);

@@ -154,7 +154,7 @@ impl<P: Port> Session<P> {
         self.read_host_timeout()?;
         self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
-            // The controller has rejected the request, so teaching was not switched on by this function. It may
+            // The controller has rejected the request, so teaching was not switched on by this function. Teaching may
             // belong to another client, so it is not switched off here.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),

@@ -68,8 +68,8 @@ impl<P: Port> Session<P> {
     ) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
-        // Last point index before an error. It is stored because the controller deletes the trajectory and its point
-        // index after an error.
+        // Last point index before an error. The index is stored because the controller deletes the trajectory and its
+        // point index after an error.
         let mut point = 0;
         let mut occurred = None;
         loop {

@@ -95,7 +95,8 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // The device now has no active arm, as after its start. It uses the stored arm when a host requests this.
+        // The device now has no active arm, as after its start. The device uses the stored arm when a host requests
+        // this.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }

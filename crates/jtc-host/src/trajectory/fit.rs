@@ -110,7 +110,7 @@ pub enum FitError {
 }
 
 impl Samples {
-    /// Returns the trajectory through the samples. If there are no samples, the trajectory is empty and does not pass a check.
+    /// Returns the trajectory through the samples. Without samples, the trajectory is empty and does not pass a check.
     ///
     /// # Errors
     ///

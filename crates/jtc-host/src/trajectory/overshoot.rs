@@ -4,8 +4,7 @@ use jtc_wire::Joint;
 
 use super::Point;
 
-/// Largest overshoot of a joint: the distance by which the curve leaves the interval between the positions of two
-/// waypoints.
+/// Largest overshoot of a joint: the distance of the curve from the interval between the positions of two waypoints.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Overshoot {
     /// Joint.

@@ -55,8 +55,8 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// Returns the commanded trajectory that is stored in the recording of a run. It is complete, even if the run was
-/// interrupted.
+/// Returns the commanded trajectory that is stored in the recording of a run. This trajectory is complete, even if the
+/// run was interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.resume_point(whole) {
@@ -102,8 +102,8 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last measured motion, without the standstill before and after the motion. The result is a motion by hand, if there is one.
-/// If there is no motion by hand, the result is a motion along a trajectory.
+/// Returns the last measured motion, without the standstill before and after the motion. The result is a motion by
+/// hand, if there is one. Without a motion by hand, the result is a motion along a trajectory.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
     let timed = if by_hand { led(samples) } else { followed(samples) };

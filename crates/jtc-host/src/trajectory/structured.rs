@@ -118,7 +118,7 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // With a single point, the step of the file is kept, even if it is above 1 s. With several points, so long a step
+    // With a single point, the step of the file is kept, even if it is above 1 s. With several points, such a long step
     // makes the times irregular, and the points are resampled.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;

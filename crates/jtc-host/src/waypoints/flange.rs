@@ -1,4 +1,5 @@
-//! Flange poses in files. Of the ten possible values, three are the position, four a quaternion, and three the angles roll, pitch and yaw.
+//! Flange poses in files. The ten possible values are: three for the position, four for a quaternion, and three for the
+//! angles roll, pitch and yaw.
 
 use jtc_plan::kinematics::Orientation;
 

@@ -11,8 +11,8 @@ use jtc_host::{
 };
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
-/// Denial that is delivered together with the next bytes that the session reads. It may belong to the last frame or
-/// to an earlier frame.
+/// Denial that is delivered together with the next bytes that the session reads. The denial may belong to the last
+/// frame or to an earlier frame.
 #[derive(Clone, Default)]
 struct Denials(Rc<RefCell<Option<&'static str>>>);
 
@@ -60,8 +60,8 @@ fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     (Session::new(SharedLine { port: device, arriving: arriving.clone(), denied: None }), arriving)
 }
 
-/// A denial that arrives late belongs to an earlier frame. It must not be used as the reason for the rejection of the
-/// next frame.
+/// A denial that arrives late belongs to an earlier frame. This denial must not be used as the reason for the rejection
+/// of the next frame.
 #[test]
 fn a_late_denial_is_not_that_of_the_next_frame() {
     let (mut s, arriving) = session(None);

@@ -89,7 +89,7 @@ fn j36_a_file_that_begins_outside_a_limit_and_goes_inwards_is_run() {
     assert!((inwards.points[0].position[2] - here[2]).abs() < 1e-9);
     let checked = CheckedTrajectory::check(&inwards, &arm, &here, &CheckOptions::default()).unwrap();
     finishes(&mut session, &checked);
-    // The same motion in the opposite direction leaves the limits, so it is rejected.
+    // The reversed motion leaves the limits, so it is rejected.
     let mut points = inwards.points.clone();
     points.reverse();
     points.iter_mut().for_each(|point| point.velocity = point.velocity.map(|v| -v));

@@ -87,8 +87,8 @@ fn j59_a_motion_whose_session_has_gone_is_paused() {
         begin(&mut s);
         s.pass(Duration::from_millis(500)).unwrap();
         assert_eq!(s.last().unwrap().trajectory, TrajectoryState::Execute);
-        // A second session now uses the port. It only observes and sends no GetInfo, so the controller receives no
-        // sign of a host and pauses the motion.
+        // A second session now uses the port. The second session only observes and sends no GetInfo, so the controller
+        // receives no sign of a host and pauses the motion.
         let mut watching: Session<SimPort> = Session::new(s.into_port());
         watching.pass(Duration::from_millis(u64::from(ms) + 1000)).unwrap();
         let status = watching.last().copied().unwrap();

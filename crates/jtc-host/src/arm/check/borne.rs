@@ -9,7 +9,7 @@ use super::ArmFinding;
 use crate::arm::Arm;
 use crate::arm::statics::{POSES, pose};
 
-/// Heaviest payload with which the damping is checked, kg.
+/// Heaviest payload in the check of the damping, kg.
 const PAYLOAD_MAX: f64 = 5.0;
 /// Mean delay of a torque command, s, because each torque stays constant for one tick. The check adds this delay to
 /// the delay in the controller's settings. `TICK` is the duration of one tick, s.

@@ -166,7 +166,8 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
 /// Formats a range such as `0.08..12` with two significant digits. The lower limit is rounded up and the upper limit
 /// is rounded down, so the text never shows a wider range.
 fn range(down: f64, up: f64) -> String {
-    // Tolerance for rounding errors. It prevents that a limit with exactly two digits is rounded to another number.
+    // Tolerance for rounding errors. The tolerance prevents that a limit with exactly two digits is rounded to another
+    // number.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

@@ -192,7 +192,7 @@ fn proposals_are_found_with_their_joints() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// The check does not panic, whatever value a number of the arm has. If the number is NaN or infinite, the check
+    /// The check does not panic for any value of a number of the arm. If the number is NaN or infinite, the check
     /// refuses the arm.
     #[test]
     fn no_number_is_too_odd_for_the_check(place in 0..11usize, joint in 0..JOINTS, value in prop::num::f64::ANY) {
@@ -228,7 +228,7 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let findings = arm.check().findings;
     let light = findings.iter().find(|f| f.code == "too-light").expect("too light");
     assert_eq!((light.finding.severity, light.joint.map(Joint::number)), (Severity::Problem, Some(1)));
-    // The gains of this arm are barely stable, so the stability check reports no problem. They are refused only
+    // The gains of this arm are barely stable, so the stability check reports no problem. The gains are refused only
     // because the inertia of the joint is too small for them.
     assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
     assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));

@@ -1,4 +1,4 @@
-//! Frames and rigid bodies, with which several links are merged into one link.
+//! Frames and rigid bodies, used to merge several links into one link.
 
 use jtc_dynamics::{Link, Origin};
 

@@ -168,7 +168,7 @@ proptest! {
     }
 }
 
-/// A plate between two joints and a tool behind two fixed joints are merged into the links that carry them. The
+/// A plate between two joints and a tool after two fixed joints are merged into the links that carry them. The
 /// resulting masses must equal the masses of links that already contain the plate and the tool.
 #[test]
 fn fixed_joints_are_merged_into_the_link_that_carries_them() {
@@ -267,8 +267,8 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
             "{limit}: {assumed:?}"
         );
     }
-    // If the torque limit is missing, the importer computes a limit from the masses of this arm. It does not copy the
-    // limit of another arm.
+    // If the torque limit is missing, the importer computes a limit from the masses of this arm. The importer does not
+    // copy the limit of another arm.
     let text = robot(&parts(), "").replace("effort=\"50\"", "");
     let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
     assert!(arm.joints.iter().all(|j| j.torque_max < 60.0 && j.torque_max > 0.5), "{:?}", arm.joints);

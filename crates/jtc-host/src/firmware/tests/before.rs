@@ -43,8 +43,8 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     for before in [asked(&board, Some(false)), asked(&board, None), Preflight::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
-    // A report of another board does not replace the missing report of the drive's board. It has no effect once the
-    // drive's board itself reports.
+    // A report of another board does not replace the missing report of the drive's board. Such a report has no effect
+    // once the drive's board itself reports.
     board.hold(true);
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });

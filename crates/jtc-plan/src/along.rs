@@ -222,7 +222,7 @@ pub(crate) struct Plan<'a> {
     pub caps: Vec<f64>,
     /// Estimate of the highest squared path speed in each cell. Friction is evaluated up to this speed.
     pub reached: Vec<f64>,
-    /// Factor by which the path speed in each cell is multiplied to reduce it.
+    /// Factor that reduces the path speed in each cell.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
@@ -263,8 +263,8 @@ impl Plan<'_> {
         if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
-    /// Returns a squared speed for each cell. It is slightly above the highest squared speed of `law` in this cell,
-    /// but not above the cap of the cell.
+    /// Returns a squared speed for each cell. This speed is slightly above the highest squared speed of `law` in this
+    /// cell, but not above the cap of the cell.
     fn reached_by(&self, law: &Law) -> Vec<f64> {
         let speed = |s: f64| law.at(law.time_of(s)).1;
         let mut before = 0.0;
@@ -302,7 +302,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns, for each cell, the time factor (new duration divided by old duration) with which the motion keeps all
+    /// Returns, for each cell, the time factor (new duration divided by old duration) that makes the motion keep all
     /// limits.
     pub(crate) fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];

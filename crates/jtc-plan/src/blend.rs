@@ -36,8 +36,8 @@ pub struct BlendedPath {
 struct Given {
     /// Index of the last corner that is at or before the waypoint.
     corner: usize,
-    /// Path parameter of the waypoint. For a waypoint that is no corner, this is a point on the straight line between
-    /// two corners.
+    /// Path parameter of the waypoint. For a waypoint that is not a corner, this is a point on the straight line
+    /// between two corners.
     parameter: f64,
 }
 
@@ -164,7 +164,7 @@ impl BlendedPath {
         path
     }
 
-    /// Returns `true` if two waypoints are so close that there is no leg between them.
+    /// Returns `true` if two waypoints are so close that no leg exists between them.
     pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
         distance(a, b) <= SAME
     }
@@ -208,7 +208,7 @@ impl BlendedPath {
 }
 
 /// Evaluates a step function from 0 (at 0) to 1 (at 1). The slope of the step rises, stays constant and falls, each for
-/// a third of the interval. Of all steps with a slope of at most 3/2, this step has the smallest second derivative.
+/// a third of the interval. Among all steps with a slope of at most 3/2, this step has the smallest second derivative.
 /// Returns the integral, the value and the slope of the step at `u`.
 fn step(u: f64) -> (f64, f64, f64) {
     const THIRD: f64 = 1.0 / 3.0;

@@ -30,7 +30,7 @@ const MOTION_SHARE: f64 = 0.05;
 /// [`MOTION_SHARE`] of the limit. The torque left at standstill is the usable torque minus holding torque and
 /// breakaway friction.
 const STANDING_SHARE: f64 = 0.5;
-/// Smallest share of the torque limit that must always remain available for motion. It is sufficient for a slow
+/// Smallest share of the torque limit that must always remain available for motion. This share is sufficient for a slow
 /// motion.
 const CREEP_SHARE: f64 = 0.002;
 

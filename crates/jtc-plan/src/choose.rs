@@ -6,8 +6,8 @@ use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
-/// Maximum distances of removed waypoints from the straight line, as shares of the blend. One path is created for
-/// each value.
+/// Maximum distances of removed waypoints from the straight line, as shares of the blend. For each value, the planner
+/// creates one path.
 const THIN: [f64; 2] = [0.2, 0.5];
 /// Ratio of the numbers of corners before and after the removal of waypoints. If this ratio or a higher ratio is
 /// reached and there is a jerk limit, the path with all waypoints is not planned.

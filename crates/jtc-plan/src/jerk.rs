@@ -165,7 +165,7 @@ impl Attempt {
     }
 }
 
-/// Returns the length of the time window (s) with which each joint keeps its jerk limit along a straight line.
+/// Returns the length of the time window (s) that keeps the jerk limit of each joint along a straight line.
 fn window(cells: &[Cell], bounds: &[Bounds], limits: &Limits) -> f64 {
     let mut longest = 0.0f64;
     for (cell, bounds) in cells.iter().zip(bounds) {

@@ -121,7 +121,7 @@ impl Kinematics {
     /// contains each solution with every joint within (−π, π]. If the limits permit, the list also contains each
     /// solution with joints turned by ±2π. Returns an empty list for an invalid pose.
     ///
-    /// A singular target has infinitely many solutions, of which the list contains some.
+    /// A singular target has infinitely many solutions. The list contains some of them.
     pub fn all(&self, target: &Pose) -> Vec<JointVec> {
         let Ok(goal) = orientation::checked(target) else { return Vec::new() };
         let found = self.solutions(&goal, &[0.0; JOINTS]);

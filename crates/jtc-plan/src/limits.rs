@@ -20,7 +20,7 @@ pub struct Limits {
     pub velocity: JointVec,
     /// Highest acceleration, rad/s².
     pub acceleration: JointVec,
-    /// Highest jerk, rad/s³; infinite if there is no limit.
+    /// Highest jerk, rad/s³; infinite without a limit.
     pub jerk: JointVec,
     /// Highest torque, N·m. The planner uses this limit only with an [`crate::ArmDynamics`].
     pub torque: JointVec,

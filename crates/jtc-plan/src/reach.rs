@@ -105,8 +105,8 @@ impl Step {
                 }
                 let size = by_acceleration.abs();
                 // A row with a negligible coefficient of s̈ limits only ṡ². The coefficient is negligible if its term
-                // is much smaller than the limit. It is also negligible if its effect is equal to a shift of the
-                // point by a very small part of the step.
+                // is much smaller than the limit. The coefficient is also negligible if its effect is equal to a shift
+                // of the point by a very small part of the step.
                 let negligible = size * highest <= NEGLIGIBLE * length * limit
                     || size <= NEGLIGIBLE * length * by_speed.abs();
                 // Such a row permits a higher ṡ² at the first point only if the arm comes to rest within the step.

@@ -205,7 +205,7 @@ impl<'a> ArmDynamics<'a> {
     }
 
     /// Returns the highest speed that the friction table covers for the joint with index `j` in both directions, rad/s
-    /// (J-36). If there is no friction table, the result is infinite.
+    /// (J-36). Without a friction table, the result is infinite.
     pub(crate) fn velocity_max(&self, j: usize) -> f64 {
         match self.friction {
             Some(Friction::Table(tables)) => {

@@ -204,7 +204,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
 /// Time, joint, torque and torque limit at a point at which the torque is not sufficient.
 type Over = (f64, Joint, f64, f64);
 
-/// Returns the smallest time factor above `least` with which no point of the motion exceeds the torque limit. Also
+/// Returns the smallest time factor above `least` that keeps every point of the motion within the torque limit. Also
 /// returns the last joint that exceeded the limit. `whole` contains the torque limits.
 fn factor_for(
     motion: &Motion,
@@ -269,8 +269,8 @@ pub(crate) fn holds(
 }
 
 /// Returns the times at which the torque of a piece is sampled, in seconds after its start. The times are at most
-/// `step` apart. They include both ends, at which the acceleration can jump, and the times at which the smoothed sign
-/// function of a joint's friction reaches ±1. A piece with higher accelerations inside than at its ends has more
+/// `step` apart. The times include both ends, at which the acceleration can jump, and the times at which the smoothed
+/// sign function of a joint's friction reaches ±1. A piece with higher accelerations inside than at its ends has more
 /// sample times.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };

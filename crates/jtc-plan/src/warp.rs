@@ -116,8 +116,8 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates (speed factors) with which each part has its requested duration. Half of a change of rate is in
-/// the part before the change, and half is in the part after the change.
+/// Returns the rates (speed factors) that give each part its requested duration. Half of a change of rate is in the
+/// part before the change, and half is in the part after the change.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
     // Compared with a constant rate, half a change of rate adds (adjacent rate − own rate)·(duration of the

@@ -46,7 +46,7 @@ proptest! {
     }
 
     /// A motion through many close waypoints on a smooth curve must take only a little longer than a motion through a
-    /// few of these waypoints. It must pass each waypoint within the blend.
+    /// few of these waypoints. The motion must pass each waypoint within the blend.
     #[test]
     fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);

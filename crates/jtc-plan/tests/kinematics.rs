@@ -175,9 +175,9 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1. The height of the wrist above the
-/// shoulder is at most the length of the two links together. Errors must contain the distance by which a position is
-/// out of reach.
+/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1. The height of the wrist above the shoulder
+/// is at most the length of the two links together. Errors must contain the distance from the reach of the arm to a
+/// position out of reach.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);
@@ -269,7 +269,7 @@ fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
     assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
 }
 
-/// Returns numbers of all kinds, most of which are invalid.
+/// Returns numbers of all kinds. Most of them are invalid.
 fn any_number() -> impl Strategy<Value = f64> {
     let special =
         vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300, 1e-300, 1e9];

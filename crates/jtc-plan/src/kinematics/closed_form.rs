@@ -125,7 +125,7 @@ fn moved(zero: &Axes, j: usize, angle: f64, point: &Vector3<f64>) -> Vector3<f64
 }
 
 impl Shoulder {
-    /// Returns up to four solutions of the first three joints with which `centre` is at `target`.
+    /// Returns up to four solutions of the first three joints that move `centre` to `target`.
     ///
     /// Let y = E₃·centre and z = E₁⁻¹·target. Because E₂ maps y to z, y and z have equal coordinates along axis 2 and
     /// equal distances from each point of axis 2.

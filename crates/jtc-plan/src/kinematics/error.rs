@@ -72,7 +72,7 @@ pub enum PoseError {
     JointStep {
         /// Joint.
         joint: Joint,
-        /// Angle by which the joint must turn, rad.
+        /// Angle that the joint must turn, rad.
         step: f64,
         /// Distance on the line within which the joint must turn, m.
         distance: f64,

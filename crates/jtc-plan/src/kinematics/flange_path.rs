@@ -48,7 +48,7 @@ impl FlangePath {
     ///
     /// Returns [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits. Returns
     /// [`PoseError::Leg`] for an error along a leg: a joint at its limit, a singular pose, or the end of the arm's
-    /// reach. Of several errors, the first error along the path is returned. All waypoints are checked before the
+    /// reach. If several errors occur, the first error along the path is returned. All waypoints are checked before the
     /// legs.
     pub fn new(
         kinematics: &Kinematics,

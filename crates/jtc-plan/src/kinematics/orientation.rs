@@ -89,7 +89,7 @@ pub(crate) fn checked(pose: &Pose) -> Result<Frame, PoseError> {
     if frame.rotation.determinant() < 0.0 {
         return Err(PoseError::NotRotation { deviation: 2.0 });
     }
-    // One Newton step towards the nearest rotation matrix. The remaining deviation is about the square of the
+    // A single Newton step towards the nearest rotation matrix. The remaining deviation is about the square of the
     // previous deviation.
     let rotation =
         frame.rotation * (Matrix3::identity() * 3.0 - frame.rotation.tr_mul(&frame.rotation)) * 0.5;

@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-29;
 /// Largest step of a joint in an iteration, rad. For larger steps, the linearisation is not accurate enough.
 const STEP: f64 = 0.7;
 /// Maximum joint difference between two solutions that are treated as one, rad. Such solutions occur near a
-/// singularity, where this joint difference moves the flange by only nanometres.
+/// singularity, because this joint difference moves the flange by only nanometres.
 pub(crate) const SAME: f64 = 1e-4;
 /// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).
 const SOLUTIONS: usize = 16;

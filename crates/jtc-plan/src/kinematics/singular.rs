@@ -35,9 +35,9 @@ pub struct Singularity {
     pub kind: SingularKind,
     /// Joints that can move while the flange is almost at rest.
     pub joints: Vec<Joint>,
-    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm. It is
-    /// the smallest motion of the flange for joint motions of 1 rad in total (root of the sum of squares). It is 0 in
-    /// a singular pose, and NaN if a joint position is NaN or infinite.
+    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm. This
+    /// value is the smallest motion of the flange for joint motions of 1 rad in total (root of the sum of squares). The
+    /// value is 0 in a singular pose, and NaN if a joint position is NaN or infinite.
     pub smallest: f64,
 }
 

@@ -140,7 +140,7 @@ pub struct Arm {
     pub temperature: JointVec,
     /// `true` for joints with a closed brake.
     pub braked: [bool; JOINTS],
-    /// Factor by which a fault multiplies the friction; normally 1.
+    /// A fault multiplies the friction by this factor; normally 1.
     pub friction_fault: JointVec,
 }
 
@@ -215,8 +215,8 @@ impl Arm {
         }
     }
 
-    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share
-    /// of the walls' damping with which the simulation is stable for this number of sub-steps.
+    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need. Also returns the share of
+    /// the walls' damping that keeps the simulation stable for this number of sub-steps.
     fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
         let (mut square, mut decay) = (0.0, 0.0);
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));

@@ -45,7 +45,7 @@ fn every_kind_is_read_by_its_own_name() {
         let keys = "joint = 1\ngripper = true\ntorque_nm = 3\nfile = \"a.csv\"\nfor_s = 1\nbits = 4\nrad = 0.1\nfactor = 2\ncelsius = 30\nprobability = 0.5\n\
                     position_m = [0, 0, 1]\nnormal = [0, 0, 1]\nstiffness_n_m = 1e4\ndamping_ns_m = 10\nside = \"above\"\n\
                     stiffness_nm_rad = 1e4\ndamping_nms_rad = 10\nmass_kg = 2\ncom_m = [0, 0, 0.1]\n";
-        // The test starts with all keys. It removes the key that each error message reports, until the file is
+        // The test starts with all keys. The test removes the key that each error message reports, until the file is
         // accepted.
         let mut keys: Vec<&str> = keys.lines().collect();
         let fault = loop {

@@ -23,8 +23,8 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// Creates a path. `points` contains joint positions (rad) that are `step_s` seconds apart. Returns `None` if there
-    /// are no points, if a number is not finite, or if `step_s` ≤ 0.
+    /// Creates a path. `points` contains joint positions (rad) that are `step_s` seconds apart. Returns `None` if
+    /// `points` is empty, if a number is not finite, or if `step_s` ≤ 0.
     pub fn new(points: Vec<JointVec>, step_s: f64) -> Option<Self> {
         let finite = points.iter().flatten().all(|q| q.is_finite());
         let good = !points.is_empty() && finite && step_s.is_finite() && step_s > 0.0;

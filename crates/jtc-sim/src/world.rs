@@ -31,7 +31,7 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Clock with which the board measures silence on its serial line, µs. `heard_us` is the time of the last byte.
+    /// Clock that the board uses to measure silence on its serial line, µs. `heard_us` is the time of the last byte.
     line_us: u64,
     heard_us: u64,
     /// Upper limit of the silence that the board measures on the serial line, µs. With `None`, the board measures the

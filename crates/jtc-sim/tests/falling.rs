@@ -55,8 +55,8 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
             let correction =
                 if joint.state == NodeState::ENABLED { joint.torque - joint.torque_model } else { 0.0 };
             let step = (correction - *last).abs();
-            // The correction is the commanded torque minus the model torque. It may change by 12 N·m or more only at
-            // a joint with an error, for example when the joint begins to yield (J-68).
+            // The correction is the commanded torque minus the model torque. The correction may change by 12 N·m or
+            // more only at a joint with an error, for example when the joint begins to yield (J-68).
             assert!(step < 12.0 || joint.internal != 0, "{after_ms} + {ms} ms: torque step of {step} N·m");
             *last = correction;
         }

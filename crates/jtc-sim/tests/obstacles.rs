@@ -189,9 +189,10 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// An elastic gear twists, so the joint encoder and the motor encoder measure different positions. The controller
-/// must not report this twist as an encoder jump or as a different speed scale, whatever the arm moves or touches.
-/// The test covers drives that measure the position at the motor, and drives that measure it at the link.
+/// An elastic gear twists, so the joint encoder and the motor encoder measure different positions. The controller must
+/// not report this twist as an encoder jump or as a different speed scale, regardless of the load or the object that
+/// the arm moves or touches. The test covers drives that measure the position at the motor, and drives that measure it
+/// at the link.
 #[test]
 fn j35_gears_that_yield_are_no_false_alarm() {
     for (trial, place) in

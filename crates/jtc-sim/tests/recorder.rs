@@ -131,7 +131,7 @@ fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // In each tick, the host sends many short frames, which are executed quickly. It also sends a parameter
+        // In each tick, the host sends many short frames, which are executed quickly. The host also sends a parameter
         // frame, which makes the recorder store a new snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));

@@ -35,8 +35,8 @@ fn j33_a_loaded_arm_stands_within_its_time() {
     }
 }
 
-/// The arm lowers a payload of 3.3 kg that the arm model contains. The controller must stop the arm in time where the
-/// holding torque is 95 % of the torque limit.
+/// The arm lowers a payload of 3.3 kg that the arm model contains. The controller must stop the arm in time at a pose
+/// whose holding torque is 95 % of the torque limit.
 #[test]
 fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     let model = with_payload(3.3);

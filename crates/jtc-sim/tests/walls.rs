@@ -264,7 +264,7 @@ fn what_is_not_there_changes_no_bit() {
     }
 }
 
-/// Returns the gravity torque of an arm at rest, computed from the acceleration with which it falls.
+/// Returns the gravity torque of an arm at rest, computed from the acceleration of its fall.
 fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
     let mut falling = arm.clone();
     let dt = 1e-7;

@@ -78,8 +78,8 @@ pub(super) struct Contact {
     surface: Surface,
     stiffness: f64,
     damping: f64,
-    /// Distance by which the current surface is inside the configured surface, m or rad. It is above 0 while a wall
-    /// that was created inside the arm has not reached its configured position.
+    /// Distance that the current surface is inside the configured surface, m or rad. This distance is above 0 while a
+    /// wall that was created inside the arm has not reached its configured position.
     recess: f64,
 }
 

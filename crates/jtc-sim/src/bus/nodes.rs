@@ -45,7 +45,7 @@ impl Nodes {
         let answer = self.receive(node, now_us, request)?;
         let mut frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
         if matches!(answer, Answer::Gripper(_)) {
-            // Real grippers send 20 bytes, of which the last bytes have no meaning.
+            // Real grippers send 20 bytes. The last of these bytes have no meaning.
             let mut data = [0; GRIPPER_ANSWER];
             let len = frame.data().len().min(GRIPPER_ANSWER);
             data[..len].copy_from_slice(&frame.data()[..len]);

@@ -3,8 +3,8 @@
 //!
 //! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a
 //! good frame. A run ends at the next good frame or at a gap. The parser reports one event for a run, as soon as it
-//! knows the fault of the first byte. It skips the other bytes of the run without an event. An incomplete frame ends
-//! when its last byte arrives, or at a gap. After a gap, the parser scans again from the second byte of the
+//! knows the fault of the first byte. The parser skips the other bytes of the run without an event. An incomplete frame
+//! ends when its last byte arrives, or at a gap. After a gap, the parser scans again from the second byte of the
 //! incomplete frame. A false header therefore does not hide the frames that follow it.
 //!
 //! Terms: a *candidate* is a position with a header, a known type and a length that is valid for this type. A *gap*

@@ -28,9 +28,9 @@ fn only_frames_of_floats_are_made_of_floats() {
     assert_eq!(Command::PidParam(Floats::new(&bytes)).emit(&mut out), Err(error));
 }
 
-/// If the buffer is too short, the encoder reports a needed length. This length must be greater than the length of
-/// the buffer, and not greater than the length of the complete frame. It can be less than the complete length,
-/// because the encoder stops before it has read all numbers.
+/// If the buffer is too short, the encoder reports a needed length. This length must be greater than the length of the
+/// buffer, and not greater than the length of the complete frame. The needed length can be less than the complete
+/// length, because the encoder stops before it has read all numbers.
 #[test]
 fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     type Encoder = fn(&mut [u8]) -> Result<usize, EncodeError>;

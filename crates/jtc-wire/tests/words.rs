@@ -52,7 +52,7 @@ fn bits_in_words() {
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
 }
 
-/// One table in the code contains the masks and the texts of a word. This table must agree with the table of the
+/// A table in the code contains the masks and the texts of a word. This table must agree with the table of the
 /// protocol.
 #[test]
 fn masks_have_the_texts_of_their_bits() {

@@ -82,8 +82,8 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
     assert_eq!(Info::parse(&later).unwrap().reactions, Some(Reactions { stop: None, ..reactions }));
 }
 
-/// The text of every cause must contain the number of the joint, except for the kind Approach. It must also contain
-/// the unit of the value, except for the kind Unstable.
+/// The text of every cause must contain the number of the joint, except for the kind Approach. The text must also
+/// contain the unit of the value, except for the kind Unstable.
 #[test]
 fn j69_every_cause_has_its_words() {
     for kind in StopKind::ALL {

@@ -143,7 +143,7 @@ fn a_short_buffer() {
 }
 
 /// Bytes in the middle of a frame are lost. The parser must report the loss with one response record (J-04), and must
-/// not treat the last bytes of this frame as a frame. It must find the next frame at its true position.
+/// not treat the last bytes of this frame as a frame. The parser must find the next frame at its true position.
 #[test]
 fn j04_lost_bytes_have_one_record_and_are_not_joined_across() {
     let mut receiver = receiver();

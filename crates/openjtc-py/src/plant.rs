@@ -158,7 +158,7 @@ impl Plant {
             let states = self.plant.node_states();
             let all = |state: NodeState| states[..JOINTS].iter().all(|each| *each == state);
             if all(NodeState::ENABLED) {
-                // The answers to this request contain the measured values with which the first step begins.
+                // The answers to this request contain the measured values at the beginning of the first step.
                 self.ask(&Request::zero_torque(false));
                 self.ticks = 0;
                 return Ok(());

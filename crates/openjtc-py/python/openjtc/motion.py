@@ -201,8 +201,7 @@ def followed(robot: Robot, begin: Callable[[], Motion], progress: bool | None) -
         _show(motion, progress)
     except BaseException as error:
         # Ctrl-C in Python code, or an error of the progress bar, may interrupt the wait. The arm is then stopped,
-        # because no caller waits for the motion any more. After an `Exception` before the start, there is no
-        # motion to stop.
+        # because no caller waits for the motion any more. An `Exception` before the start leaves no motion to stop.
         if motion is not None or not isinstance(error, Exception):
             robot._link.rest()
         raise

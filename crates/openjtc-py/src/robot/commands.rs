@@ -31,8 +31,8 @@ impl WorkerState {
     /// Teaching, even if another program has enabled it, because the caller expects that the controller holds the arm.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         self.session.port_mut().take_over();
-        // The Stop is sent before any query. It can therefore reach the controller even if this program receives no
-        // bytes.
+        // The Stop is sent before any query. The Stop can therefore reach the controller even if this program receives
+        // no bytes.
         let stopped = match self.session.stop() {
             // The controller refuses a Stop if no motion is in progress.
             Err(Error::Link(LinkError::Refused { .. })) => Ok(()),

@@ -42,7 +42,7 @@ pub(crate) struct Order {
     /// `true` if the caller confirms that the limits, gravity and rotor inertia in the controller are safe for the
     /// arm, although they can differ from the values of the arm.
     pub accept_device_limits: bool,
-    /// Path of a recording. The second field is `true` if an existing recording is to be overwritten.
+    /// Path of a recording. The second field is `true` if an existing recording must be overwritten.
     pub record: Option<(PathBuf, bool)>,
     /// Progress of the run, which other threads can read.
     pub progress: Arc<Mutex<Progress>>,

@@ -127,8 +127,8 @@ impl AnyPort {
         }
     }
 
-    /// Handles a frame that the line did not send because of another program's Stop or Pause. The waiting requests
-    /// were made before that Stop or Pause, so they are cancelled. They are kept only if the frame is an Execute and
+    /// Handles a frame that the line did not send because of another program's Stop or Pause. The waiting requests were
+    /// made before that Stop or Pause, so they are cancelled. The requests are kept only if the frame is an Execute and
     /// the motion stays paused.
     fn withheld(&mut self, frame: &[u8], moved: bool) {
         self.take_foreign_halts();

@@ -56,7 +56,7 @@ impl Tap {
         if let Some(sender) = &*lock(&self.sink.0) {
             let passed = self.start.elapsed();
             let time_ns = (self.began_at + passed).as_nanos() as u64;
-            // An error is ignored. It means that the writer has ended, for example because the disk is full. The
+            // An error is ignored. The error means that the writer has ended, for example because the disk is full. The
             // writer itself reports the cause.
             let _ = sender.send(Taken(passed.as_micros() as u64, time_ns, *frame));
         }

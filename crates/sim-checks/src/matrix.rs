@@ -149,8 +149,8 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// Cell of the matrix. It contains the reaction to the fault, and the way in which the arm returns to position hold
-/// after ClearCurrentErrors. If the controller has lost the parameters, the host sends them again.
+/// Cell of the matrix. The cell contains the reaction to the fault, and the way in which the arm returns to position
+/// hold after ClearCurrentErrors. If the controller has lost the parameters, the host sends them again.
 struct Cell {
     reaction: Reaction,
     back: Back,

@@ -37,9 +37,8 @@ impl MotionWatch {
         self.torque(moment)
     }
 
-    /// Checks J-33: after a Pause or Stop, the arm comes to rest in time, unless an error removes the torque. If a
-    /// push needs so much torque that too little remains for braking, the time limit is `braking_ms_max` instead of
-    /// `stop_ms`.
+    /// Checks J-33: after a Pause or Stop, the arm comes to rest in time, unless an error removes the torque. If the
+    /// torque for a push leaves too little for braking, the time limit is `braking_ms_max` instead of `stop_ms`.
     fn stop(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {

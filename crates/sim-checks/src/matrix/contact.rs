@@ -7,7 +7,7 @@ use super::standstill::state_then;
 use super::{MatrixError, bring_to, config_for};
 use jtc_sim::{Fault, FaultKind, ModelError, Operator, Side, Support, Trigger, host};
 
-/// Observed time, ms. It is longer than the remaining motion.
+/// Observed time, ms. This time is longer than the remaining motion.
 const WATCH_MS: u64 = 5_000;
 /// Duration of a push, ms. `PUSH_SHARE` is its torque as a share of the largest push that a joint can hold.
 const PUSH_MS: u64 = 500;
@@ -61,8 +61,8 @@ impl Meets {
         }
     }
 
-    /// Returns the deviation from the arm model that represents the influence. It exists from the start of the
-    /// simulation. For a push, a contact or a load, there is no deviation.
+    /// Returns the deviation from the arm model that represents the influence. The deviation exists from the start of
+    /// the simulation. A push, a contact or a load causes no deviation.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -108,8 +108,8 @@ fn load(mass: f64) -> FaultKind {
     FaultKind::Payload { mass, com: [0.0, 0.0, 0.05] }
 }
 
-/// Returns the torque of a push in the direction of gravity, N·m. It is 0.8 times the largest push that the joint can
-/// hold: 95 % of its torque limit minus 1.1 times its load.
+/// Returns the torque of a push in the direction of gravity, N·m. This torque is 0.8 times the largest push that the
+/// joint can hold: 95 % of its torque limit minus 1.1 times its load.
 fn push(operator: &Operator, joint: usize) -> f64 {
     let config = operator.world.config();
     let q = operator.world.truth().q;

@@ -1,7 +1,8 @@
 //! Access control: tokens, and checks of the origin of a request.
 //!
 //! A web page of another site that is open in a browser can send requests to the address of this computer. The agent
-//! recognises such a request by its `Origin` header. The page can also point its own host name to the address of this
+//! recognises such a request by its `Origin` header. For images, scripts and links of a page, browsers send no `Origin`;
+//! the agent recognises these requests by their `Sec-Fetch-Site` header. The page can also point its own host name to the address of this
 //! computer (DNS rebinding). The agent recognises this by the `Host` header, which contains the page's host name. The
 //! agent refuses a request of a page of another site, even with a valid token, unless the page's origin has read-only
 //! access.
@@ -67,6 +68,9 @@ pub struct Request<'a> {
     pub host: Option<&'a str>,
     /// `Origin` header, which browsers send.
     pub origin: Option<&'a str>,
+    /// `Sec-Fetch-Site` header: relation of the page that sends the request to this agent. Browsers send this header
+    /// with every request; other programs do not send it.
+    pub site: Option<&'a str>,
     /// Token of the request, if it has one.
     pub token: Option<&'a str>,
     /// Token in the URL, for clients that cannot send a token in a header. The agent accepts only the viewer's token
@@ -172,12 +176,16 @@ impl Access {
     ///
     /// [`Refusal::Host`] or [`Refusal::Origin`].
     pub fn is_foreign(&self, request: &Request<'_>) -> Result<bool, Refusal> {
-        let site = request.origin.map(str::to_lowercase);
+        let origin = request.origin.map(str::to_lowercase);
         match self.is_own(request.host, request.origin) {
             Err(Refusal::Origin(_))
-                if request.looks && site.is_some_and(|site| self.origins.contains(&site)) =>
+                if request.looks && origin.as_ref().is_some_and(|origin| self.origins.contains(origin)) =>
             {
                 Ok(true)
+            }
+            // Another port of this computer is the same site, but it belongs to another program.
+            Ok(()) if origin.is_none() && matches!(request.site, Some("cross-site" | "same-site")) => {
+                Err(Refusal::Origin("another site".to_owned()))
             }
             own => own.map(|()| false),
         }
@@ -246,7 +254,16 @@ mod tests {
         token: Option<&str>,
     ) -> Result<Role, Refusal> {
         let peer = peer.parse().expect("an address");
-        let request = Request { peer, host, origin, token, address_token: None, looks: false, halts: false };
+        let request = Request {
+            peer,
+            host,
+            origin,
+            site: None,
+            token,
+            address_token: None,
+            looks: false,
+            halts: false,
+        };
         access.enter(&request).map(|entry| entry.role)
     }
 
@@ -261,6 +278,7 @@ mod tests {
                     peer,
                     host: Some(HERE),
                     origin: Some(from),
+                    site: None,
                     token,
                     address_token: None,
                     looks: true,
@@ -278,6 +296,7 @@ mod tests {
                 peer,
                 host: Some(HERE),
                 origin: Some(from),
+                site: None,
                 token: None,
                 address_token: None,
                 looks: true,
@@ -304,6 +323,7 @@ mod tests {
                 peer,
                 host: Some(HERE),
                 origin: None,
+                site: None,
                 token,
                 address_token,
                 looks: true,
@@ -352,6 +372,37 @@ mod tests {
     }
 
     #[test]
+    fn requests_that_a_browser_marks_as_from_another_site_are_refused() {
+        let access = access().allowing(&["https://app.example".to_owned()]);
+        let operator = "o".repeat(43);
+        let enter = |origin, site, looks, halts| {
+            let peer = "127.0.0.1".parse().expect("an address");
+            let (host, token) = (Some(HERE), Some(operator.as_str()));
+            access.enter(&Request { peer, host, origin, site, token, address_token: None, looks, halts })
+        };
+        let own = "http://127.0.0.1:8780";
+        for (looks, halts) in [(true, false), (false, false), (false, true)] {
+            // An image, a script or a link of a page of another site, or of another port of this computer.
+            for site in ["cross-site", "same-site"] {
+                let refused = enter(None, Some(site), looks, halts);
+                assert_eq!(refused, Err(Refusal::Origin("another site".into())), "{site}");
+            }
+            // A page of this agent, an address that the user has typed, and a program.
+            for (origin, site) in [
+                (Some(own), Some("same-origin")),
+                (None, Some("same-origin")),
+                (None, Some("none")),
+                (None, None),
+            ] {
+                let entry = enter(origin, site, looks, halts).expect("it is let in");
+                assert_eq!(entry, Entry { role: Role::Operator, looks_only: false }, "{site:?}");
+            }
+        }
+        let allowed = enter(Some("https://app.example"), Some("cross-site"), true, false);
+        assert_eq!(allowed, Ok(Entry { role: Role::Viewer, looks_only: true }));
+    }
+
+    #[test]
     fn from_elsewhere_nobody_gets_in_without_a_token_and_wrong_ones_are_counted() {
         let access = access();
         let from = |token: Option<&str>| role(&access, "10.0.0.9", Some(HERE), None, token);
@@ -371,8 +422,16 @@ mod tests {
         let access = access();
         let enter = |peer: &str, origin, (token, address_token), halts| {
             let peer = peer.parse().expect("an address");
-            let request =
-                Request { peer, host: Some(HERE), origin, token, address_token, looks: false, halts };
+            let request = Request {
+                peer,
+                host: Some(HERE),
+                origin,
+                site: None,
+                token,
+                address_token,
+                looks: false,
+                halts,
+            };
             access.enter(&request).map(|entry| entry.role)
         };
         let operator = "o".repeat(43);
@@ -417,6 +476,7 @@ mod tests {
                 peer,
                 host: Some(HERE),
                 origin: Some(origin),
+                site: None,
                 token: None,
                 address_token: None,
                 looks: true,

@@ -6,7 +6,7 @@ use axum::body::Body;
 use axum::extract::rejection::ExtensionRejection;
 use axum::extract::{ConnectInfo, FromRequestParts, Query, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
@@ -17,10 +17,13 @@ use crate::api::Problem;
 use crate::cut::cut;
 use crate::lease::key_of;
 use crate::log::CommandLog;
+use crate::pages::SHOWN_TO;
 use crate::problem::Denial;
 
 /// Prefix of the token in the protocol list of a WebSocket.
 const BEARER: &str = "bearer.";
+/// Header in which a browser states the relation of a page to the address of the page's request.
+const SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 /// Longest name of a client, in characters.
 const NAME_MAX: usize = 64;
 
@@ -155,6 +158,7 @@ pub async fn let_in(
         peer: peer.ip(),
         host: text_of(headers, header::HOST),
         origin: text_of(headers, header::ORIGIN),
+        site: text_of(headers, SITE),
         token: text_of(headers, header::AUTHORIZATION).map(bearer_token).or_else(|| protocol_token(headers)),
         address_token: address_token.as_deref(),
         looks: looks(method, request.uri().path()),
@@ -179,6 +183,8 @@ pub async fn let_in(
             }
             let mut response = if looks_only { may_read(response, origin) } else { response };
             let headers = response.headers_mut();
+            let shown_to = if looks_only { "cross-origin" } else { "same-origin" };
+            headers.insert(SHOWN_TO, HeaderValue::from_static(shown_to));
             headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
             headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
             headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));

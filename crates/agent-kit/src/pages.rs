@@ -34,7 +34,7 @@ const LASTING: &str = "assets/";
 const COMPRESSED: [&str; 3] = ["png", "woff2", "ico"];
 
 /// HTTP header that states which sites may use a file.
-const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
+pub(crate) const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
 /// Dashboard file, ready to be sent.
 struct File {

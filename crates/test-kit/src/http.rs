@@ -156,6 +156,11 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         assert_eq!(http.ask(request, &[&rebound, &bearer]).0, 403, "{request}: a name that points here");
         let neighbour = format!("Origin: http://127.0.0.1:{}", port ^ 1);
         assert_eq!(http.ask(request, &[&own, &neighbour]).0, 403, "{request}: another program's page");
+        // Browsers mark an image, a script or a link of a page of another site, or of another port of this computer.
+        for site in ["cross-site", "same-site"] {
+            let mark = format!("Sec-Fetch-Site: {site}");
+            assert_eq!(http.ask(request, &[&own, &mark, &bearer]).0, 403, "{request}: {mark}");
+        }
         // A Stop and a Pause from this computer need no token, so they succeed even with a wrong token.
         let refused = if ["POST /api/stop", "POST /api/pause"].contains(request) { 200 } else { 401 };
         for token in ["Bearer 0123456789abcdefghij", "Basic b3BlcmF0b3I6"] {
@@ -166,7 +171,10 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
             );
         }
     }
-    assert_eq!(http.get("GET /api/status").0, 200);
+    for site in ["same-origin", "none"] {
+        let mark = format!("Sec-Fetch-Site: {site}");
+        assert_eq!(http.ask("GET /api/status", &[&own, &mark, &bearer]).0, 200, "{mark}");
+    }
     // A GET request must not cause a Stop. Otherwise, an image or a link on a page could stop the arm or the boards.
     assert_eq!(http.get("GET /api/stop").0, 405);
 }

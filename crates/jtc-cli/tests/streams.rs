@@ -89,7 +89,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert_eq!(result["outcome"], "refused");
 }
 
-/// A failure during a motion is reported at once. The first cause is the first in the list.
+/// A failure during a motion is reported at once. The list of causes begins with the cause that occurred first.
 #[test]
 fn what_breaks_in_motion_is_reported_at_once() {
     let fault =

@@ -41,7 +41,7 @@ pub struct ArmModel {
     pub links: [Link; 7],
 }
 
-/// Position of a number in a joint or link of an [`ArmModel`].
+/// Numeric field of a joint or a link of an [`ArmModel`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Field {

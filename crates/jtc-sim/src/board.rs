@@ -22,7 +22,7 @@ const TICK_US: u32 = 1000;
 /// Maximum number of bytes that are passed to the parser at once.
 const CHUNK: usize = 4096;
 
-/// Number of ticks that storing an arm takes, equal to the erase time of a flash sector.
+/// Number of ticks that storing the arm parameters takes. This is the erase time of a flash sector.
 const STORE_MS: u32 = 2_000;
 
 /// Maximum number of polls of the parser between two ticks. The polls represent the free processor time of the real

@@ -40,7 +40,7 @@ pub struct Followed {
     pub commands: usize,
     /// Reasons why the test did not run blocks.
     pub left_out: Vec<String>,
-    /// Differences between the page and the output.
+    /// Differences between the documentation page and the output of the commands.
     pub wrong: Vec<String>,
 }
 

@@ -54,7 +54,7 @@ impl TimedBus {
             if senders.contains(&number) || !self.members[number.0].on_bus() {
                 continue;
             }
-            // A member that lost a collision receives the frame, as on a real bus.
+            // A member that lost the arbitration receives the winning frame, as on a real bus.
             self.count(number, Counters::received);
             match &mut self.members[number.0].lines {
                 Some(lines) => lines.1.put(now, frame),

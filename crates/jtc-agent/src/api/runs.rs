@@ -116,7 +116,7 @@ pub(super) struct JobObject {
     pub stage: String,
     /// Number of finished motions, without approaches.
     pub runs: u32,
-    /// Results of its last motion.
+    /// Results of the last motion of this job.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub result: Option<ResultObject>,
     /// Address of the report page of its last motion. Missing if nothing moved, or if later reports have replaced the

@@ -141,7 +141,7 @@ impl Diagnose for StateError {
             Self::NotMeasured { .. } => Diagnosis::new(
                 ErrorKind::Device,
                 "not-measured",
-                next!("{} shows the joints, {} brings them up", Status, Recover),
+                next!("{} shows the state of the joints, {} makes them ready", Status, Recover),
             ),
             Self::WouldFall { state, .. } => {
                 let next = if *state == ControllerState::Operate {

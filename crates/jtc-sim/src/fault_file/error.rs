@@ -14,7 +14,7 @@ pub enum FaultFileError {
     Syntax(String),
     /// The fault file does not contain `format = 2`.
     Format {
-        /// Format number of the file.
+        /// Version of the file format, if the file states it.
         found: Option<f64>,
     },
     /// The fault file uses the key `node`, which only formats before 2 contain.

@@ -25,7 +25,7 @@ const LISTEN: Duration = Duration::from_millis(600);
 /// Time for which requests without the lease do not query a board again after the board returned no names.
 const LEFT_ALONE: Duration = Duration::from_secs(3);
 
-/// Session on the bus, and the data of this session.
+/// Owner of a session on the bus: executes the requests and stores the data of the session.
 pub(crate) struct Worker {
     pub session: Session,
     /// Records of the images that firmware updates wrote to boards.

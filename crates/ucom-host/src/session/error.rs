@@ -270,8 +270,12 @@ impl Diagnose for ValuesError {
             Self::Unknown { board, .. } => Diagnosis::new(
                 Fault,
                 "unknown",
-                next!("{} shows its state; {}, and write them again", BoardStatus, BoardStart)
-                    .of_board(*board),
+                next!(
+                    "{} shows the state of the board; {}, then write the values again",
+                    BoardStatus,
+                    BoardStart
+                )
+                .of_board(*board),
             ),
             Self::File { hint, .. } => Diagnosis::new(Usage, "usage", *hint),
             Self::Misfit { .. } => Diagnosis::new(

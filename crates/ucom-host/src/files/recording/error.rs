@@ -65,7 +65,7 @@ pub enum RecordProblem {
     #[error("the data are not pairs of hexadecimal digits, or have more than 8 bytes")]
     Data,
     /// The file ends in the middle of the record in this line. The readable part of the line may be only the beginning of the record.
-    #[error("the file is broken off here: the line has no end")]
+    #[error("the file ends in the middle of this line")]
     Truncated,
     /// The line of the FZI-CAN file has a wrong number of columns.
     #[error("a line of FZI-CAN is `sec.usec id dlc` and eight bytes")]

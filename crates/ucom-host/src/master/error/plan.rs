@@ -79,7 +79,7 @@ pub enum SecondImageError {
         plan: Plan,
     },
     /// The user gave a second image, but the plan uses only one image.
-    #[error("plan `{plan}` sends one image twice and does not use a second image")]
+    #[error("plan `{plan}` sends the first image twice and never sends a second one")]
     Unused {
         /// Value of `prog.plan` in the profile.
         plan: Plan,

@@ -16,7 +16,7 @@ use anyhow::{Context, Result, bail, ensure};
 use mdbook_driver::MDBook;
 use mdbook_driver::config::Config;
 
-/// File that every book made by mdbook contains. It shows that an output folder contains an earlier book.
+/// File that every book made by mdbook contains. The file shows that an output folder contains an earlier book.
 const MARK: &str = "searcher.js";
 
 fn main() -> Result<()> {

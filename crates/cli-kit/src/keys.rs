@@ -29,8 +29,8 @@ pub enum Key {
     Escape,
 }
 
-/// Converts bytes of a terminal to keys, and returns the remaining bytes. They are the possible start of a key whose
-/// other bytes have not arrived yet.
+/// Converts bytes of a terminal to keys, and returns the remaining bytes. The remaining bytes are the possible start
+/// of a key whose other bytes have not arrived yet.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
     let (mut keys, mut rest) = (Vec::new(), bytes);

@@ -173,8 +173,8 @@ mod tests {
         lines.iter().map(ToString::to_string).collect()
     }
 
-    /// The live view never truncates the text of a cause. It counts the causes that do not fit, and shows them as the
-    /// first rows of the scrolled part.
+    /// The live view never truncates the text of a cause. The view counts the causes that do not fit, and shows them as
+    /// the first rows of the scrolled part.
     #[test]
     fn causes_are_shown_whole_or_scroll() {
         let trouble = Trouble {

@@ -133,8 +133,8 @@ impl Terminal {
     /// terminal open.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
-        // The reading thread ends when `closed` is set. It owns the last handle of the user's side, so the terminal
-        // then hangs up.
+        // The reading thread ends when `closed` is set. This thread owns the last handle of the user's side, so the
+        // terminal then hangs up.
         self.closed.store(true, Ordering::Relaxed);
         self.reader.take().map(JoinHandle::join);
     }

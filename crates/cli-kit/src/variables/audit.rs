@@ -42,7 +42,7 @@ const PLACES: [&str; 11] = [
     "ORIGIN",
 ];
 
-/// Returns all faults of the environment variables of a command line. The list is empty if there are no faults.
+/// Returns all faults of the environment variables of a command line. The list is empty if no faults exist.
 /// `allowed` lists each variable with the reason why it is allowed. `without` lists options that name a file and
 /// still have no variable, for example `update --data`.
 pub fn faults<Cli: CommandFactory>(
@@ -104,7 +104,7 @@ fn lists(
         faults.push(format!("no option has the allowed variable {variable}"));
     }
     for option in without.iter().filter(|one| options.iter().all(|(typed, _)| typed != *one)) {
-        faults.push(format!("there is no option {option}"));
+        faults.push(format!("no option {option} exists"));
     }
     let commands = commands(root);
     for retired in variables.retired {
@@ -132,7 +132,7 @@ fn lists(
     }
     for words in variables.offline {
         if commands.iter().all(|(name, _)| name != words) {
-            faults.push(format!("there is no command {words}"));
+            faults.push(format!("no command {words} exists"));
         }
     }
     faults
@@ -142,11 +142,11 @@ fn lists(
 fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
     match kind {
-        Kind::File | Kind::Output if is_flag || !names_place => Some("its value is no file or folder"),
+        Kind::File | Kind::Output if is_flag || !names_place => Some("its value is not a file or folder"),
         Kind::Line | Kind::Limit if is_flag => Some("it has no value"),
         Kind::Caution if !is_flag => Some("it has a value"),
         _ if is_flag && arg.get_value_parser().type_id() != clap::builder::ValueParser::bool().type_id() => {
-            Some("it is no on/off option")
+            Some("it is not an on/off option")
         }
         _ => None,
     }

@@ -3,8 +3,8 @@
 use cli_kit::{ErrorKind, Failure};
 use std::io::{BufRead, IsTerminal, Write};
 
-/// Asks `question` and continues only if the answer is `yes`. Rejects the command if no terminal is present. The hint then suggests
-/// `option`, with which the user confirms in advance.
+/// Asks `question` and continues only if the answer is `yes`. Rejects the command if no terminal is
+/// present. The hint then suggests `option`: the user can confirm in advance using this option.
 pub(crate) fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
         Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)

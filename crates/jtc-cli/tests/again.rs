@@ -220,7 +220,7 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
 }
 
 /// If the second of three runs is interrupted, the command executes the remainder of this run, and then the third
-/// run. The same holds for the recording of a continued run, and for a run that the controller has finished after its
+/// run. The test also covers the recording of a continued run, and a run that the controller has finished after its
 /// program was killed.
 #[test]
 fn the_runs_that_are_left_are_run() {

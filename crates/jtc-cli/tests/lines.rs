@@ -132,7 +132,7 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
                 corners.windows(2).map(|c| off_leg(pose.position, c[0], c[1])).fold(f64::INFINITY, f64::min);
             let corner =
                 corners[1..3].iter().map(|c| norm(sub(pose.position, *c))).fold(f64::INFINITY, f64::min);
-            assert!(off < 1e-4 || corner < blend + 1e-4, "{off} m beside the legs at {time} s");
+            assert!(off < 1e-4 || corner < blend + 1e-4, "{off} m off the legs at {time} s");
         }
         for (time, corner) in times(&printed).iter().zip(corners) {
             let there =

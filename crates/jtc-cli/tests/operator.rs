@@ -255,8 +255,8 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
-/// If the user presses Ctrl-C while a jog waits for the drives, the command reports that it has sent no jog. It does
-/// not report a jog by 0 rad.
+/// If the user presses Ctrl-C while a jog waits for the drives, the command reports that it has sent no jog. The
+/// command does not report a jog by 0 rad.
 #[test]
 fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     let sim = Sim::start(&[]);

@@ -56,7 +56,7 @@ fn j60_a_payload_that_is_given_is_carried() {
     let set = sim.json(&["payload", "set", "--mass", "3", "--com", "0,0,0.05"], 0);
     assert_eq!((mass(&set), mass(&set["before"])), (3.0, 0.0));
     let info = sim.json(&["info"], 0);
-    assert_eq!((mass(&info["payload"]), &info["hash"]), (3.0, &hash), "it is no part of the arm");
+    assert_eq!((mass(&info["payload"]), &info["hash"]), (3.0, &hash), "it is not a part of the arm");
     std::thread::sleep(std::time::Duration::from_secs(2));
     assert_eq!(sim.end("-TERM").0, 0);
     let (before, after) = missing(&std::fs::read_to_string(record).unwrap());

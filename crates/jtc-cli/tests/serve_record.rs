@@ -1,4 +1,4 @@
-//! Tests of `jtc serve --record`, with which the agent records the motions of all clients.
+//! Tests of `jtc serve --record`: the agent records the motions of all clients.
 #![cfg(unix)]
 
 use crate::common;

@@ -106,7 +106,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     );
     let holder = &stopped["arms"][0]["holder"]["program"];
     assert_eq!(holder, "jtc traj run", "{stopped}");
-    // The same test with text output, with the real path of the port, and with `jtc run` and `jtc traj stop` instead
+    // Same test with text output, with the real path of the port, and with `jtc run` and `jtc traj stop` instead
     // of `jtc traj run` and `jtc stop`.
     let child = cell.moving(&["run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     let real = std::fs::canonicalize(&cell.0.port).unwrap();

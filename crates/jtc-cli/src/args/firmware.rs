@@ -24,9 +24,9 @@ pub(crate) enum FirmwareCommand {
             command can find this port only on Linux. Before flashing, the command asks the controller at \
             the board's own port for its state. With --port, the command also asks the controller at the \
             port of this option. The command refuses to flash (exit code 4) if the board's own port cannot \
-            be used. It also refuses if the port of --port is in use, or if a controller reports torque. No \
+            be used. The command also refuses if the port of --port is in use, or if a controller reports torque. No \
             option overrides these checks.\n\n\
-            On a terminal, the command asks for confirmation before flashing. It does not ask if the \
+            On a terminal, the command asks for confirmation before flashing. The command does not ask if the \
             controller at the board's own port reports zero torque, answers of all joints, and a gripper \
             that is off. With --yes, the command never asks.\n\n\
             The processor core of some boards can have one of two supplies (SMPS or LDO). Do not flash an \

@@ -12,7 +12,7 @@ pub(crate) enum LogCommand {
     /// Read the flight recorder, and report the first error
     #[command(
         after_help = "The report shows the first error, and the events before and after this error.\n\n\
-            The flight recorder is a memory in the controller. It contains every control cycle (tick, 1 ms) \
+            The flight recorder is a memory in the controller. This memory contains every control cycle (tick, 1 ms) \
             of the last seconds (at least 2 s), and stops 0.3 s after the first error. The stopped log \
             survives a reset, and stays in the controller until `jtc log clear`. `jtc clear` does not delete \
             the log. A new log replaces a log without any commanded torque as soon as the torque is on. You \

@@ -170,8 +170,8 @@ pub(crate) enum TrajCommand {
     Stop(LinkArgs),
     /// Set or show the speed override, in percent (5 to 100)
     #[command(
-        after_help = "The override slows down the present motion and later motions. It does not change the \
-            path. The speed changes gradually. The controller must have the protocol extensions (see `jtc \
+        after_help = "The override slows down the present motion and later motions. The path does not \
+            change. The speed changes gradually. The controller must have the protocol extensions (see `jtc \
             info`). Without a number, the command shows the present override.\n\n\
             Examples:\n  \
             jtc traj speed 30\n  \

@@ -81,8 +81,8 @@ pub(crate) struct ServeArgs {
     pub record: Option<PathBuf>,
     /// Limit the size of the recordings.
     ///
-    /// When the recordings reach this size, the agent deletes the oldest recordings. It deletes only recordings of
-    /// agents
+    /// When the recordings reach this size, the agent deletes the oldest recordings. The agent deletes only
+    /// recordings of agents
     #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = record_size)]
     pub record_limit: u64,
     /// Let a PLC control the arm by Modbus TCP at this address.

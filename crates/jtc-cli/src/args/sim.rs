@@ -134,7 +134,8 @@ pub(crate) struct SimArgs {
     pub bus: Option<String>,
     /// Record one sample per ms to this .mcap or .csv file.
     ///
-    /// The recording starts at power-up. It contains commanded and measured positions, velocities, torques and states
+    /// The recording starts at power-up. The samples contain commanded and measured positions, velocities, torques and
+    /// states
     #[arg(long, env = "JTC_SIM_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]

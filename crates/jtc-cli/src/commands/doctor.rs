@@ -24,7 +24,7 @@ pub(super) fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     out.note(format!("listening on {name} at {} Bd", link.baud));
     let mut session = link.session()?;
     let mut seen = session.examine(LISTEN)?;
-    // The error bit `EXTERNAL_JOINTS` has several causes. One cause is a drive that answers although its joint is
+    // The error bit `EXTERNAL_JOINTS` has several causes. For example, a drive answers although its joint is
     // declared absent (J-53). Therefore the command asks the controller which joints are declared absent.
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
     seen.absent = match &seen.status {

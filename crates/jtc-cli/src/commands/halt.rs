@@ -87,7 +87,7 @@ fn failed_json(failure: &Failure) -> Value {
 fn not_asked(arms: &[Arm]) -> Vec<String> {
     let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
     if asked.is_empty() {
-        // No port is known, so the command uses the only port of the computer. There is no other port to list.
+        // No port is known, so the command uses the only port of the computer. No other port can be listed.
         return Vec::new();
     }
     let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
@@ -378,7 +378,7 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
 }
 
 /// Stops one arm, and waits until the arm is at rest. If the program that has executed the Stop ends before that, the
-/// function sends the Stop again. It uses the port directly, or the next program that has opened the port.
+/// function sends the Stop again. The function uses the port directly, or the next program that has opened the port.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {

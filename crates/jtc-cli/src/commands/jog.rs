@@ -61,8 +61,8 @@ pub(super) fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     };
     // The command stops the arm at once after every end of the jog, without waiting for the timeout of the controller.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // If an error has switched off the torque, it is the cause of all other failures. It may also be the only
-    // failure, because the jog itself can succeed. Therefore the command reports this error first.
+    // If an error has switched off the torque, it is the cause of all other failures. The error may also be the
+    // only failure, because the jog itself can succeed. Therefore the command reports this error first.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
         // During a held stop, the controller rejects a jog. The command then reports the held stop, because it is the

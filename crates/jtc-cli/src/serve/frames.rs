@@ -63,8 +63,8 @@ impl Frames {
     }
 }
 
-/// Tracker of the bytes that the host sends. It determines whether a frame is incomplete, and how long its next byte
-/// has been missing.
+/// Tracker of the bytes that the host sends. The tracker determines whether a frame is incomplete, and how long its
+/// next byte has been missing.
 ///
 /// With `--speed max`, and while the simulator catches up after a delay, virtual time runs faster than the clock of
 /// the host. A gap within a frame must not become longer in virtual time than it was for the host.
@@ -132,7 +132,7 @@ impl Incoming {
     }
 
     /// Returns how long the host has been silent within a frame. Returns zero if further bytes of the frame have just
-    /// arrived. Returns `None` outside a frame, or if the silence is so long that it ends the frame.
+    /// arrived. Returns `None` outside a frame, or if the silence is long enough to end the frame.
     pub(super) fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);
@@ -200,7 +200,7 @@ mod tests {
         incoming.carries(later(8));
         assert_eq!(incoming.silence(later(12)), Some(Duration::from_millis(4)));
         assert_eq!(incoming.silence(later(13)), None, "too late");
-        assert!(!incoming.mid_frame(), "the next byte begins anew");
+        assert!(!incoming.mid_frame(), "the next byte begins a new frame");
     }
 
     #[test]

@@ -202,7 +202,7 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
     let mut job = Silent::come(&cell, "continue").begins("POST /api/runs", json!({ "trajectory": 8 }));
     job.reports("executing");
     pause(&cell);
-    assert_eq!(trajectory(&cell.rests(2 * LASTS)), "Pause", "it stays where it is");
+    assert_eq!(trajectory(&cell.rests(2 * LASTS)), "Pause", "it stays at its position");
     cell.done(&["traj", "stop"]);
     assert_eq!(job.ends()["stage"], "stopped");
 }

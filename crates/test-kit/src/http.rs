@@ -98,7 +98,7 @@ impl Http {
                 }
                 seen.push(event["event"].clone());
             }
-            patience.pause(format_args!("{what} behind {after}: {seen:?}"));
+            patience.pause(format_args!("{what} after {after}: {seen:?}"));
         }
     }
 
@@ -233,8 +233,8 @@ pub fn tokens_cannot_be_tried_without_end(http: &Http) {
         (0..40).map(|n| http.ask("GET /api/status", &[&host, &format!("Authorization: Bearer {n:0>43}")]).0);
     assert!(answers.by_ref().take(20).all(|status| status == 401));
     assert!(answers.all(|status| status == 429));
-    // The limit does not block clients with a valid token. It also does not block requests that need no token, such
-    // as a Stop from this computer.
+    // The limit does not block clients with a valid token. The limit also does not block requests that need no token,
+    // such as a Stop from this computer.
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 

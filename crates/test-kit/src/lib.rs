@@ -1,5 +1,5 @@
 //! Shared code of the tests and benchmarks of several crates. The code runs the stored fuzz inputs on the stable
-//! toolchain, and compares documents with the output of their commands. It also contains access to data of an
+//! toolchain, and compares documents with the output of their commands. This crate also contains access to data of an
 //! existing arm, a clock, test timeouts, and requests to agents.
 #![forbid(unsafe_code)]
 
@@ -52,7 +52,7 @@ pub fn run_kept_inputs(targets: &[Target]) {
 fn kept_inputs(target: &str) -> Vec<PathBuf> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
     let source = fuzz.join("fuzz_targets").join(target).with_extension("rs");
-    assert!(source.is_file(), "there is no fuzz target {}", source.display());
+    assert!(source.is_file(), "no fuzz target {} exists", source.display());
     let mut files = Vec::new();
     for kind in ["corpus", "regressions"] {
         let Ok(directory) = read_dir(fuzz.join(kind).join(target)) else { continue };

@@ -9,7 +9,7 @@ const TIME: Duration = Duration::from_secs(60);
 pub const LONGEST: Duration = Duration::from_secs(300);
 /// Time between two checks of a condition.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Seconds by which the timeout grows for each second by which the computer delays the waiting thread.
+/// Growth of the timeout, in seconds for each second that the computer delays the waiting thread.
 const GROWTH: u32 = 4;
 
 /// Wait of a test for a condition. If the computer delays the waiting thread, the timeout grows, because the awaited

@@ -165,8 +165,8 @@ impl Run {
         }
         let mut steps = block.steps();
         if steps.is_empty() {
-            // A block without lines does not have its output on the page yet. It is handled as one step without a
-            // command.
+            // A block without lines does not have its output on the page yet. Such a block is handled as one step
+            // without a command.
             steps.push(Step { command: String::new(), shown: Vec::new() });
         }
         let name = block.note("terminal").unwrap_or(OWN).to_owned();

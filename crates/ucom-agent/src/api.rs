@@ -235,8 +235,8 @@ struct SentObject {
     )
 )]
 async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
-    // The identity of the client sets the name that is reported. It also determines the client to which the hold-off
-    // after this Stop does not apply.
+    // The identity of the client sets the name that is reported. The identity also determines the client to which the
+    // hold-off after this Stop does not apply.
     let client = match asker.caller.role {
         Role::Operator => agent.client(&asker).ok(),
         Role::Viewer => None,

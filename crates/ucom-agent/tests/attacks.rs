@@ -113,7 +113,7 @@ fn who_may_look_changes_nothing() {
             assert_eq!(served.api_as(None, request, key, body.clone()).0, 403, "{request}");
         }
         if !request.ends_with("/lease") {
-            assert_eq!(served.api(request, Some("x"), body).0, 403, "{request}: a wrong key is none");
+            assert_eq!(served.api(request, Some("x"), body).0, 403, "{request}: wrong keys are rejected");
         }
     }
     for request in ["GET /api/status", "GET /api/boards", "GET /api/jobs", "GET /api/events"] {

@@ -272,8 +272,8 @@ fn what_waits_too_long_does_not_move_anything() {
 fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
     let (served, key) = Served::numbered(2);
     served.run(&key, &[1, 2]);
-    // The board misses the reset. It receives frames again before the end of the 1 s in which the agent collects
-    // reports after the reset.
+    // The board misses the reset. This board receives frames again before the end of the 1 s in which the agent
+    // collects reports after the reset.
     served.chain.fault("deaf board=2 for_s=0.9");
     let job = served.job("POST /api/init", &key, Some(json!({})));
     assert_eq!((&job["stage"], &job["error"]["code"]), (&json!("failed"), &json!("init")), "{job}");

@@ -190,7 +190,8 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     std::thread::sleep(Duration::from_millis(100));
     assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 409);
     // The flash was not erased, so the board still has its old program. However, since the start of an update, the
-    // agent does not know the contents of the flash (D-62). It therefore reports only that the program is up to date.
+    // agent does not know the contents of the flash (D-62). The agent therefore reports only that the program is up to
+    // date.
     let job = served.job("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
     assert_eq!(job["update"]["boards"][0]["outcome"], "program-up-to-date", "{job}");
 }

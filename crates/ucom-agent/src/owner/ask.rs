@@ -84,7 +84,7 @@ impl Shared {
         asked: Option<Asked>,
     ) -> Result<&'a mut Worker, Problem> {
         // In this case, the thread may already hold the lock of the leases. The lock is therefore taken only after
-        // this check, where `turn` runs in the owner's thread.
+        // this check: here, `turn` runs in the owner's thread.
         let worker = worker.map_err(|refused| match refused {
             Refused::Stopped => self.stopped(),
             Refused::Cancelled => cancelled(),

@@ -29,8 +29,8 @@ pub(crate) struct StatusObject {
     pub sent: u64,
     /// Number of frames that do not belong to this protocol.
     pub foreign_frames: u64,
-    /// `true` if this agent sends heartbeats. It sends them after a command of the lease holder, and as long as a
-    /// board that it has started is not stopped.
+    /// `true` if this agent sends heartbeats. The agent sends them after a command of the lease holder, and as long as
+    /// a board that it has started is not stopped.
     pub is_master: bool,
     /// `true` if another PC sends commands on this bus.
     pub competing_master: bool,

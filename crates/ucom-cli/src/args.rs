@@ -217,7 +217,7 @@ pub(crate) enum Command {
         ucom repair 3\n  \
         ucom repair 3 --flash-id 0x63\n\n\
         Only a board with an active incoming init pin can take a number. During the repair, the command \
-        keeps only the outgoing pin of the previous board active. It switches off the outgoing pins of all \
+        keeps only the outgoing pin of the previous board active. The command switches off the outgoing pins of all \
         other boards. Therefore, only the board to repair can take the number. The board must have the flash \
         number from --flash-id or from the inventory.\n\n\
         Exit codes:\n  \
@@ -349,8 +349,9 @@ pub(crate) enum Command {
             disturb running applications. For each test, the command shows the frames that it sent, the \
             expected result and the actual result.\n\n\
             With --init, --run or --program, the command restores the boards afterwards, even after Ctrl-C \
-            or an error. It restores the numbers and the status bit ASTART. It also starts the applications \
-            again, with the parameters that they have after a start. --run takes about 80 s per board.\n\n\
+            or an error. The command restores the numbers and the status bit ASTART. The command also starts \
+            the applications again, with the parameters that they have after a start. --run takes about 80 s \
+            per board.\n\n\
             Exit codes:\n  \
             0  all tests passed or were skipped\n  \
             1  a test failed, or the command could not restore a board\n  \

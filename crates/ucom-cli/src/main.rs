@@ -39,8 +39,8 @@ fn main() -> ExitCode {
         Err(failure) => {
             let exit = exit::of(failure.kind);
             if !failure.is_shown() {
-                // If earlier output blocks stdout, the program cannot print JSON there. It then prints the failure as
-                // text on stderr.
+                // If earlier output blocks stdout, the program cannot print JSON there. The program then prints the
+                // failure as text on stderr.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }

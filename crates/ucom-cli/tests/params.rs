@@ -130,7 +130,7 @@ fn outputs_are_opened_before_anything_is_sent() {
         let output = sim.ucom(words).ends(2);
         assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
-    // The started boards send a heartbeat every second (D-50). There is no other frame on the bus, because no command
+    // The started boards send a heartbeat every second (D-50). No other frame is on the bus, because no command
     // in this test has sent a frame.
     let sent: Vec<_> =
         peer.all(100).into_iter().filter(|frame| !["681#", "682#"].contains(&frame.as_str())).collect();

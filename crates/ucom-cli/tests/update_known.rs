@@ -76,7 +76,7 @@ fn d62_another_address_is_written() {
     let text = sim.ucom(&["update", "1", &high]).ends(4).out;
     assert!(text.contains("--rewrite") && !text.contains("--force"), "{text}");
     assert_eq!(of(&sim.json(&["update", "1", &high, "--rewrite"], 0)), ("verified", true));
-    // Without an inventory file, there is no record of the image, so the update is not verified either.
+    // Without an inventory file, a record of the image is missing, so the update is not verified either.
     let nowhere = sim.path("nowhere.toml");
     let words = ["update", "1", &high, "--inventory", &nowhere];
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));

@@ -29,7 +29,7 @@ fn only_questions(frames: &[String]) {
 fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "1"]).ends(0);
-    // This command stores the signal names, so that none of the following commands has to request them.
+    // This command stores the signal names, so that the following commands need not request them.
     sim.ucom(&["io", "all"]);
     let file = sim.file("bus.log", b"(1.000000) can0 201#\n(1.010000) can0 000#\n");
     let parameters =

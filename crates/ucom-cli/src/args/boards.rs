@@ -9,7 +9,7 @@ pub(super) fn one_board(text: &str) -> Result<u8, String> {
         _ if text.parse::<Boards>().is_ok() => {
             Err("inputs are set on one board at a time; ucom run sets those of several".into())
         }
-        _ => Err(format!("\"{text}\" is no board: a number 0..31")),
+        _ => Err(format!("\"{text}\" is not a board: a number 0..31")),
     }
 }
 
@@ -20,7 +20,7 @@ pub(super) fn flash_id(text: &str) -> Result<u16, String> {
         Some(hex) => u16::from_str_radix(hex, 16),
         None => text.parse(),
     };
-    number.map_err(|_| format!("\"{text}\" is no flash id, as 0x21 or 33"))
+    number.map_err(|_| format!("\"{text}\" is not a flash id, as 0x21 or 33"))
 }
 
 /// Parses a mask of status bits, for example `ASTART,OPINIT`.
@@ -29,7 +29,7 @@ pub(super) fn bits(text: &str) -> Result<ucom::Status, String> {
     for name in text.split(',').map(str::trim) {
         let bit = ucom::Status::bit(name).ok_or_else(|| {
             let names: Vec<&str> = ucom::Status::NAMES.iter().map(|(name, _)| *name).collect();
-            format!("there is no bit \"{name}\"; there are {}", names.join(" "))
+            format!("no bit \"{name}\" exists; there are {}", names.join(" "))
         })?;
         all = all | bit;
     }
@@ -50,7 +50,7 @@ pub(super) fn raw_status(text: &str) -> Result<(u8, u8), String> {
 /// Parses a duration in seconds.
 pub(super) fn seconds(text: &str) -> Result<std::time::Duration, String> {
     let value = text.parse::<f64>().ok().and_then(|s| std::time::Duration::try_from_secs_f64(s).ok());
-    value.ok_or_else(|| format!("\"{text}\" is no number of seconds"))
+    value.ok_or_else(|| format!("\"{text}\" is not a number of seconds"))
 }
 
 #[cfg(test)]

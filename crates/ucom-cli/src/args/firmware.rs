@@ -30,7 +30,8 @@ pub(crate) struct UpdateArgs {
     pub image: PathBuf,
     /// Read files of any name as raw bytes.
     ///
-    /// With this option, the command refuses Intel HEX and S-records. It reads text as raw bytes only from a .bin file
+    /// With this option, the command refuses Intel HEX and S-records. The command reads text as raw bytes only from a
+    /// .bin file
     #[arg(long)]
     pub raw: bool,
     /// Set the unit of the addresses in Intel HEX and S-records.
@@ -88,7 +89,7 @@ pub(crate) struct UpdateArgs {
     pub expect_program_id: Option<u16>,
     /// Accept an update that the command cannot verify.
     ///
-    /// The exit code is then 0 for the outcome `program-up-to-date`. It is also 0 if the profile does not allow a
+    /// The exit code is then 0 for the outcome `program-up-to-date`. The code is also 0 if the profile does not allow a
     /// verification
     #[arg(long)]
     pub unverified: bool,
@@ -128,7 +129,7 @@ pub(crate) struct RepairArgs {
 
 /// Parses a Program ID, which is decimal, or hexadecimal with 0x.
 fn program_id(text: &str) -> Result<u16, String> {
-    flash_id(text).map_err(|_| format!("\"{text}\" is no Program ID, as 0x4B3F"))
+    flash_id(text).map_err(|_| format!("\"{text}\" is not a Program ID, as 0x4B3F"))
 }
 
 #[cfg(test)]

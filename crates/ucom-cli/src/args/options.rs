@@ -185,7 +185,7 @@ pub(crate) struct ParArgs {
     pub values: Vec<Assignment>,
     /// Write a parameter file, YAML (- for stdout).
     ///
-    /// The file contains the values that this tool wrote last. It contains all other names as comments
+    /// The file contains the values that this tool wrote last. All other names are in the file as comments
     #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
     pub save: Option<PathBuf>,
     /// Write the parameters of this file to the boards.

@@ -96,8 +96,8 @@ pub(super) fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result
         let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
-            // A write error on stdout ends the recording. It is not a fault if the reader has disconnected, as in
-            // `ucom record - | head`; `lose` distinguishes this case.
+            // A write error on stdout ends the recording. This error is not a fault if the reader has disconnected, as
+            // in `ucom record - | head`; `lose` distinguishes this case.
             Err(RecordingError::Io { source: e, .. }) if stdout => {
                 Output::lose(&e);
                 break;

@@ -27,7 +27,7 @@ pub(super) fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(),
         return Err(Failure::new(ErrorKind::Refused, "intrusive", what).next("--intrusive sends it"));
     }
     let wire = |frame: &RecordedFrame| {
-        replayed(frame).ok_or_else(|| Failure::usage(format!("{frame} is no frame that can be sent")))
+        replayed(frame).ok_or_else(|| Failure::usage(format!("{frame} is not a frame that can be sent")))
     };
     let wire = frames.iter().map(wire).collect::<Result<Vec<_>, _>>()?;
     let mut bus = link.open()?;

@@ -4,7 +4,7 @@
 //! CI, SO and PAR frames are multiplexed by their buffer offset: the first word of the frame shows which three words
 //! of the buffer follow (D-15). Packages of strings have the same identifiers as other frames, and their content does
 //! not distinguish them from those frames. Therefore the DBC file describes only the first frame of DSP_INFO and of
-//! the IO description. It describes debug texts and program data as raw bytes.
+//! the IO description. The file describes debug texts and program data as raw bytes.
 mod names;
 #[cfg(test)]
 mod tests;

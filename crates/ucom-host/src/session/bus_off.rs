@@ -17,7 +17,7 @@ pub struct BusOff {
 }
 
 impl BusOff {
-    /// Returns the message about a new bus-off. Returns `None` if there is no new bus-off, or if a bus-off was
+    /// Returns the message about a new bus-off. Returns `None` without a new bus-off, or if a bus-off was
     /// reported in the last 5 s.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
         let new = times.saturating_sub(self.reported);

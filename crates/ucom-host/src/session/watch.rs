@@ -196,7 +196,7 @@ impl Picture<'_> {
                 &mut problems.warnings
             };
             list.push(text);
-            // If there is no hint, or if it recommends `ucom monitor`, which is this view, another command is shown.
+            // If the hint is missing, or recommends `ucom monitor`, which is this view, another command is shown.
             let helps = finding.next.to_string();
             let own = helps.is_empty() || helps.contains("ucom monitor");
             next.push(if own { "ucom doctor".into() } else { helps });

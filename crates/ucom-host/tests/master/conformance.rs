@@ -83,7 +83,7 @@ fn without_options_only_harmless_frames_leave() {
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
         // Without options, the master sends only PC_INFO, PC_REPORT, PC_INIT with a number that the board already
-        // has, and dump requests. It also sends heartbeats, which began with the start of the application.
+        // has, and dump requests. The master also sends heartbeats, which began with the start of the application.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
             // The master sends PC_INIT(n) only directly after a PC_INFO to number n.

@@ -48,7 +48,7 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
 }
 
 /// D-50: between the master and the bus there are other queues, for example the queue of a socket. The master sends
-/// no more inputs than the bus can carry. Otherwise, heartbeats would wait behind the inputs in these queues.
+/// no more inputs than the bus can carry. Otherwise, heartbeats would wait for the earlier inputs in these queues.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();

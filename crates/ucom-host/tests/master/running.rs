@@ -130,8 +130,8 @@ fn d36_kept_names_of_another_application_start_nothing() {
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
-/// D-14: if frames of a dump are missing, surplus or swapped, the master requests the dump again. It sends at most
-/// three requests.
+/// D-14: if frames of a dump are missing, surplus or swapped, the master requests the dump again. The master sends
+/// at most three requests.
 #[test]
 fn d14_dump_is_accepted_only_if_the_totals_fit() {
     let good = ["581#010000000000", "581#0100", "581#6865616420", "581#0100", "581#737065656400"];

@@ -70,7 +70,7 @@ fn p2_init_of_the_golden_chain() {
     assert!(end <= 1_000_000, "{end} us");
 }
 
-/// P-2: on a bus without boards, an init sends one reset and reports that there are no boards.
+/// P-2: on a bus without boards, an init sends one reset and reports that no boards exist.
 #[test]
 fn p2_init_of_nobody() {
     let mut bench = Bench::script(Script::default());

@@ -272,7 +272,7 @@ fn characters_of_records_are_never_an_image() {
                 )
                 .into_bytes(),
             ),
-            ("text behind the end", with(|b| b.extend(b"made by hand\n"))),
+            ("text after the end", with(|b| b.extend(b"made by hand\n"))),
             ("text before the start", [b"made by hand\n", bytes.as_slice()].concat()),
             ("quoted", text.lines().map(|l| format!("> {l}\n")).collect::<String>().into_bytes()),
             ("letters for digits", text.replace('0', "O").replace('1', "l").into_bytes()),
@@ -299,7 +299,7 @@ fn characters_of_records_are_never_an_image() {
 }
 
 /// With the option for raw bytes, the reader reads a file with any name as raw bytes, except Intel HEX and S-record
-/// files. It still accepts a text only from a `.bin` file.
+/// files. The reader still accepts a text only from a `.bin` file.
 #[test]
 fn raw_bytes_on_request_are_looked_at() {
     let dir = tempfile::tempdir().unwrap();

@@ -42,7 +42,7 @@ fn d62_a_record_changes_one_key_of_the_file() {
     let path = dir.path().join("inventory.toml");
     let texts = [
         "# left arm, cabinet 3\n[[board]] # first\nnumber = 1\nflash_number = 0x21 # new since May\n\n[[board]]\nflash_number = 0x42\nnumber = 2\nname = 'pan'\n",
-        "[[board]]\nnumber = 1\nflash_number = 33\n# behind it\n",
+        "[[board]]\nnumber = 1\nflash_number = 33\n# after it\n",
         "board = [\n  { number = 1, flash_number = 0x0021 }, # in line\n  { number = 2, flash_number = 0x42 },\n]\n",
     ];
     for text in texts {

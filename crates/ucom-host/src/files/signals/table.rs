@@ -197,7 +197,7 @@ impl ProgramSignals {
     }
 
     /// Finds a signal by its complete name, by its name without the unit in brackets, or by its index. The letter
-    /// case is ignored unless two names differ only by letter case. The same rule applies to names that the user
+    /// case is ignored unless two names differ only by letter case. This rule also applies to names that the user
     /// gives.
     pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
@@ -295,7 +295,7 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 
-    /// D-11: the letter case of names in the signal table does not matter. The same rule applies to names that the
+    /// D-11: the letter case of names in the signal table does not matter. This rule also applies to names that the
     /// user gives.
     #[test]
     fn d11_names_of_the_table_are_found_in_any_case() {

@@ -23,8 +23,8 @@ pub enum Event {
         /// Progress of the update.
         progress: Progress,
     },
-    /// An update will reset this board for programming, so the board's flash record is no longer valid (D-62). The board's memory is erased
-    /// only after the board has answered the reset.
+    /// An update will reset this board for programming, so the board's flash record becomes invalid (D-62).
+    /// The board's memory is erased only after the board has answered the reset.
     FlashBegins {
         /// Procedure of the update.
         id: ProcedureId,

@@ -122,7 +122,7 @@ pub(crate) enum Open {
     Wait(u64),
     /// No board has answered a recent PC_INFO to the board number.
     Ask,
-    /// One flash number answered the same PC_INFO twice, so one more PC_INFO is needed.
+    /// A single flash number answered the same PC_INFO twice, so one more PC_INFO is needed.
     AskAgain,
 }
 
@@ -163,8 +163,8 @@ impl Holders {
             _ => false,
         };
         match (forgets, function) {
-            // A reset that is sent to the number for boards without a number reaches all boards, whatever
-            // `addr.broadcast` is.
+            // A reset that is sent to the number for boards without a number reaches all boards, for any
+            // value of `addr.broadcast`.
             (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
             (true, _) => self.forget(to.number()),
             (false, Function::Info) if broadcast => {

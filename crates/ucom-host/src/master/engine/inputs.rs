@@ -29,7 +29,7 @@ impl Core {
     ///
     /// The repeated inputs use only a part of the bus time, even if boards were started with `force`. Without this
     /// limit, inputs would delay answers and heartbeats, which have a lower priority on the bus. The queue of a
-    /// socket is no limit, because it accepts more frames than the bus can carry.
+    /// socket is not a limit, because it accepts more frames than the bus can carry.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;

@@ -175,7 +175,7 @@ impl Link {
         }
     }
 
-    /// Runs `work`. One of three errors can end `work` early:
+    /// Runs `work`. Three errors can end `work` early:
     /// - [`MasterError::Cancelled`]: the caller cancels the procedure.
     /// - [`MasterError::Bus`]: the caller reports that the bus is lost.
     /// - [`NumberShared`](crate::master::IdentityError::NumberShared): two boards with the same number appear, and

@@ -50,7 +50,7 @@ impl DescriptionKey {
 /// Description that an application sends about itself and about every signal. The description is stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
-    /// Text about the application. It can differ from the board's own description in DSP_INFO.
+    /// Text about the application. This text can differ from the board's own description in DSP_INFO.
     pub description: String,
     /// Texts of the controller inputs.
     pub ci: Vec<String>,

@@ -18,8 +18,8 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Ide
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // In later rounds, a PC_INFO of any age counts. It was recent in the first round, or was sent after that round,
-        // so it can look old only because the driver is late.
+        // In later rounds, a PC_INFO of any age counts. The PC_INFO was recent in the first round, or was sent after
+        // that round, so it can look old only because the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();

@@ -133,8 +133,8 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // If the control loop was already running, this PC knows only the inputs that it has sent itself. It must not
-    // replace inputs of another PC by initial values, unless the user sets inputs.
+    // If the control loop was already running, this PC knows only the inputs that it has sent itself. This PC
+    // must not replace inputs of another PC by initial values, unless the user sets inputs.
     let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
     let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;

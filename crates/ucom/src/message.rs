@@ -1,7 +1,8 @@
 //! Messages of the PC and of the boards, and their conversion to and from frames.
 //!
 //! The PC and the boards send functions 22, 24 and 26 with the same identifier (D-05). Therefore the caller must know
-//! the sender of a frame. It decodes frames of the PC with [`ToBoard`], and frames of a board with [`FromBoard`].
+//! the sender of a frame. The caller decodes frames of the PC with [`ToBoard`], and frames of a board with
+//! [`FromBoard`].
 
 mod from_board;
 mod to_board;

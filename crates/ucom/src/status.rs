@@ -62,7 +62,7 @@ impl Status {
         Self((self.0 & !mask) | value)
     }
 
-    /// Returns a text that explains which bits of this status contradict each other; returns `None` if there is no
+    /// Returns a text that explains which bits of this status contradict each other; returns `None` without a
     /// contradiction. No board can be in a contradictory state.
     pub const fn contradiction(self) -> Option<&'static str> {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {

@@ -52,7 +52,7 @@ mod tests {
     }
 
     /// Section 9: the rate limit counts an event that occurred 999 999 µs ago, but not an event that occurred 1 s
-    /// ago. It never allows more than `N` events in a second.
+    /// ago. The limit never allows more than `N` events in a second.
     #[test]
     fn a_second_is_a_second() {
         let mut limit = RateLimit::<2>::new();

@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: on an identifier that the PC and the boards share, a board sends an answer 2 ms after the request. It sends
-/// a message without a request after a random time of 1 to 8 ms, which differs between boards.
+/// D-05: on an identifier that the PC and the boards share, a board sends an answer 2 ms after the request. The board
+/// sends a message without a request after a random time of 1 to 8 ms, which differs between boards.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();

@@ -97,7 +97,7 @@ fn d04_other_addresses() {
     let mut bus = Bus::new(&[0x21, 0x42], profile);
     assert_eq!(bus.ask("01F#", 300), frames("441#21 482#42"));
     assert_eq!(bus.ask("280#", 20), frames("0C0#00"));
-    assert_eq!(bus.ask("29F#", 20), [], "31 is no board");
+    assert_eq!(bus.ask("29F#", 20), [], "31 is not a board");
     bus.send("1C0#0202");
     assert_eq!(bus.ask("281#", 20), frames("0C1#01"));
     assert_eq!(bus.ask("21F#", 20).iter().filter(|frame| frame.dlc() == 8).count(), 4, "both boards");

@@ -79,7 +79,8 @@ pub(super) struct Axis {
     pub current: f64,
     /// Temperature of the motor, °C.
     pub temperature: f64,
-    /// Set point of the position controller, degrees. It moves towards the set position, at most at the speed limit.
+    /// Set point of the position controller, degrees. The set point moves towards the set position, at most at the
+    /// speed limit.
     pub reference: f64,
 }
 

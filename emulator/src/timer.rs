@@ -126,8 +126,8 @@ impl Timer {
         if !self.runs() {
             return NEVER;
         }
-        // The model needs an event only for flags whose interrupt is enabled. It computes all other flags when the
-        // program reads a register.
+        // The model needs an event only for flags whose interrupt is enabled. The model computes all other flags when
+        // the program reads a register.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();

@@ -70,7 +70,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
             let found = records(&rig);
             assert_eq!(found.len(), 2, "{ms} ms: {found:?}");
             assert_eq!(found[0], cut, "{ms} ms and {us} µs");
-            assert_eq!(found[1].status, rest.status, "{ms} ms: the rest of the frame is none");
+            assert_eq!(found[1].status, rest.status, "{ms} ms: the rest is not a frame");
         }
         assert_eq!(rig.status(port).jtc_init & 2, 0, "the gains were given");
     }

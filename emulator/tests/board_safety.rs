@@ -175,7 +175,7 @@ fn latched_until_cleared(mut rig: Rig, cause: u32) {
     assert_eq!(
         (status.jtc_init, status.trajectory),
         (7, TrajectoryState::Null.into()),
-        "nothing is left of what the host gave"
+        "nothing that the host gave is left"
     );
     for _ in 0..500 {
         rig.step();

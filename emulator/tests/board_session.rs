@@ -111,7 +111,7 @@ fn a_whole_session() {
     }
 
     // J-25: after the last point, the controller can change to Teaching.
-    rig.wait("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
+    rig.wait("HoldPos after the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
     // Teaching begins when the integral term of the position controller has settled after the motion.
     rig.wait("Teaching", 3_000, |rig| rig.state() == ControllerState::Teaching);

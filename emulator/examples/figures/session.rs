@@ -108,7 +108,7 @@ impl Session {
         self.until("pause", 3_000, |rig| rig.telemetry().trajectory == TrajectoryState::Pause);
         self.write(&frames::exec(ExecCommand::Execute));
         self.until("the end", 6_000, |rig| rig.telemetry().trajectory == TrajectoryState::Finish);
-        self.until("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
+        self.until("HoldPos after the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
         self.write(&fixed::TEACHING_MODE_ENABLE);
         self.until("teaching", 2_000, |rig| rig.state() == ControllerState::Teaching);
         self.run_ms(1_000);

@@ -65,7 +65,7 @@ fn a_sector_takes_its_time_and_holds_ones_then() {
     assert_eq!(sr(&mut flash, 2 * SECOND - 1), sr::BSY | sr::QW);
     assert_eq!(sr(&mut flash, 2 * SECOND), 0);
     assert!(flash.bank.bytes(AT, 0x2_0000).iter().all(|byte| *byte == 0xFF));
-    assert_eq!(flash.bank.bytes(AT - 1, 1), [0], "the sectors beside it are as before");
+    assert_eq!(flash.bank.bytes(AT - 1, 1), [0], "the neighbouring sectors are as before");
     assert_eq!(flash.bank.bytes(AT + 0x2_0000, 1), [0]);
 }
 

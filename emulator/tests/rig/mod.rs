@@ -204,7 +204,7 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // This frame is not in the list yet. It belongs to the current tick, whose flight record the rig
+                // This frame is not in the list yet. The frame belongs to the current tick, whose flight record the rig
                 // reads later.
                 continue;
             };

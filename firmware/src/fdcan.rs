@@ -21,8 +21,8 @@ const CAN: Registers = FDCAN1;
 /// Largest number of reads of a register while the driver waits for a change. The change should take a few clock
 /// periods.
 const PATIENCE: u32 = 10_000;
-/// Largest number of reads of a register within a tick, where waits must be short. If the change has not occurred by
-/// then, the next tick checks the register again.
+/// Largest number of reads of a register within a tick. Waits within a tick must be short. If the change has not
+/// occurred by then, the next tick checks the register again.
 const PATIENCE_IN_TICK: u32 = 100;
 
 /// Frames that the joint bus received since the last tick.

@@ -50,7 +50,7 @@ impl FlightFrame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
-    /// Kind of the event: 0 is no event, 1 a valid frame, 2 an invalid frame, 3 noise. Bit 6 is set if the event
+    /// Kind of the event: 0 for none, 1 a valid frame, 2 an invalid frame, 3 noise. Bit 6 is set if the event
     /// arrived on a plain line, whose host does not use the extensions (J-51). Bit 7 is set if the controller
     /// received Stop or Pause after the event.
     pub kind: u8,

@@ -61,8 +61,8 @@ pub const fn lost_power(rsr: u32) -> bool {
 
 /// Determines the cause of the start from the register RCC_RSR and from the data of the previous program run.
 ///
-/// Every reset pulls the reset pin, so the function checks the pin's flag last. It uses `failure` only after a
-/// software reset or a watchdog reset. A program that fails requests a software reset, but the watchdog can be
+/// Every reset pulls the reset pin, so the function checks the pin's flag last. The function uses `failure` only after
+/// a software reset or a watchdog reset. A program that fails requests a software reset, but the watchdog can be
 /// faster.
 pub const fn cause(rsr: u32, failure: Option<Failure>) -> Cause {
     match failure {

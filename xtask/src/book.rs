@@ -77,7 +77,7 @@ pub(crate) fn check() -> Result<()> {
             let to = if file.is_empty() { path.clone() } else { path.parent().unwrap_or(root()).join(file) };
             let text = std::fs::read_to_string(&to).unwrap_or_default();
             if to.extension().is_some_and(|ending| ending == "md") && !anchors(&text).contains(anchor) {
-                wrong.push(format!("{name}: there is no heading for {target}"));
+                wrong.push(format!("{name}: no heading exists for {target}"));
             }
         }
     }

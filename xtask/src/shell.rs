@@ -26,8 +26,8 @@ pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
     // The command must not inherit the environment variables that cargo sets for the package of xtask. Some build
-    // scripts, such as that of the crate ring, read these variables. They would run again whenever the user changes
-    // between xtask and cargo without xtask.
+    // scripts, such as that of the crate ring, read these variables. Such scripts would run again whenever the user
+    // changes between xtask and cargo without xtask.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();
         if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {

@@ -1,4 +1,4 @@
-//! Checks of the dashboard. They check its source, build it again, compare the result with the built files in
+//! Checks of the dashboard. The checks examine its source, build it again, compare the result with the built files in
 //! web/dist, and test the dashboard in a browser.
 //!
 //! A build of the programs needs none of these steps, because the built dashboard files are in the repository.

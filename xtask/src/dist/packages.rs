@@ -116,8 +116,8 @@ impl Release {
         tree.put("THIRD-PARTY.txt", &*self.third_party);
         tree.put("udev/70-openjtc.rules", RULES);
         if name == "jtc" {
-            // The program is in the folder `bin`. It searches for the images at this path, relative to the parent of
-            // `bin`.
+            // The program is in the folder `bin`. The program searches for the images at this path, relative to the
+            // parent of `bin`.
             images::install(&self.images, &self.version, "share/openjtc/firmware", &mut tree)?;
         }
         let folder = format!("{name}-{}-{}-linux", self.version, platform.machine);

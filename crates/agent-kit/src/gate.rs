@@ -111,9 +111,9 @@ impl<S: Send + Sync> FromRequestParts<S> for Asker {
     }
 }
 
-/// Returns a client's name without control characters, at most 64 characters long.
+/// Returns a client's name without control characters and marks of the text direction, at most 64 characters long.
 pub fn plain(name: &str) -> String {
-    name.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect()
+    name.chars().filter(|c| !host_kit::is_hidden(*c)).take(NAME_MAX).collect()
 }
 
 impl Caller {

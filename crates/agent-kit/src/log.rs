@@ -167,7 +167,8 @@ fn write(
             line.insert("lines_lost_before".into(), (before + lost).into());
         }
         // An incomplete log line is first completed with a line end, so that the next line is not damaged.
-        let mut text = format!("{}{line}\n", if cut { "\n" } else { "" });
+        let line = line.to_string();
+        let mut text = format!("{}{}\n", if cut { "\n" } else { "" }, host_kit::visible(&line));
         let room = file.make_room(text.len());
         if cut && matches!(room, Ok(true)) {
             text.remove(0);

@@ -1,6 +1,7 @@
 //! Output lines that a separate thread prints, so that a blocked reader (`ucom run --json | less`) does not block the
 //! control loop.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::io::Write;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -76,6 +77,10 @@ impl Lines {
     }
 
     fn add(&self, line: String, most: usize) {
+        let line = match host_kit::visible(&line) {
+            Cow::Borrowed(_) => line,
+            Cow::Owned(shown) => shown,
+        };
         let mut state = self.shared.lock();
         if state.gone {
             return;

@@ -8,6 +8,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
+use host_kit::visible;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -84,7 +85,7 @@ impl Output {
     /// Prints a result: `value` as one line of JSON, or the text. On a terminal, the text is wrapped between words.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         let width = if self.json { None } else { stdout_width() };
-        let line = within(&self.words(value, text), width);
+        let line = within(&visible(&self.words(value, text)), width);
         Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
     }
 
@@ -122,7 +123,7 @@ impl Output {
             self.event("note", json!({ "text": text.to_string().trim() }));
             return;
         }
-        let text = within(&text.to_string(), bar::stderr_width());
+        let text = within(&visible(&text.to_string()), bar::stderr_width());
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
@@ -132,8 +133,8 @@ impl Output {
         if !self.json {
             return self.note(text);
         }
-        let event = json!({ "event": "note", "time_s": 0.0, "text": text });
-        suspended(|| drop(writeln!(std::io::stderr().lock(), "{event}")));
+        let event = json!({ "event": "note", "time_s": 0.0, "text": text }).to_string();
+        suspended(|| drop(writeln!(std::io::stderr().lock(), "{}", visible(&event))));
     }
 
     /// Creates a progress bar on stderr, which is invisible if stderr is not a terminal.
@@ -155,7 +156,8 @@ impl Output {
     /// Prints the reason why a command failed.
     pub fn failure(&self, failure: &Failure) {
         if self.json {
-            let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error_object(failure) }));
+            let error = json!({ "error": error_object(failure) }).to_string();
+            let _ = writeln!(std::io::stdout().lock(), "{}", visible(&error));
         }
         self.warn(&failure.message, &failure.next.to_string());
     }

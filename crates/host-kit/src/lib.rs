@@ -14,6 +14,7 @@ mod next;
 pub mod owner;
 mod suggest;
 mod user_folder;
+mod visible;
 
 pub use atomic_write::write_atomically;
 pub use clock::unix_time;
@@ -25,3 +26,4 @@ pub use kind::ErrorKind;
 pub use next::{Action, FrontEnd, Next};
 pub use suggest::{nearest, similarity};
 pub use user_folder::user_folder;
+pub use visible::{is_hidden, visible};

@@ -307,3 +307,32 @@ fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
     let cells: Vec<f64> = last.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
     assert!((cells[1] - 60f64.to_radians()).abs() < 1e-3, "{cells:?}");
 }
+
+/// A name in a file may contain escape sequences of a terminal. The commands print them as codes, also in errors.
+#[test]
+fn escape_sequences_of_a_file_are_printed_as_codes() {
+    let dir = Dir::new();
+    let arm = include_str!("../../../arms/avena.toml");
+    let name = arm.lines().find(|line| line.starts_with("name = ")).unwrap();
+    let arm = arm.replacen(name, "name = \"a\\u001B]0;t\\u0007\\u009B1m\\u202Eb\"", 1);
+    let header = "t,q1,q2,q3,q4,q5,q6,\u{1b}[31mq7\r\n0,0,0,0,0,0,0,0\n";
+    let (arm, motion) = (dir.file("arm.toml", &arm), dir.file("motion.csv", header));
+    for words in [
+        &["arm", "show", &arm][..],
+        &["arm", "check", &arm],
+        &["--json", "arm", "show", &arm],
+        &["traj", "check", &motion],
+        &["--json", "traj", "check", &motion],
+    ] {
+        let output = jtc(words);
+        let hidden = |c: char| host_kit::is_hidden(c) && c != '\n';
+        assert!(
+            !output.out.contains(hidden) && !output.err.contains(hidden),
+            "{words:?}: {}{}",
+            output.out,
+            output.err
+        );
+    }
+    let shown = jtc(&["arm", "show", &arm]).ends(0).out;
+    assert!(shown.contains(r"a\u001b]0;t\u0007\u009b1m\u202eb"), "{shown}");
+}

@@ -390,3 +390,28 @@ fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     );
     assert!(std::fs::metadata(file).is_ok());
 }
+
+/// A description that a board sends may contain escape sequences of a terminal. The commands print them as codes.
+#[test]
+fn escape_sequences_of_a_board_are_printed_as_codes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("chain.toml");
+    let text = "[[board]]\nflash_id = 0x21\ndescription = \"X\\u001B[31mR\\u001B]0;t\\u0007Z\"\n";
+    std::fs::write(&file, text).unwrap();
+    let sim = Sim::start(&["--chain", file.to_str().unwrap()]);
+    for words in
+        [&["init"][..], &["info", "1"], &["monitor", "--count", "1"], &["--json", "info", "1"], &["doctor"]]
+    {
+        let output = sim.ucom(words).ends(0);
+        let hidden = |c: char| host_kit::is_hidden(c) && c != '\n';
+        assert!(
+            !output.out.contains(hidden) && !output.err.contains(hidden),
+            "{words:?}: {}{}",
+            output.out,
+            output.err
+        );
+    }
+    let info = sim.ucom(&["info", "1"]).ends(0);
+    assert!(info.out.contains(r"X\u001b[31mR\u001b]0;t\u0007Z"), "{}", info.out);
+    assert_eq!(sim.json(&["info", "1"], 0)["boards"][0]["description"], "X\u{1b}[31mR\u{1b}]0;t\u{7}Z");
+}

@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path, port: &str) -> Found {
         }
         Ok(stored) if stored.port != port => Found::Doubtful("it belongs to another port".into()),
         Ok(stored) => {
-            let client = stored.client.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect();
+            let client = stored.client.chars().filter(|c| !host_kit::is_hidden(*c)).take(NAME_MAX).collect();
             Found::Left(Stored { client, ..stored })
         }
     }

@@ -150,7 +150,7 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let request: Request = read_line(Within { stream, end: Instant::now() + PATIENCE }, REQUEST_MAX)?;
-    let by: String = request.by.chars().filter(|c| !c.is_control()).take(100).collect();
+    let by: String = request.by.chars().filter(|c| !host_kit::is_hidden(*c)).take(100).collect();
     let done = line.halt(request.halt, &by);
     let answer = Answer::of(line.path.clone(), line.baud, done);
     write_line(stream, &answer)?;

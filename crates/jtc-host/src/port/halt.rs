@@ -179,7 +179,7 @@ pub fn this_program() -> String {
     let option = |word: &String| word.starts_with('-');
     let words = words.skip_while(option).take_while(|word| !option(word)).take(2);
     let all: Vec<String> = name.into_iter().chain(words).collect();
-    all.join(" ").chars().filter(|c| !c.is_control()).take(80).collect()
+    all.join(" ").chars().filter(|c| !host_kit::is_hidden(*c)).take(80).collect()
 }
 
 /// Returns `true` if `user` may stop the arm. Only the user who runs this program may stop the arm.

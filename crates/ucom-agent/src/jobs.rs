@@ -40,8 +40,8 @@ pub(crate) enum Done {
     Chain(Vec<BoardSeen>, Vec<String>),
     /// Findings of a doctor job.
     Findings(Vec<Finding>),
-    /// Result of a firmware update for each board.
-    Update(UpdateReport),
+    /// Result of a firmware update for each board, and notes about its images.
+    Update(UpdateReport, Vec<String>),
     /// Running boards with their flags, and the predicted bus load.
     Running(Vec<(u8, Admin)>, LoadForecast),
 }

@@ -106,6 +106,24 @@ fn d46_records_are_no_raw_bytes() {
     }
 }
 
+/// D-46: the agent fills a gap of an image only on request. The result of the job then shows the gap and the byte.
+#[test]
+fn d46_a_gap_is_filled_on_request_and_shown() {
+    let (served, key) = Served::numbered(1);
+    let hole = ":0400000001020304F2\n:0400100001020304E2\n:00000001FF\n";
+    let mut body = json!({ "boards": [{ "board": 1 }], "image": STANDARD.encode(hole), "dry_run": true });
+    let (status, error) = served.api("POST /api/updates", Some(&key), Some(body.clone()));
+    assert!(status == 422 && error["next"].to_string().contains("set fill_gaps to 255"), "{status} {error}");
+    for wrong in [json!(256), json!(-1), json!("FF"), json!(true)] {
+        body["fill_gaps"] = wrong;
+        assert_eq!(served.api("POST /api/updates", Some(&key), Some(body.clone())).0, 422);
+    }
+    body["fill_gaps"] = json!(0x3E);
+    let job = served.job("POST /api/updates", &key, Some(body));
+    let notes = json!(["gap of 12 bytes at word address 0x2 filled with 3E"]);
+    assert_eq!((&job["update"]["notes"], &job["stage"]), (&notes, &json!("finished")), "{job}");
+}
+
 /// D-46: the agent does not send an image to a board if the image is for another board.
 #[test]
 fn d46_the_wrong_board_and_what_is_no_image_are_refused() {

@@ -51,8 +51,8 @@ fn d46_raw_does_not_flash_records() {
         ("checksum.hex", hex.replace("F2", "F3").into()),
         ("checksum.s19", srec.replace("EE", "EF").into()),
         ("cut.hex", ":0400000001020304F2\n".into()),
-        ("z.hex", [hex.as_bytes(), b"\x1A"].concat()),
-        ("nul.hex", [hex.as_bytes(), &[0; 16]].concat()),
+        ("z.hex", [hex.as_bytes(), b"\x1Amade by hand\n"].concat()),
+        ("nul.hex", [&hex.as_bytes()[..20], &[0; 16]].concat()),
         ("colon.hex", hex.replace(':', "").into()),
         ("odd.hex", hex.replace("0102", "012").into()),
         ("mark.hex", format!("\u{feff}{hex}").into()),
@@ -96,10 +96,38 @@ fn count_records_and_gaps() {
     assert!(output.contains("line 2") && output.contains("make the file again"), "{output}");
     let hole = ":0400000001020304F2\n:0400100001020304E2\n:00000001FF\n";
     let output = dry("hole.hex", hole.into(), &[], 2);
-    assert!(output.contains("12 bytes at word address 0x2") && output.contains("--fill-gaps"), "{output}");
+    assert!(
+        output.contains("12 bytes at word address 0x2") && output.contains("--fill-gaps 0xFF"),
+        "{output}"
+    );
     assert!(!output.contains("--addresses"), "{output}");
-    let output = dry("hole.hex", hole.into(), &["--fill-gaps"], 0);
+    let output = dry("hole.hex", hole.into(), &["--fill-gaps", "0xFF"], 0);
     assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
+    let output = dry("hole.hex", hole.into(), &["--fill-gaps", "0"], 0);
+    assert!(output.contains("gap of 12 bytes at word address 0x2 filled with 00"), "{output}");
+    for wrong in [&["--fill-gaps"][..], &["--fill-gaps", "FF"], &["--fill-gaps", "256"]] {
+        dry("hole.hex", hole.into(), wrong, 2);
+    }
+    let odd = ":020001000102FA\n:00000001FF\n";
+    let output = dry("odd.hex", odd.into(), &[], 2);
+    assert!(output.contains("the 1 byte at word address 0x0") && output.contains("--fill-gaps"), "{output}");
+    dry("odd.hex", odd.into(), &["--fill-gaps", "0xFF"], 0);
+}
+
+/// A file is complete with its end record. ^Z and NUL after the end record, and CR as line end, do not damage the file.
+#[test]
+fn the_characters_of_old_tools_are_no_damage() {
+    let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
+    let hex = ":0400000001020304F2\r\n:00000001FF\r\n";
+    for (name, text) in [
+        ("z.hex", format!("{hex}\x1A")),
+        ("nul.hex", format!("{hex}{}", "\0".repeat(16))),
+        ("cr.hex", hex.replace('\n', "")),
+    ] {
+        let file = sim.file(name, text.as_bytes());
+        let output = sim.ucom(&["update", "1", &file, "--flash-id", "0x21", "--dry-run"]).ends(0);
+        assert!(output.err.contains("Intel HEX, 4 bytes from word 0x0"), "{name}: {}", output.err);
+    }
 }
 
 /// The tool chain of the boards counts S-record addresses in words; other tools count addresses in bytes. The command determines the unit

@@ -76,7 +76,7 @@ impl Read {
                 )));
             }
         };
-        let gaps = if self.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
+        let gaps = if self.fill_gaps { Gaps::Fill(0xFF) } else { Gaps::Refuse };
         let format = self.raw.then_some(Format::Bin);
         let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
         if self.name_target && !has_header(profile) {

@@ -73,9 +73,9 @@ pub(super) struct UpdateRequest {
     format: Option<ImageFormat>,
     /// Unit of the addresses in the images; missing: detected from their records.
     addresses: Option<Unit>,
-    /// `true`: fill gaps between records with FF.
-    #[serde(default)]
-    fill_gaps: bool,
+    /// Byte that fills gaps between records, for example 255, the erased state of flash; missing: an image with a gap
+    /// is refused.
+    fill_gaps: Option<u8>,
     /// Flash date, as `2009-06-01`; missing: today, but a board that already shows the program keeps its date.
     date: Option<String>,
     /// Program ID that the boards must show at the end.
@@ -105,7 +105,8 @@ fn usage(message: impl Into<String>, next: &'static str) -> Problem {
     Problem::new("image", message, next).kind(ErrorKind::Usage)
 }
 
-fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
+/// Reads an image. Adds its notes, such as a gap that was filled, to `notes`.
+fn image(text: &str, request: &UpdateRequest, notes: &mut Vec<String>) -> Result<UpdateImage, Problem> {
     let bytes = STANDARD
         .decode(text)
         .map_err(|e| usage(format!("the image is not valid base64: {e}"), "encode the file as base64"))?;
@@ -118,9 +119,10 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
         Unit::Byte => AddressUnit::Byte,
         Unit::Word => AddressUnit::Word,
     });
-    let gaps = if request.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
+    let gaps = request.fill_gaps.map_or(Gaps::Refuse, Gaps::Fill);
     let options = ImageOptions { format, address_unit, gaps, ..ImageOptions::default() };
     let image = Image::parse(&bytes, &options).map_err(|e| usage(e.to_string(), advice(&e)))?;
+    notes.extend(image.notes().iter().map(ToString::to_string));
     Ok(image.into())
 }
 
@@ -129,12 +131,12 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
-        ImageAdvice::FillGaps => "if the board may get FF there, fill the gap with fill_gaps",
+        ImageAdvice::FillGaps => "if nothing belongs there, set fill_gaps to 255 (the erased state of flash)",
         ImageAdvice::OtherUnit(AddressUnit::Byte) => {
-            "set addresses to byte if the tool chain counts bytes, or set fill_gaps if the gap is intended"
+            "set addresses to byte if the tool chain counts bytes, or set fill_gaps to 255 if the gap is intended"
         }
         ImageAdvice::OtherUnit(AddressUnit::Word) => {
-            "set addresses to word if the tool chain counts words, or set fill_gaps if the gap is intended"
+            "set addresses to word if the tool chain counts words, or set fill_gaps to 255 if the gap is intended"
         }
         ImageAdvice::MakeAgain | ImageAdvice::NameRaw | ImageAdvice::Rename | ImageAdvice::Addresses => {
             "make the file again with the tool chain; valid formats are hex, srec and bin"
@@ -169,7 +171,8 @@ fn parsed(text: &str) -> Option<Date> {
     parts.next().is_none().then_some(date)
 }
 
-fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, Problem> {
+/// Returns the options of an update, and the notes about its images.
+fn options(request: &UpdateRequest, profile: &Profile) -> Result<(UpdateOptions, Vec<String>), Problem> {
     if request.boards.is_empty() {
         return Err(usage(
             "no board is selected",
@@ -179,9 +182,11 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
     numbers(request.boards.iter().map(|target| target.board))?;
     let target = |t: &TargetRequest| UpdateTarget { board: t.board, flash_number: t.flash_number };
     let targets = request.boards.iter().map(target).collect();
-    let second = request.second.as_deref().map(|text| image(text, request)).transpose()?;
+    let mut notes = Vec::new();
+    let main = image(&request.image, request, &mut notes)?;
+    let second = request.second.as_deref().map(|text| image(text, request, &mut notes)).transpose()?;
     let date = day(request.date.as_deref(), profile)?;
-    Ok(UpdateOptions {
+    let options = UpdateOptions {
         second,
         expect_program_id: request.expect_program_id,
         mode: if request.group { UpdateMode::Group } else { UpdateMode::OneByOne },
@@ -192,13 +197,14 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
         start: request.start,
         accept_unverified: request.accept_unverified,
         keep_going: request.boards.len() > 1,
-        ..UpdateOptions::new(targets, image(&request.image, request)?, date)
-    })
+        ..UpdateOptions::new(targets, main, date)
+    };
+    Ok((options, notes))
 }
 
 /// Reads the body of an update request. A separate thread parses long images, so that other requests are served at the
 /// same time.
-async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Problem> {
+async fn read(request: Request, profile: Profile) -> Result<(UpdateOptions, Vec<String>), Problem> {
     let (parts, body) = request.into_parts();
     let body = Bytes::from_request(Request::from_parts(parts.clone(), body), &()).await;
     let body = body.map_err(|e| Problem::rejected(e.status(), e.body_text()))?;
@@ -255,13 +261,13 @@ pub(super) async fn update(
     agent.commander(&asker)?;
     let Ok(room) = agent.images.clone().acquire_owned().await else { return Err(fault()) };
     let profile = agent.shared.snapshot().profile;
-    let options = read(request, profile).await?;
+    let (options, notes) = read(request, profile).await?;
     drop(room);
     agent.begin((&asker, Some(after)), (Kind::Update, "update"), |worker| {
         let start = options.start;
         let report = worker.session.driver.update(options, &mut worker.records, &mut |_| {})?;
         worker.updated(&report, start);
         let error = failed(&report);
-        Ok((Done::Update(report), error))
+        Ok((Done::Update(report, notes), error))
     })
 }

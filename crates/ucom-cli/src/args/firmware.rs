@@ -40,9 +40,11 @@ pub(crate) struct UpdateArgs {
     /// command uses the other unit
     #[arg(long, value_enum, value_name = "UNIT")]
     pub addresses: Option<Addresses>,
-    /// Fill gaps between records with 0xFF (erased flash)
-    #[arg(long)]
-    pub fill_gaps: bool,
+    /// Fill gaps between records with this byte.
+    ///
+    /// Example: 0xFF, the erased state of flash. Without this option, the command refuses an image with a gap
+    #[arg(long, value_name = "BYTE", value_parser = fill_byte)]
+    pub fill_gaps: Option<u8>,
     /// Require this flash number of the board
     #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
@@ -132,13 +134,23 @@ fn program_id(text: &str) -> Result<u16, String> {
     flash_id(text).map_err(|_| format!("\"{text}\" is not a Program ID, as 0x4B3F"))
 }
 
+/// Parses the byte that fills gaps, which is decimal, or hexadecimal with 0x.
+fn fill_byte(text: &str) -> Result<u8, String> {
+    let byte = flash_id(text).ok().and_then(|word| u8::try_from(word).ok());
+    byte.ok_or_else(|| format!("\"{text}\" is not a valid byte, expected 0 to 255 or 0x00 to 0xFF"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn program_ids_are_words() {
+    fn program_ids_are_words_and_fill_bytes_are_bytes() {
         assert_eq!((program_id("0x4B3F"), program_id("19263")), (Ok(0x4B3F), Ok(0x4B3F)));
+        assert_eq!((fill_byte("0xFF"), fill_byte("0")), (Ok(0xFF), Ok(0)));
+        for wrong in ["FF", "256", "0x100", "-1", ""] {
+            assert!(fill_byte(wrong).is_err_and(|e| e.contains("0x00 to 0xFF")), "{wrong}");
+        }
         assert!(program_id("0x10000").is_err_and(|e| e.contains("Program ID")));
     }
 }

@@ -47,7 +47,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
         Addresses::Byte => AddressUnit::Byte,
         Addresses::Word => AddressUnit::Word,
     });
-    let gaps = if args.fill_gaps { Gaps::Fill } else { Gaps::Refuse };
+    let gaps = args.fill_gaps.map_or(Gaps::Refuse, Gaps::Fill);
     let format = args.raw.then_some(Format::Bin);
     let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
@@ -84,10 +84,12 @@ fn advice(error: &ImageError) -> String {
             "if these are the raw bytes of a program, rename the file to .bin, or use --raw".into()
         }
         ImageAdvice::Rename => "if these are the raw bytes of a program, rename the file to .bin".into(),
-        ImageAdvice::FillGaps => "if the board may get FF there, fill the gap with --fill-gaps".into(),
+        ImageAdvice::FillGaps => {
+            "if nothing belongs there, use --fill-gaps 0xFF (the erased state of flash)".into()
+        }
         ImageAdvice::OtherUnit(unit) => format!(
             "if the tool chain counts {unit}s, use --addresses {unit}: then the records are contiguous. If \
-             the gap is intended, use --fill-gaps to fill it with FF"
+             the gap is intended, use --fill-gaps 0xFF"
         ),
         ImageAdvice::Addresses => {
             "make the file again: its addresses are valid neither in bytes nor in words".into()

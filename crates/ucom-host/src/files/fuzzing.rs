@@ -17,7 +17,7 @@ use super::signals::{BoardSignals, SignalTable, SignalValue};
 pub fn image(data: &[u8]) {
     let Some((&choice, data)) = data.split_first() else { return };
     let format = [None, Some(Format::Bin), Some(Format::IntelHex), Some(Format::SRecord)];
-    let gaps = if choice & 4 == 0 { Gaps::Refuse } else { Gaps::Fill };
+    let gaps = if choice & 4 == 0 { Gaps::Refuse } else { Gaps::Fill(choice) };
     let options = ImageOptions {
         format: format[usize::from(choice & 3)],
         gaps,

@@ -18,8 +18,10 @@ mod tests;
 use core::fmt;
 use core::str::FromStr;
 
+use crate::master::counted;
+
 pub use error::{ImageAdvice, ImageError, LineProblem};
-use segments::Segments;
+use segments::{Segments, without_padding};
 
 /// Largest size of an image, in bytes, unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
@@ -90,8 +92,8 @@ pub enum Gaps {
     /// The reader refuses a file with a gap.
     #[default]
     Refuse,
-    /// The reader fills the gap with 0xFF, the erased state of flash, and lists the gap in [`Image::notes`].
-    Fill,
+    /// The reader fills the gap with this byte, and lists the gap in [`Image::notes`]. 0xFF is the erased state of flash.
+    Fill(u8),
 }
 
 /// Options for reading an image file.
@@ -131,15 +133,20 @@ impl Default for ImageOptions {
 /// A property of an image that the user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageNote {
-    /// The reader filled a gap with 0xFF.
+    /// The reader filled a gap.
     GapFilled {
         /// First address without data, in words.
         address_words: u32,
         /// Length of the gap in bytes.
         bytes: usize,
+        /// Byte that fills the gap.
+        with: u8,
     },
-    /// The last word had only one byte, so the reader added a byte 0xFF.
-    LastWordPadded,
+    /// The last word had only one byte, so the reader added a byte: 0xFF, or the byte that fills gaps.
+    LastWordPadded {
+        /// Byte that was added.
+        with: u8,
+    },
     /// The file has no end record. Its last record is a count record, and the number in this count record is correct.
     EndedByCount {
         /// Number of data records in the file.
@@ -153,13 +160,16 @@ pub enum ImageNote {
 impl fmt::Display for ImageNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::GapFilled { address_words, bytes } => {
-                write!(f, "gap of {bytes} bytes at word address 0x{address_words:X} filled with FF")
+            Self::GapFilled { address_words, bytes, with } => {
+                let bytes = counted(*bytes, "byte");
+                write!(f, "gap of {bytes} at word address 0x{address_words:X} filled with {with:02X}")
             }
             Self::EndedByCount { records } => {
                 write!(f, "no end record; the count record confirms all {records} data records")
             }
-            Self::LastWordPadded => f.write_str("odd number of bytes: FF added to fill the last word"),
+            Self::LastWordPadded { with } => {
+                write!(f, "odd number of bytes: {with:02X} added to fill the last word")
+            }
             Self::AddressesCount(unit) => {
                 write!(f, "addresses are read in {unit}s, because only then the records are contiguous")
             }
@@ -200,8 +210,9 @@ impl Image {
             Format::IntelHex | Format::SRecord => Self::records(content, format, options)?,
         };
         if image.bytes.len() % 2 == 1 {
-            image.bytes.push(0xFF);
-            image.notes.push(ImageNote::LastWordPadded);
+            let with = if let Gaps::Fill(with) = options.gaps { with } else { 0xFF };
+            image.bytes.push(with);
+            image.notes.push(ImageNote::LastWordPadded { with });
         }
         if options.swap_bytes {
             image.bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.swap(0, 1));
@@ -244,6 +255,7 @@ impl Image {
             Format::SRecord => (AddressUnit::Word, AddressUnit::Byte),
             _ => (AddressUnit::Byte, AddressUnit::Word),
         };
+        let content = without_padding(content);
         let read = |unit, gaps| {
             let (mut segments, mut notes) = (Segments::new(unit, options.max_bytes), Vec::new());
             match format {
@@ -268,7 +280,7 @@ impl Image {
                     image.notes.push(ImageNote::AddressesCount(other));
                     Ok(image)
                 }
-                _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
+                _ if options.gaps != Gaps::Refuse => read(usual, options.gaps).map(|(image, _)| image),
                 // The records are too few or too short to show the unit, so the user must decide.
                 Ok(_) if e.is_of_addresses() => {
                     Err(ImageError::OtherUnit { error: Box::new(e), unit: other })

@@ -58,12 +58,14 @@ pub(crate) struct UpdateObject {
     pub unverifiable: Option<String>,
     /// Number of bytes that the agent sends in both cycles of the update.
     pub bytes: u64,
+    /// Changes that the agent made to the images, such as a gap that it filled.
+    pub notes: Vec<String>,
     /// Results for each board.
     pub boards: Vec<UpdatedObject>,
 }
 
 impl UpdateObject {
-    fn of(report: &UpdateReport) -> Self {
+    fn of(report: &UpdateReport, notes: Vec<String>) -> Self {
         let board = |result: &UpdateResult| UpdatedObject {
             board: result.board,
             flash_number: result.flash_number,
@@ -84,6 +86,7 @@ impl UpdateObject {
             program_id: report.program_id,
             unverifiable: report.unverifiable.map(|why| why.to_string().replace('`', "")),
             bytes: report.bytes,
+            notes,
             boards: report.boards.iter().map(board).collect(),
         }
     }
@@ -149,7 +152,7 @@ impl From<Job> for JobObject {
             Some(Done::Findings(all)) => {
                 object.findings = Some(all.iter().map(FindingObject::from).collect());
             }
-            Some(Done::Update(report)) => object.update = Some(UpdateObject::of(&report)),
+            Some(Done::Update(report, notes)) => object.update = Some(UpdateObject::of(&report, notes)),
             Some(Done::Running(boards, load)) => {
                 let running = |(board, admin): &(u8, ucom::Admin)| RunningObject {
                     board: *board,

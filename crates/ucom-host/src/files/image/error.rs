@@ -1,6 +1,7 @@
 //! Reasons why a file is not a valid image.
 
 use super::{AddressUnit, Format};
+use crate::master::counted;
 use std::path::PathBuf;
 
 /// Reasons why a file cannot be used as an image.
@@ -102,7 +103,7 @@ pub enum ImageError {
         lines: usize,
     },
     /// The records leave a gap in the addresses.
-    #[error("no record contains the {bytes} bytes at word address 0x{address_words:X}")]
+    #[error("no record contains the {} at word address 0x{address_words:X}", counted(*bytes, "byte"))]
     Gap {
         /// First address without data, in words.
         address_words: u32,

@@ -92,20 +92,18 @@ impl Segments {
         let words = |byte: u64| u32::try_from(byte / 2);
         let beyond = ImageError::AddressRange { address_words: u32::MAX, words: 0 };
         let Ok(address_words) = words(first) else { return Err(beyond) };
-        if first % 2 == 1 {
-            // The image begins in the middle of a word, and no record contains the other half of this word.
-            return Err(ImageError::Gap { address_words, bytes: 1 });
-        }
         let mut bytes: Vec<u8> = Vec::new();
+        // If the first record begins in the middle of a word, no record contains the first half of this word.
+        let first = first - first % 2;
         for (start, run) in self.runs {
             let missing = (start - first) as usize - bytes.len();
             if missing > 0 {
                 let at = words(first + bytes.len() as u64).unwrap_or(u32::MAX);
-                match gaps {
-                    Gaps::Refuse => return Err(ImageError::Gap { address_words: at, bytes: missing }),
-                    Gaps::Fill => notes.push(ImageNote::GapFilled { address_words: at, bytes: missing }),
-                }
-                bytes.resize(bytes.len() + missing, 0xFF);
+                let Gaps::Fill(with) = gaps else {
+                    return Err(ImageError::Gap { address_words: at, bytes: missing });
+                };
+                notes.push(ImageNote::GapFilled { address_words: at, bytes: missing, with });
+                bytes.resize(bytes.len() + missing, with);
             }
             bytes.extend_from_slice(&run);
         }
@@ -125,9 +123,22 @@ pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> 
     Ok(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
 }
 
-/// Returns the lines of a text with their numbers from 1, without line ends and surrounding blanks. The result does not contain empty
-/// lines.
+/// Returns a text without the characters that some tools write after the last line: ^Z (end of file in DOS), NUL, and white space.
+pub(super) fn without_padding(content: &[u8]) -> &[u8] {
+    let is_text = |b: &u8| !b.is_ascii_whitespace() && !matches!(b, 0 | 0x1A);
+    content.iter().rposition(is_text).and_then(|last| content.get(..=last)).unwrap_or_default()
+}
+
+/// Returns the lines of a text with their numbers from 1, without line ends (CR LF, LF or CR) and surrounding blanks. The result does not
+/// contain empty lines.
 pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
-    let lines = content.split(|b| *b == b'\n').enumerate();
-    lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())
+    let (mut rest, mut number) = (content, 0);
+    let next = move || {
+        let end = rest.iter().position(|b| matches!(b, b'\r' | b'\n')).unwrap_or(rest.len());
+        let (line, after) = rest.split_at_checked(end).filter(|_| !rest.is_empty())?;
+        rest = after.strip_prefix(b"\r\n").or_else(|| after.get(1..)).unwrap_or_default();
+        number += 1;
+        Some((number, line.trim_ascii()))
+    };
+    core::iter::from_fn(next).filter(|(_, line)| !line.is_empty())
 }

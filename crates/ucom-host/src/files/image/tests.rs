@@ -135,16 +135,69 @@ fn what_is_wrong_is_named_with_line_and_column() {
 fn gaps_are_refused_or_filled_with_a_word() {
     let text = hex_line(0x10, 0, &[1, 2]) + &hex_line(0x16, 0, &[3, 4]) + ":00000001FF\n";
     assert!(matches!(parse(&text), Err(ImageError::Gap { address_words: 9, bytes: 4 })));
-    let options = ImageOptions { gaps: Gaps::Fill, ..Default::default() };
-    let image = Image::parse(text.as_bytes(), &options).unwrap();
-    assert_eq!(image.bytes(), [1, 2, 0xFF, 0xFF, 0xFF, 0xFF, 3, 4]);
-    assert_eq!(image.notes(), [ImageNote::GapFilled { address_words: 9, bytes: 4 }]);
+    let fill = |with, text: &str| {
+        let options = ImageOptions { gaps: Gaps::Fill(with), ..Default::default() };
+        Image::parse(text.as_bytes(), &options).unwrap()
+    };
+    for with in [0xFF, 0x00, 0x3E] {
+        let image = fill(with, &text);
+        assert_eq!(image.bytes(), [1, 2, with, with, with, with, 3, 4]);
+        assert_eq!(image.notes(), [ImageNote::GapFilled { address_words: 9, bytes: 4, with }]);
+    }
+    // Half a word can be missing before the first record and after the last record.
+    let odd = hex_line(0x11, 0, &[1, 2]) + ":00000001FF\n";
+    assert_eq!(parse(&odd).unwrap_err().to_string(), "no record contains the 1 byte at word address 0x8");
+    let image = fill(0xAA, &odd);
+    assert_eq!((image.bytes(), image.address_words()), (&[0xAA, 1, 2, 0xAA][..], 8));
+    let notes = [
+        ImageNote::GapFilled { address_words: 8, bytes: 1, with: 0xAA },
+        ImageNote::LastWordPadded { with: 0xAA },
+    ];
+    assert_eq!(image.notes(), notes);
+}
+
+/// DOS tools end a file with ^Z, and some programmers fill a file with NUL. These characters are ignored only after the end of the
+/// records.
+#[test]
+fn padding_after_the_end_record_is_ignored() {
+    let hex = hex_line(0, 0, &[1, 2]) + ":00000001FF";
+    let srec = s_line(1, 2, 0, &[1, 2]) + &s_line(9, 2, 0, &[]);
+    let counted = s_line(1, 2, 0, &[1, 2]) + &s_line(5, 2, 1, &[]);
+    for text in [&hex, &srec, &counted] {
+        for end in ["\x1a", "\r\n\x1a", "\0\0\0", "\n\0\0\x1a\r\n\0 "] {
+            assert_eq!(parse(&format!("{text}{end}")).unwrap().bytes(), [1, 2], "{text:?} {end:?}");
+        }
+        for end in ["\n\x1aEND", "\n\0\0:\n", "\nmade by hand\x1a"] {
+            assert!(matches!(parse(&format!("{text}{end}")), Err(ImageError::Line { .. })), "{end:?}");
+        }
+    }
+    for cut in [hex_line(0, 0, &[1, 2]) + "\0\0", s_line(1, 2, 0, &[1, 2]) + "\x1a"] {
+        assert!(matches!(parse(&cut), Err(ImageError::NoEnd { lines: 1, .. })), "{cut:?}");
+    }
+    let inside = hex_line(0, 0, &[1, 2]) + "\x1a\n:00000001FF";
+    assert_eq!(problem(&inside), (2, 1, LineProblem::Start { expected: ':' }));
+}
+
+/// A line ends with LF, CR LF or CR. Errors contain the right line in each case.
+#[test]
+fn a_carriage_return_ends_a_line() {
+    for end in ["\n", "\r\n", "\r"] {
+        let text = (hex_line(0, 0, &[1, 2]) + &hex_line(2, 0, &[3, 4]) + ":00000001FF\n").replace('\n', end);
+        assert_eq!(parse(&text).unwrap().bytes(), [1, 2, 3, 4], "{end:?}");
+        let text = (s_line(1, 2, 0, &[1, 2]) + &s_line(9, 2, 0, &[])).replace('\n', end);
+        assert_eq!(parse(&text).unwrap().bytes(), [1, 2], "{end:?}");
+        let wrong = (hex_line(0, 0, &[1, 2]) + "\n" + &hex_line(2, 0, &[3, 4]) + "x\n").replace('\n', end);
+        assert_eq!(problem(&wrong), (4, 1, LineProblem::Start { expected: ':' }), "{end:?}");
+    }
 }
 
 #[test]
 fn raw_bytes_are_whole_words() {
     let image = Image::parse(&[1, 2, 3], &Default::default()).unwrap();
-    assert_eq!((image.bytes(), image.notes()), (&[1, 2, 3, 0xFF][..], &[ImageNote::LastWordPadded][..]));
+    assert_eq!(
+        (image.bytes(), image.notes()),
+        (&[1, 2, 3, 0xFF][..], &[ImageNote::LastWordPadded { with: 0xFF }][..])
+    );
     let options = ImageOptions { swap_bytes: true, load_address_words: Some(7), ..Default::default() };
     let image = Image::parse(&[1, 2, 3, 4], &options).unwrap();
     assert_eq!((image.bytes(), image.address_words()), (&[2, 1, 4, 3][..], 7));
@@ -253,7 +306,7 @@ fn characters_of_records_are_never_an_image() {
             ("checksum", with(|b| b[20] = if b[20] == b'0' { b'1' } else { b'0' })),
             ("cut between lines", text.as_bytes()[..text.len() / 2].to_vec()),
             ("no end record", lines[..lines.len() - 1].join("\n").into_bytes()),
-            ("^Z", with(|b| b.push(0x1A))),
+            ("^Z in the middle", with(|b| b.insert(60, 0x1A))),
             ("^Z and text", with(|b| b.extend(b"\x1Atext"))),
             ("NULs in the middle", with(|b| b.splice(60..60, [0; 4]).for_each(drop))),
             ("more NULs than text", with(|b| b[60..].fill(0))),
@@ -370,7 +423,7 @@ proptest! {
         form in 0_u8..4, at in any::<prop::sample::Index>(), with in any::<u8>(),
     ) {
         let format = [None, Some(Format::Bin), Some(Format::IntelHex), Some(Format::SRecord)][usize::from(form)];
-        let options = ImageOptions { format, gaps: Gaps::Fill, ..Default::default() };
+        let options = ImageOptions { format, gaps: Gaps::Fill(with), ..Default::default() };
         let _ = Image::parse(&data, &options);
         let mut text = (hex_line(0x20, 0, &[1, 2, 3, 4]) + ":00000001FF\n").into_bytes();
         let i = at.index(text.len());

@@ -17,6 +17,11 @@ pub trait CanBus {
     /// the call does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
 
+    /// Returns an error if this bus can never carry the frame. `send` returns the same error. The check sends nothing.
+    fn carries(&self, _frame: &CanFrame) -> Result<(), CanError> {
+        Ok(())
+    }
+
     /// Returns the state of this member's CAN controller, derived from the frames received so far.
     fn state(&mut self) -> ControllerState {
         ControllerState::default()
@@ -38,6 +43,9 @@ macro_rules! what_leads_to_a_bus_is_one {
             }
             fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
                 (**self).receive(timeout)
+            }
+            fn carries(&self, frame: &CanFrame) -> Result<(), CanError> {
+                (**self).carries(frame)
             }
             fn state(&mut self) -> ControllerState {
                 (**self).state()

@@ -191,6 +191,10 @@ impl<B: CanBus> Faulty<B> {
 }
 
 impl<B: CanBus> CanBus for Faulty<B> {
+    fn carries(&self, frame: &CanFrame) -> Result<(), CanError> {
+        self.bus.carries(frame)
+    }
+
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
         let now = (self.clock)();
         self.out.put(now, *frame);

@@ -59,6 +59,15 @@ impl SocketCanBus {
         })
     }
 
+    fn not_carried(&self, frame: &CanFrame) -> CanError {
+        CanError::NotCarried {
+            url: self.url.clone(),
+            frame: *frame,
+            why: "the interface is set up for classic CAN; if its adapter supports CAN FD, set it up with \
+                  `dbitrate 5000000 fd on`",
+        }
+    }
+
     fn failed(&self, step: &'static str, source: io::Error) -> CanError {
         let url = self.url.clone();
         match source.raw_os_error() {
@@ -90,16 +99,18 @@ fn hint(error: &io::Error, interface: &str) -> String {
 }
 
 impl CanBus for SocketCanBus {
+    fn carries(&self, frame: &CanFrame) -> Result<(), CanError> {
+        // The largest frame of an interface shows how it is set up: 16 bytes for classic CAN, 72 bytes for CAN FD.
+        let mtu = || std::fs::read_to_string(format!("/sys/class/net/{}/mtu", self.interface)).ok();
+        let is_classic = frame.is_fd() && mtu().is_some_and(|mtu| mtu.trim() == "16");
+        if is_classic { Err(self.not_carried(frame)) } else { Ok(()) }
+    }
+
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
         let raw = to_kernel(frame);
         let result = retry_while_full(|| self.socket.write_frame(&raw), std::thread::sleep);
         result.map_err(|source| match source.raw_os_error() {
-            Some(EINVAL) if frame.is_fd() => CanError::NotCarried {
-                url: self.url.clone(),
-                frame: *frame,
-                why: "the interface is set up for classic CAN; if its adapter supports CAN FD, set it up \
-                      with `dbitrate 5000000 fd on`",
-            },
+            Some(EINVAL) if frame.is_fd() => self.not_carried(frame),
             _ => self.failed("sending", source),
         })
     }

@@ -14,6 +14,7 @@ mod overwrite;
 mod pages;
 mod params;
 mod repair;
+mod replay;
 mod serve;
 mod shared_numbers;
 mod silence;

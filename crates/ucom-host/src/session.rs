@@ -54,7 +54,7 @@ pub use parameters::{
 pub use plans::{plans, remember};
 pub use prompt::Prompt;
 pub use recorder::Recorder;
-pub use replay::{is_intrusive, replay};
+pub use replay::{ReplayPlan, Unsent, is_intrusive, replay};
 pub use selection::{Assignment, Boards, for_board, only};
 pub use values::{Prepared, Word, note_rounded, with_names, words};
 pub use watch::{CompetingMaster, HISTORY, LOG, Picture, Problems, Watch};

@@ -235,12 +235,16 @@ fn is_no_data(error: &io::Error) -> bool {
 }
 
 impl CanBus for SocketcandBus {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
-        if !has_form(frame) {
-            let why =
-                "the socketcand protocol has classic data frames only; for CAN FD use multicast:ADDR:PORT";
-            return Err(CanError::NotCarried { url: self.url.clone(), frame: *frame, why });
+    fn carries(&self, frame: &CanFrame) -> Result<(), CanError> {
+        if has_form(frame) {
+            return Ok(());
         }
+        let why = "the socketcand protocol has classic data frames only; for CAN FD use multicast:ADDR:PORT";
+        Err(CanError::NotCarried { url: self.url.clone(), frame: *frame, why })
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
+        self.carries(frame)?;
         let mut text = String::with_capacity(64);
         push_send(&mut text, frame);
         self.write(text.as_bytes())

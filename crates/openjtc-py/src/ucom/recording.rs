@@ -78,6 +78,10 @@ impl CanBus for Tap {
         Ok(received)
     }
 
+    fn carries(&self, frame: &CanFrame) -> Result<(), CanError> {
+        self.bus.carries(frame)
+    }
+
     fn state(&mut self) -> ControllerState {
         self.bus.state()
     }

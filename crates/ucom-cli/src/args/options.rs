@@ -317,8 +317,11 @@ pub(crate) struct ReplayArgs {
     /// Set the speed as a factor of the original speed
     #[arg(long, value_name = "X", default_value_t = 1.0)]
     pub speed: f64,
-    #[command(flatten)]
-    pub force: ForceArgs,
+    /// Send only the frames of this CAN interface of the recording
+    #[arg(long, value_name = "NAME")]
+    pub interface: Option<String>,
+    #[arg(long, hide = true)]
+    pub force: bool,
 }
 
 /// Options of `ucom send`.
@@ -350,6 +353,9 @@ pub(crate) struct DecodeArgs {
     /// End after this number of frames
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
+    /// Decode only the frames of this CAN interface of the recording
+    #[arg(long, value_name = "NAME", conflicts_with = "live")]
+    pub interface: Option<String>,
 }
 
 /// Options of `ucom probe`.

@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use cli_kit::{Failure, Output, Stop};
 use serde_json::json;
-use ucom_host::Decoder;
 use ucom_host::ProfileFile;
 use ucom_host::files::recording::{CandumpReader, Record, RecordedFrame, Recording};
 use ucom_host::session::{CleanupList, protocol_frame, recorded};
+use ucom_host::{Decoder, Described};
 
-use super::record::{Silence, report_broken_off};
+use super::record::{Silence, is_view, one_bus, report_broken_off, unreadable};
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::interrupt::listen;
 
@@ -32,9 +32,13 @@ pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result
     let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
         Box::new(received(&stop)?)
     } else {
-        let recording = Recording::read(&args.file)
-            .map_err(|e| Failure::usage(e).next("valid formats are candump -L, FZI-CAN 1.2 and MCAP"))?;
+        let mut recording = Recording::read(&args.file).map_err(unreadable)?;
         report_broken_off(&recording, &args.file, out);
+        one_bus(&mut recording, &args.file, args.interface.as_deref())?;
+        if let Some((number, back)) = recording.second_start() {
+            let (file, back) = (args.file.display(), back.as_secs_f64());
+            out.note(format!("{file}: more than one recording: frame {number} is {back:.3} s earlier than the frame before it"));
+        }
         // The command uses the profile in the recording, unless the user selects another profile.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
             profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
@@ -44,8 +48,12 @@ pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result
     let mut decoder = Decoder::new(profile);
     let mut frames = 0;
     let mut start = None;
+    let mut interface = args.interface.clone();
     for record in records {
         let record = record?;
+        if stdin && !is_of(&record, &mut interface, args.interface.is_some())? {
+            continue;
+        }
         if frames == left || Output::gone() || stop.asked() {
             return Ok(());
         }
@@ -58,6 +66,21 @@ pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result
             .next("give a candump log, or one frame in each line: 141#2100011934126E38"));
     }
     Ok(())
+}
+
+/// Returns `true` if the record is a frame of the interface that is decoded: the selected interface, or the interface of the first frame.
+/// Returns an error for another interface if the user has selected none. A bare frame has no interface.
+fn is_of(record: &Record, interface: &mut Option<String>, is_selected: bool) -> Result<bool, Failure> {
+    if record.channel.is_empty() {
+        return Ok(true);
+    }
+    let name = interface.get_or_insert_with(|| record.channel.clone());
+    if *name != record.channel && !is_selected {
+        let (first, second) = (name.escape_debug(), record.channel.escape_debug());
+        let what = format!("the input contains the frames of several CAN interfaces: {first}, {second}");
+        return Err(Failure::usage(what).next("select one of them with --interface NAME"));
+    }
+    Ok(*name == record.channel)
 }
 
 fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
@@ -78,7 +101,15 @@ fn live(mut left: u64, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
 }
 
 fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Output) {
-    let described = decoder.describe(time_ns / 1000, &protocol_frame(frame));
+    let described = match frame.error_text() {
+        Some(text) => Described {
+            name: "error frame".into(),
+            who: "-".into(),
+            value: json!({ "error_frame": text }),
+            text,
+        },
+        None => decoder.describe(time_ns / 1000, &protocol_frame(frame)),
+    };
     let time_s = time_ns as f64 * 1e-9;
     let mut value = json!({
         "time_s": time_s,
@@ -132,7 +163,9 @@ pub(super) fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure
     // line of a candump log.
     let full = if bare { format!("(0.0) can0 {line}\n") } else { format!("{line}\n") };
     match CandumpReader::new(full.as_bytes()).next()? {
+        Ok(record) if bare => Some(Ok(Record { channel: String::new(), ..record })),
         Ok(record) => Some(Ok(record)),
+        Err(e) if is_view(&e) => Some(Err(unreadable(e))),
         Err(e) => Some(Err(Failure::usage(format!("line {number}: \"{line}\": {e}"))
             .next("give a candump log, or one frame in each line: 141#2100011934126E38"))),
     }

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use cli_kit::{Diagnose, ErrorKind, Failure, Output, OutputFile, Stop};
 use serde_json::json;
-use ucom_host::files::recording::{Record, Recording, RecordingError, RecordingFormat, profile_path};
+use ucom_host::files::recording::{RecordProblem, Recording, RecordingError, RecordingFormat, profile_path};
 use ucom_host::master::counted;
-use ucom_host::session::{self, CleanupList, Operator, Recorder, is_intrusive};
+use ucom_host::session::{self, CleanupList, Operator, Recorder, ReplayPlan, Unsent};
 
 use super::params::open_output;
 use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
@@ -164,30 +164,96 @@ pub(super) fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result
             args.speed
         )));
     }
-    let recording = Recording::read(&args.file).map_err(Failure::usage)?;
+    let mut recording = Recording::read(&args.file).map_err(unreadable)?;
     report_broken_off(&recording, &args.file, out);
-    let intrusive = |record: &Record| is_intrusive(&record.frame);
-    let (guarded, due): (Vec<&Record>, Vec<&Record>) =
-        recording.records.iter().partition(|record| !args.intrusive && intrusive(record));
+    one_bus(&mut recording, &args.file, args.interface.as_deref())?;
+    if let Some((number, back)) = recording.second_start() {
+        let what = format!(
+            "{}: the file contains more than one recording: the time of frame {number} is {:.3} s before the \
+             time of frame {}; nothing was sent",
+            args.file.display(),
+            back.as_secs_f64(),
+            number - 1
+        );
+        return Err(Failure::usage(what).next("write each recording to its own file"));
+    }
+    if args.force {
+        out.note("--force has no effect, because this command does not check the bus");
+    }
     let cleanup = CleanupList::default();
     let player = Player { stop: listen(&cleanup)?, out };
     let mut bus = link.open()?;
+    let ReplayPlan { due, unsent } = ReplayPlan::new(&recording.records, args.intrusive, &bus);
     if args.intrusive {
         cleanup.begin_other("it is not known which frames of the recording the boards received", "ucom scan");
     }
     let bar = out.bar(due.len() as u64, "replay");
     let sent = session::replay(&due, args.speed, &mut bus, &player, || bar.inc(1))?;
     bar.finish_and_clear();
-    let value = json!({ "sent": sent, "left_out": guarded.len(), "frames": recording.records.len(), "broken_off": recording.broken_off });
+    let left_out: usize = unsent.values().sum();
+    let why: serde_json::Map<_, _> = unsent.iter().map(|(why, n)| (why.name().into(), json!(n))).collect();
+    let value = json!({
+        "sent": sent,
+        "left_out": left_out,
+        "left_out_why": why,
+        "frames": recording.records.len(),
+        "broken_off": recording.broken_off,
+    });
     out.result(&value, || {
-        let hint = match guarded.len() {
-            0 => String::new(),
-            n => format!(
-                ", {n} not sent because they reset, number, program, start or move boards (--intrusive \
-                 sends them)"
-            ),
-        };
-        format!("{} sent{hint}", counted(sent as usize, "frame"))
+        let mut text = format!("{} sent", counted(sent as usize, "frame"));
+        unsent.iter().for_each(|(why, n)| text += &format!("; not sent: {}", unsent_words(*why, *n)));
+        text
     });
     Ok(())
+}
+
+fn unsent_words(why: Unsent, number: usize) -> String {
+    match why {
+        Unsent::Intrusive => format!(
+            "{} that would reset, number, program, start or move boards (--intrusive sends them)",
+            counted(number, "frame")
+        ),
+        Unsent::Error => format!("{}, which only a CAN controller can send", counted(number, "error frame")),
+        Unsent::Remote => format!("{}, which this bus cannot carry", counted(number, "remote frame")),
+        Unsent::Fd => format!("{}, which this bus cannot carry", counted(number, "CAN FD frame")),
+        Unsent::Invalid => format!("{} without a valid identifier or length", counted(number, "frame")),
+    }
+}
+
+/// Returns `true` if a line has the format that candump shows in a terminal.
+pub(super) fn is_view(error: &RecordingError) -> bool {
+    matches!(error, RecordingError::Line { problem: RecordProblem::View, .. })
+}
+
+/// Returns the failure for a file that is not a recording.
+pub(super) fn unreadable(error: RecordingError) -> Failure {
+    let is_view = is_view(&error);
+    Failure::usage(error).next(if is_view {
+        "record again with `ucom record` or `candump -L`"
+    } else {
+        "valid formats are candump -L, FZI-CAN 1.2 and MCAP"
+    })
+}
+
+/// Keeps the frames of one CAN interface. Returns an error if the recording contains several interfaces and none is selected, or if it
+/// does not contain the selected interface.
+pub(super) fn one_bus(recording: &mut Recording, file: &Path, asked: Option<&str>) -> Result<(), Failure> {
+    let all = recording.interfaces();
+    let listed: Vec<String> =
+        all.iter().map(|(name, n)| format!("{} ({})", name.escape_debug(), counted(*n, "frame"))).collect();
+    let (file, listed) = (file.display(), listed.join(", "));
+    match asked {
+        Some(name) if !all.contains_key(name) && !all.is_empty() => {
+            let what = format!("{file}: no frame of the interface {name}, the file contains {listed}");
+            Err(Failure::usage(what))
+        }
+        None if all.len() > 1 => {
+            let what = format!("{file}: the file contains the frames of several CAN interfaces: {listed}");
+            Err(Failure::usage(what).next("select one of them with --interface NAME"))
+        }
+        _ => {
+            recording.records.retain(|record| asked.is_none_or(|name| record.channel == name));
+            Ok(())
+        }
+    }
 }

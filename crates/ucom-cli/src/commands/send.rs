@@ -32,6 +32,9 @@ pub(super) fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(),
     let wire = frames.iter().map(wire).collect::<Result<Vec<_>, _>>()?;
     let mut bus = link.open()?;
     for frame in &wire {
+        bus.carries(frame)?;
+    }
+    for frame in &wire {
         bus.send_wire(frame)?;
     }
     let end = Instant::now() + SENT;

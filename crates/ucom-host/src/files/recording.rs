@@ -13,9 +13,11 @@ mod mcap;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 pub use candump::{CandumpReader, CandumpWriter};
 pub use error::{RecordProblem, RecordingError};
@@ -96,6 +98,26 @@ impl Recording {
             recording.profile = Some(text);
         }
         Ok(recording)
+    }
+
+    /// Returns the CAN interfaces in the recording, each with its number of frames.
+    pub fn interfaces(&self) -> BTreeMap<&str, usize> {
+        let mut all = BTreeMap::new();
+        for record in &self.records {
+            *all.entry(record.channel.as_str()).or_default() += 1;
+        }
+        all
+    }
+
+    /// Returns the number of the first frame, from 1, whose time is more than one second before the time of the frame before it, and the
+    /// difference. A file with such a frame contains more than one recording. `None` if there is no such frame.
+    pub fn second_start(&self) -> Option<(usize, Duration)> {
+        let back = |(i, pair): (usize, &[Record])| {
+            let [before, next] = pair else { return None };
+            let back = Duration::from_nanos(before.time_ns.saturating_sub(next.time_ns));
+            (back > Duration::from_secs(1)).then_some((i + 2, back))
+        };
+        self.records.windows(2).enumerate().find_map(back)
     }
 
     /// Reads a recording from candump lines.

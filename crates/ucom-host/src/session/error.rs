@@ -199,6 +199,7 @@ impl Diagnose for SessionError {
                 (NoLink, "bus", "check that the bus exists and is up; ucom sim makes a simulated bus".into())
             }
             Self::Partly { failure, .. } => return failure.diagnosis(),
+            Self::Bus(CanError::NotCarried { .. }) => (Usage, "usage", Next::default()),
             Self::Bus(_) => (NoLink, "bus", next!("check the bus with {}", ChainDoctor)),
             Self::Frame(_) => (Fault, "frame", Next::default()),
             Self::NoBoards => (NoLink, "no-boards", next!("find the cause with {}", ChainDoctor)),

@@ -52,6 +52,11 @@ impl Link {
         self.start.elapsed().as_micros() as u64
     }
 
+    /// Returns an error if the bus can never carry the frame. The check sends nothing.
+    pub fn carries(&self, frame: &CanFrame) -> Result<(), SessionError> {
+        self.bus.carries(frame).map_err(SessionError::Bus)
+    }
+
     /// Sends a frame of any protocol.
     pub fn send_wire(&mut self, frame: &CanFrame) -> Result<(), SessionError> {
         self.bus.send(frame).map_err(SessionError::Bus)

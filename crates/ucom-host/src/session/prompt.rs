@@ -20,6 +20,10 @@ impl CanBus for Prompt {
         self.0.receive(timeout.min(WAIT))
     }
 
+    fn carries(&self, frame: &CanFrame) -> Result<(), CanError> {
+        self.0.carries(frame)
+    }
+
     fn state(&mut self) -> ControllerState {
         self.0.state()
     }

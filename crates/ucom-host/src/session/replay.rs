@@ -1,11 +1,78 @@
 //! Replay of a recording on a bus, and detection of frames that change boards.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use super::driver::Operator;
 use super::error::SessionError;
 use super::link::{Link, protocol_frame, replayed};
-use crate::files::recording::{Record, RecordedFrame};
+use crate::files::recording::{FrameKind, Record, RecordedFrame};
+
+/// Reasons why a replay does not send a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Unsent {
+    /// The frame changes boards or keeps them running.
+    Intrusive,
+    /// The record is an error that a CAN controller reported. No program can send an error frame.
+    Error,
+    /// The bus cannot carry remote frames.
+    Remote,
+    /// The bus cannot carry CAN FD frames.
+    Fd,
+    /// The record is not a valid frame.
+    Invalid,
+}
+
+impl Unsent {
+    /// Returns the name of the reason in the JSON output.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Intrusive => "intrusive",
+            Self::Error => "error",
+            Self::Remote => "remote",
+            Self::Fd => "fd",
+            Self::Invalid => "invalid",
+        }
+    }
+}
+
+/// Frames of a recording that a replay sends, and the numbers of frames that it does not send.
+#[derive(Debug, Default)]
+pub struct ReplayPlan<'a> {
+    /// Records with frames that the replay sends.
+    pub due: Vec<&'a Record>,
+    /// Number of frames that the replay does not send, by reason.
+    pub unsent: BTreeMap<Unsent, usize>,
+}
+
+impl<'a> ReplayPlan<'a> {
+    /// Examines all frames of a recording before the first frame is sent. `intrusive` permits frames that change boards.
+    pub fn new(records: impl IntoIterator<Item = &'a Record>, intrusive: bool, bus: &Link) -> Self {
+        let mut plan = Self::default();
+        for record in records {
+            match unsent(&record.frame, intrusive, bus) {
+                None => plan.due.push(record),
+                Some(why) => *plan.unsent.entry(why).or_default() += 1,
+            }
+        }
+        plan
+    }
+}
+
+fn unsent(frame: &RecordedFrame, intrusive: bool, bus: &Link) -> Option<Unsent> {
+    if frame.kind == FrameKind::Error {
+        return Some(Unsent::Error);
+    }
+    let Some(wire) = replayed(frame) else { return Some(Unsent::Invalid) };
+    if bus.carries(&wire).is_err() {
+        return Some(match frame.kind {
+            FrameKind::Remote { .. } => Unsent::Remote,
+            FrameKind::Fd { .. } => Unsent::Fd,
+            FrameKind::Data | FrameKind::Error => Unsent::Invalid,
+        });
+    }
+    (!intrusive && is_intrusive(frame)).then_some(Unsent::Intrusive)
+}
 
 /// Sends the frames of a recording at their times, `speed` times as fast as recorded, until the operator requests an end. The function
 /// calls `done` after each frame. The function returns the number of frames that it sent.

@@ -40,7 +40,19 @@ impl<R: BufRead> Iterator for CandumpReader<R> {
     }
 }
 
+/// Returns `true` for a line of candump without the option `-L`, for example `can0  240   [2]  11 22`.
+fn is_view(line: &str) -> bool {
+    let is_length = |column: &str| {
+        let digits = column.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+        digits.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
+    };
+    !line.contains('#') && line.split_whitespace().any(is_length)
+}
+
 fn record(line: &str) -> Result<Record, RecordProblem> {
+    if is_view(line) {
+        return Err(RecordProblem::View);
+    }
     let mut columns = line.split_whitespace();
     let (Some(time), Some(channel), Some(frame)) = (columns.next(), columns.next(), columns.next()) else {
         return Err(RecordProblem::Columns);

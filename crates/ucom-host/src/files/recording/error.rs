@@ -55,6 +55,9 @@ pub enum RecordProblem {
     /// The time in the line is not valid.
     #[error("not a time in seconds")]
     Time,
+    /// The line has the format that candump shows in a terminal, without the option `-L`.
+    #[error("this is the view of candump for a terminal, expected the format of `candump -L`")]
+    View,
     /// The identifier in the line is not valid.
     #[error("not an identifier")]
     Id,

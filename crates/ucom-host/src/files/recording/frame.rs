@@ -50,6 +50,45 @@ impl RecordedFrame {
 }
 
 /// Prints a frame in the format of candump.
+/// Error classes in the identifier of an error frame (linux/can/error.h).
+const ERROR_CLASSES: [(u32, &str); 10] = [
+    (0x001, "transmit timeout"),
+    (0x002, "lost arbitration"),
+    (0x004, "controller"),
+    (0x008, "protocol violation"),
+    (0x010, "transceiver"),
+    (0x020, "no acknowledge"),
+    (0x040, "bus-off"),
+    (0x080, "bus error"),
+    (0x100, "controller restarted"),
+    (0x200, "error counters"),
+];
+/// Problems of a controller in byte 1 of an error frame.
+const CONTROLLER_PROBLEMS: [(u8, &str); 7] = [
+    (0x01, "receive overflow"),
+    (0x02, "transmit overflow"),
+    (0x04, "receive warning"),
+    (0x08, "transmit warning"),
+    (0x10, "receive passive"),
+    (0x20, "transmit passive"),
+    (0x40, "active again"),
+];
+
+impl RecordedFrame {
+    /// Returns the errors that an error frame reports, as text. Returns `None` for all other frames.
+    pub fn error_text(&self) -> Option<String> {
+        if self.kind != FrameKind::Error {
+            return None;
+        }
+        let problems = self.data.get(1).copied().unwrap_or(0);
+        let problems =
+            CONTROLLER_PROBLEMS.iter().filter(|(bit, _)| self.id & 0x4 != 0 && problems & bit != 0);
+        let classes = ERROR_CLASSES.iter().filter(|(bit, name)| self.id & bit != 0 && *name != "controller");
+        let all: Vec<&str> = classes.map(|(_, name)| *name).chain(problems.map(|(_, name)| *name)).collect();
+        Some(if all.is_empty() { "unknown error".into() } else { all.join(", ") })
+    }
+}
+
 impl fmt::Display for RecordedFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.kind == FrameKind::Error {

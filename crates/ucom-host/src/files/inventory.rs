@@ -13,11 +13,13 @@
 //! The key `program` of a board is the [`FlashRecord`] of the last update that was read back. An update changes only the key `program`. An
 //! update does not change any other part of the file, including comments.
 
+mod edit;
+
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_atomically};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use toml_edit::{DocumentMut, Item, TableLike, Value};
+use toml_edit::{Item, TableLike, Value};
 
 use super::FlashRecord;
 use crate::master::InitReport;
@@ -204,12 +206,6 @@ impl Inventory {
         })
     }
 
-    /// Writes the inventory to a file atomically.
-    pub fn write(&self, path: &Path) -> Result<(), InventoryError> {
-        let io = |source| InventoryError::Io { path: path.into(), source };
-        write_atomically(path, self.to_toml().as_bytes()).map_err(io)
-    }
-
     /// Adds a board to the inventory. The function refuses a number above 31, a position that is already used, and a flash number that the
     /// inventory already lists.
     pub fn insert(&mut self, board: InventoryBoard) -> Result<(), InventoryError> {
@@ -292,7 +288,7 @@ impl Inventory {
         let io = |source| InventoryError::Io { path: path.into(), source };
         let wrong = |text: String| InventoryError::Form(format!("{}: {text}", path.display()));
         let text = std::fs::read_to_string(path).map_err(io)?;
-        let mut document: DocumentMut = text.parse().map_err(|e| wrong(format!("{e}")))?;
+        let mut document = edit::parsed(&text)?;
         let item = match record {
             None => None,
             Some(record) => {
@@ -316,7 +312,7 @@ impl Inventory {
             (Some(board), None) if board.contains_key("program") => drop(board.remove("program")),
             (Some(_), None) | (None, _) => return Ok(()),
         }
-        write_atomically(path, document.to_string().as_bytes()).map_err(io)
+        write_atomically(path, edit::rendered(&document, &text).as_bytes()).map_err(io)
     }
 
     /// Returns the inventory as the text of a file.

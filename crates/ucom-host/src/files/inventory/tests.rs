@@ -100,7 +100,96 @@ fn d62_a_record_belongs_to_one_board() {
     }
 }
 
+/// Returns an inventory of boards with these numbers and flash numbers.
+fn chain(boards: &[(u8, u16)]) -> Inventory {
+    let mut inventory = Inventory::default();
+    for (number, flash_number) in boards {
+        inventory.insert(board(*number, *flash_number)).unwrap();
+    }
+    inventory
+}
+
+/// A file that already contains the inventory is not written. In other files only the values that differ are changed.
+#[test]
+fn an_init_keeps_the_comments_of_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("inventory.toml");
+    let text = "# left arm, cabinet 3\n\n# the shoulder\n[[board]] # first\nnumber = 1 # new since May\nflash_number = 33\n\n\
+                [[board]]\nflash_number = 0x0042 # spare\nnumber = 2\nname = 'pan'\n# the end\n";
+    let mut same = chain(&[(1, 0x21)]);
+    same.insert(InventoryBoard { name: "pan".into(), ..board(2, 0x42) }).unwrap();
+    for text in [text.to_owned(), text.replace('\n', "\r\n"), format!("\u{feff}{text}")] {
+        std::fs::write(&path, &text).unwrap();
+        assert!(!same.write(&path).unwrap());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        // The boards have changed places, and a third board was added.
+        let mut new = chain(&[(2, 0x21), (3, 0x63)]);
+        let described =
+            InventoryBoard { description: "UCoM2 \"pan\"".into(), name: "pan".into(), ..board(1, 0x42) };
+        new.insert(described).unwrap();
+        assert!(new.write(&path).unwrap());
+        let after = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(Inventory::read(&path).unwrap(), new, "{after}");
+        assert_eq!(after.contains("\r\n"), text.contains("\r\n"));
+        assert_eq!(after.starts_with('\u{feff}'), text.starts_with('\u{feff}'));
+        for comment in
+            ["# left arm, cabinet 3", "# the shoulder", "# first", "# new since May", "# spare", "# the end"]
+        {
+            assert_eq!(after.matches(comment).count(), 1, "{comment}: {after}");
+        }
+        let places: Vec<usize> = ["0x0042", "33", "0x0063"].iter().map(|f| after.find(f).unwrap()).collect();
+        assert!(places.is_sorted(), "{after}");
+        // Board 1 was replaced, and board 3 was removed. A replaced board has no name.
+        let fewer = chain(&[(1, 0x77), (2, 0x21)]);
+        assert!(fewer.write(&path).unwrap());
+        let after = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(Inventory::read(&path).unwrap(), fewer, "{after}");
+        assert!(
+            after.contains("# new since May") && after.contains("# left arm") && !after.contains("pan"),
+            "{after}"
+        );
+    }
+    for odd in [
+        "",
+        "\n",
+        "# only a comment\n",
+        "board = [ { number = 1, flash_number = 0x42 } ] # in line\n",
+        "board = []\n",
+    ] {
+        std::fs::write(&path, odd).unwrap();
+        assert!(same.write(&path).unwrap());
+        assert_eq!(Inventory::read(&path).unwrap(), same, "{odd}");
+    }
+    assert!(std::fs::read_to_string(&path).is_ok_and(|text| !text.contains("board = []")));
+    std::fs::write(&path, "[[board]]\nnumber = 1\nflash_number = 1\nspare = true\n").unwrap();
+    assert!(same.write(&path).is_err());
+}
+
 proptest! {
+    /// An edit results in the new inventory, whatever the file contains. A second edit does not write the file.
+    #[test]
+    fn an_edit_leads_to_the_inventory(
+        old in prop::collection::btree_map(0_u8..8, (0_u16..12, ".{0,4}"), 0..8),
+        new in prop::collection::btree_map(0_u8..8, (0_u16..12, ".{0,4}"), 0..8),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("inventory.toml");
+        let of = |boards: &std::collections::BTreeMap<u8, (u16, String)>| {
+            let mut inventory = Inventory::default();
+            for (number, (flash, text)) in boards {
+                // A flash number that is already in the chain is left out.
+                let named = InventoryBoard { name: text.clone(), description: text.clone(), ..board(*number, *flash) };
+                let _ = inventory.insert(named);
+            }
+            inventory
+        };
+        let (old, new) = (of(&old), of(&new));
+        old.write(&path).unwrap();
+        new.write(&path).unwrap();
+        prop_assert_eq!(&Inventory::read(&path).unwrap(), &new);
+        prop_assert!(!new.write(&path).unwrap());
+    }
+
     #[test]
     fn round_trip(boards in prop::collection::btree_map(0_u8..32, (any::<u16>(), any::<String>()), 0..32)) {
         let mut inventory = Inventory::default();

@@ -37,7 +37,8 @@ fn d11_values_have_the_units_of_the_signal_table() {
     // Without a unit, the number 61 is refused: it could mean 61 degrees, or the raw word 61, which is 0.61 degrees.
     let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     let message = bare["error"]["message"].as_str().unwrap();
-    assert!(message.contains("the unit is missing: give `61deg`"), "{bare}");
+    assert!(message.contains("the word 61 is `0x003D` (0.61 deg)"), "{bare}");
+    assert!(message.contains("61 deg is outside -60.00..60.00 deg"), "{bare}");
     let io = ucom(&["io", "1"]).ends(0);
     assert!(io.err.contains("has no SO `nobody`"), "{}", io.err);
     let io = io.json();

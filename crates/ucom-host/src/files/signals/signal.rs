@@ -207,7 +207,7 @@ impl Signal {
                 // A number without a unit is refused if the table has a unit or a scale for the signal. The number
                 // would be a scaled value with the signal table, and a raw word without it.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
-                    return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
+                    return Err(self.no_unit(*value, given));
                 }
                 let steps = (value - self.offset) / self.scale;
                 if kind == SignalType::Bool && steps != 0.0 && steps != 1.0 {
@@ -226,6 +226,26 @@ impl Signal {
             }
         };
         Ok(number as u16)
+    }
+
+    /// Returns the error for a number without a unit. The error contains the two possible meanings of the number, each with its exact word.
+    fn no_unit(&self, value: f64, given: &SignalValue) -> ValueError {
+        let unit = self.unit.clone();
+        let mut choices = Vec::new();
+        if !unit.is_empty() {
+            choices.push(match self.word(&SignalValue::Number { value, unit: unit.clone() }) {
+                Ok(word) => format!("`{given}{unit}` is the word 0x{word:04X}"),
+                Err(error) => error.to_string(),
+            });
+        }
+        let (low, high) = self.words();
+        if value.fract() == 0.0 && (f64::from(low)..=f64::from(high)).contains(&value) {
+            let word = value as i32 as u16;
+            if self.word(&SignalValue::Raw(word)).is_ok() {
+                choices.push(format!("the word {given} is `0x{word:04X}` ({})", self.text_with_unit(word)));
+            }
+        }
+        ValueError::NoUnit { given: given.to_string(), unit, choices: choices.join("; ") }
     }
 
     /// Returns the error for a value that is out of the limits; `value` is in the signal's unit.

@@ -27,12 +27,14 @@ pub enum ValueError {
         unit: String,
     },
     /// The value is a number without a unit, which could be the raw word or a value in the signal's unit.
-    #[error("{given}: {}, or give the word as 0x0000", no_unit(given, unit))]
+    #[error("{given}: {}", no_unit(unit, choices))]
     NoUnit {
         /// Text that the user wrote.
         given: String,
         /// Unit of the signal. The unit is empty if the table scales the signal but has no unit for it.
         unit: String,
+        /// Possible meanings of the number, each with its word.
+        choices: String,
     },
     /// The signal cannot represent the value, because the value lies between two words.
     #[error("{given}: the signal has whole numbers only")]
@@ -66,11 +68,15 @@ pub(super) fn space(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
-fn no_unit(given: &str, unit: &str) -> String {
-    match unit.is_empty() {
-        true => "the table has a scale but no unit for this signal: add a unit to the table (unit = \
-                 \"ratio\") and give the value with it"
-            .into(),
-        false => format!("the unit is missing: give `{given}{unit}`"),
-    }
+fn no_unit(unit: &str, choices: &str) -> String {
+    let cause = match unit.is_empty() {
+        true => "the table has a scale but no unit for this signal",
+        false => "the unit is missing",
+    };
+    let choices = if choices.is_empty() { String::new() } else { format!(": {choices}") };
+    let remedy = match unit.is_empty() {
+        true => "; to give values, add a unit to the table (unit = \"ratio\")",
+        false => "",
+    };
+    format!("{cause}{choices}{remedy}")
 }

@@ -49,7 +49,19 @@ fn d11_scale_offset_and_unit() {
     assert_eq!(angle.json(1550), json!(15.5));
     // The number could be the raw word or a value in the signal's unit, so it is refused.
     let message = word(&angle, "15").unwrap_err().to_string();
-    assert_eq!(message, "15: the unit is missing: give `15deg`, or give the word as 0x0000");
+    assert_eq!(
+        message,
+        "15: the unit is missing: `15deg` is the word 0x05DC; the word 15 is `0x000F` (0.15 deg)"
+    );
+    // The message never proposes a value that is outside the limits, or a word that the user did not type.
+    let narrow = Signal { min: Some(-60.0), max: Some(60.0), ..angle.clone() };
+    let message = |text: &str| word(&narrow, text).unwrap_err().to_string();
+    assert_eq!(
+        message("61"),
+        "61: the unit is missing: 61 deg is outside -60.00..60.00 deg; the word 61 is `0x003D` (0.61 deg)"
+    );
+    assert_eq!(message("7000"), "7000: the unit is missing: 7000 deg is outside -60.00..60.00 deg");
+    assert_eq!(message("-0.5"), "-0.5: the unit is missing: `-0.5deg` is the word 0xFFCE");
     assert!(word(&angle, "0").is_err());
     // The conversion never scales a raw word.
     assert_eq!(word(&angle, "0x0010"), Ok(16));
@@ -65,7 +77,7 @@ fn d11_scale_offset_and_unit() {
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
         message.starts_with("2: the table has a scale but no unit for this signal")
-            && message.contains("0x0000"),
+            && message.contains("the word 2 is `0x0002` (-1.0)"),
         "{message}"
     );
     assert_eq!(word(&down, "0x0002"), Ok(2));

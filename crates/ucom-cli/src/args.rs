@@ -259,7 +259,7 @@ pub(crate) enum Command {
     /// Show live sensor outputs of running boards
     #[command(after_help = "The command first sends queries to find the boards and the names of their \
             outputs. Then it only listens. The values come from boards that `ucom run` or another PC has \
-            started.\n\n\
+            started. `ucom decode --live` sends nothing at all.\n\n\
             Examples:\n  \
             ucom so 1\n  \
             ucom so 1 --count 100 --csv > so.csv\n  \

@@ -218,13 +218,16 @@ fn report(all: &[Parameters], inputs: usize, dry_run: bool, out: &Output) {
         let count = rows.len();
         let mut text = table(&[">board", ">#", "parameter", "value"], &rows);
         text += &match dry_run {
+            true if count == 1 => "1 parameter fits; nothing was written\n".into(),
             true => format!("{count} parameters fit; nothing was written\n"),
             false => {
-                format!("{count} parameters written; boards do not confirm them, and a restart resets them\n")
+                let count = counted(count, "parameter");
+                format!("{count} written; boards do not confirm them, and a restart resets them\n")
             }
         };
         if inputs > 0 {
-            text += &format!("{inputs} initial inputs were not written; use: ucom run --params FILE\n");
+            let (inputs, were) = (counted(inputs, "initial input"), if inputs == 1 { "was" } else { "were" });
+            text += &format!("{inputs} {were} not written; use: ucom run --params FILE\n");
         }
         text
     });

@@ -179,7 +179,7 @@ pub enum LineProblem {
         to: u64,
     },
     /// The file contains data after the end record.
-    #[error("data after the end record")]
+    #[error("data after the end record; the file may contain more than one image")]
     AfterEnd,
     /// The number in the count record is wrong.
     #[error("the file has {has} data records, but its count record says {declared}")]

@@ -81,6 +81,18 @@ impl Diagnose for ExchangeError {
                     ChainDoctor
                 )),
             ),
+            // The board sent nothing during the whole exchange, so it may have no power any more.
+            Self::NoAnswer { board, waited_ms, last: Some(last), .. } if last.ago_ms > *waited_ms => {
+                Diagnosis::new(
+                    ErrorKind::NoLink,
+                    "no-answer",
+                    Next::from(format!("board {board} has sent nothing for {} ms: ", last.ago_ms)).then(next!(
+                        "check its power and its cable; {} shows the cause, {} lists the boards that answer",
+                        ChainDoctor,
+                        ChainScan
+                    )),
+                )
+            }
             Self::NoAnswer { board, .. } => Diagnosis::new(
                 ErrorKind::NoLink,
                 "no-answer",
@@ -187,4 +199,26 @@ pub enum Incomplete {
         /// Number of expected packages.
         of: u32,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A board that has lost its power sends nothing during the exchange. The next step then names the power.
+    #[test]
+    fn the_age_of_the_last_frame_selects_the_next_step() {
+        let next = |ago_ms| {
+            let last = Some(LastReceived { function: Function::Alive, ago_ms });
+            let error =
+                ExchangeError::NoAnswer { board: 3, asked: Function::Info, tries: 3, waited_ms: 300, last };
+            error.diagnosis().next.to_string()
+        };
+        assert!(next(120).starts_with("board 3 sends frames but does not answer"), "{}", next(120));
+        assert!(
+            next(1400).starts_with("board 3 has sent nothing for 1400 ms: check its power"),
+            "{}",
+            next(1400)
+        );
+    }
 }

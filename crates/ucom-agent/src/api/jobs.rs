@@ -67,7 +67,7 @@ pub(super) async fn scan(
 
 /// Expected board at a position of the chain.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with the fields number and flash_number")]
 pub(super) struct ExpectedBoard {
     /// Position of the board in the chain. The board receives this number.
     board: u8,
@@ -137,7 +137,7 @@ pub(super) async fn doctor(
 
 /// Value of an input or a parameter.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with the fields name and value, and optionally board")]
 pub(super) struct NamedValue {
     /// Number of the board; missing: the value is for each board of the request.
     board: Option<u8>,

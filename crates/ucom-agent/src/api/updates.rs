@@ -27,7 +27,7 @@ use crate::owner::{Kind, fault};
 
 /// Board to update.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with the field board, and optionally flash_number")]
 pub(super) struct TargetRequest {
     /// Number of the board.
     board: u8,

@@ -232,16 +232,21 @@ impl Signal {
     fn no_unit(&self, value: f64, given: &SignalValue) -> ValueError {
         let unit = self.unit.clone();
         let mut choices = Vec::new();
+        let mut scaled = None;
         if !unit.is_empty() {
             choices.push(match self.word(&SignalValue::Number { value, unit: unit.clone() }) {
-                Ok(word) => format!("`{given}{unit}` is the word 0x{word:04X}"),
+                Ok(word) => {
+                    scaled = Some(word);
+                    format!("`{given}{unit}` is the word 0x{word:04X}")
+                }
                 Err(error) => error.to_string(),
             });
         }
         let (low, high) = self.words();
         if value.fract() == 0.0 && (f64::from(low)..=f64::from(high)).contains(&value) {
             let word = value as i32 as u16;
-            if self.word(&SignalValue::Raw(word)).is_ok() {
+            // Without a scale, both meanings are the same word.
+            if scaled != Some(word) && self.word(&SignalValue::Raw(word)).is_ok() {
                 choices.push(format!("the word {given} is `0x{word:04X}` ({})", self.text_with_unit(word)));
             }
         }

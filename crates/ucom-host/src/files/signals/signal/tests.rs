@@ -53,6 +53,9 @@ fn d11_scale_offset_and_unit() {
         message,
         "15: the unit is missing: `15deg` is the word 0x05DC; the word 15 is `0x000F` (0.15 deg)"
     );
+    let current = signal(SignalType::Int16, 1.0, 0.0, "mA");
+    let message = word(&current, "120").unwrap_err().to_string();
+    assert_eq!(message, "120: the unit is missing: `120mA` is the word 0x0078");
     // The message never proposes a value that is outside the limits, or a word that the user did not type.
     let narrow = Signal { min: Some(-60.0), max: Some(60.0), ..angle.clone() };
     let message = |text: &str| word(&narrow, text).unwrap_err().to_string();

@@ -32,7 +32,7 @@ pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result
     let records: Box<dyn Iterator<Item = Result<Record, Failure>>> = if stdin {
         Box::new(received(&stop)?)
     } else {
-        let mut recording = Recording::read(&args.file).map_err(unreadable)?;
+        let mut recording = Recording::read(&args.file).map_err(|e| unreadable(e, Some(&args.file)))?;
         report_broken_off(&recording, &args.file, out);
         one_bus(&mut recording, &args.file, args.interface.as_deref())?;
         if let Some((number, back)) = recording.second_start() {
@@ -165,7 +165,7 @@ pub(super) fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure
     match CandumpReader::new(full.as_bytes()).next()? {
         Ok(record) if bare => Some(Ok(Record { channel: String::new(), ..record })),
         Ok(record) => Some(Ok(record)),
-        Err(e) if is_view(&e) => Some(Err(unreadable(e))),
+        Err(e) if is_view(&e) => Some(Err(unreadable(e, None))),
         Err(e) => Some(Err(Failure::usage(format!("line {number}: \"{line}\": {e}"))
             .next("give a candump log, or one frame in each line: 141#2100011934126E38"))),
     }

@@ -164,7 +164,7 @@ pub(super) fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result
             args.speed
         )));
     }
-    let mut recording = Recording::read(&args.file).map_err(unreadable)?;
+    let mut recording = Recording::read(&args.file).map_err(|e| unreadable(e, Some(&args.file)))?;
     report_broken_off(&recording, &args.file, out);
     one_bus(&mut recording, &args.file, args.interface.as_deref())?;
     if let Some((number, back)) = recording.second_start() {
@@ -225,10 +225,13 @@ pub(super) fn is_view(error: &RecordingError) -> bool {
     matches!(error, RecordingError::Line { problem: RecordProblem::View, .. })
 }
 
-/// Returns the failure for a file that is not a recording.
-pub(super) fn unreadable(error: RecordingError) -> Failure {
+/// Returns the failure for a file that is not a recording. Without `file`, the input is stdin.
+pub(super) fn unreadable(error: RecordingError, file: Option<&Path>) -> Failure {
     let is_view = is_view(&error);
-    Failure::usage(error).next(if is_view {
+    let text = error.to_string();
+    // Some errors already contain the file name.
+    let file = file.map(|file| file.display().to_string()).filter(|file| !text.contains(file));
+    Failure::usage(file.map_or_else(|| text.clone(), |file| format!("{file}: {text}"))).next(if is_view {
         "record again with `ucom record` or `candump -L`"
     } else {
         "valid formats are candump -L, FZI-CAN 1.2 and MCAP"

@@ -32,7 +32,7 @@ pub(super) fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(),
     let wire = frames.iter().map(wire).collect::<Result<Vec<_>, _>>()?;
     let mut bus = link.open()?;
     for frame in &wire {
-        bus.carries(frame)?;
+        bus.carries(frame).map_err(Failure::nothing_sent)?;
     }
     for frame in &wire {
         bus.send_wire(frame)?;

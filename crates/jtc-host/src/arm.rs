@@ -8,6 +8,7 @@ mod device;
 mod export;
 mod gains;
 mod image;
+mod lacking;
 mod parameters;
 mod poses;
 mod propose;
@@ -35,6 +36,7 @@ pub use device::{Difference, NOT_CARRIED};
 pub(crate) use export::frame_name;
 pub use gains::RotorMargin;
 pub use image::ImageError;
+pub use lacking::Lacking;
 pub use parameters::{Beyond, ParameterError, ParameterSet};
 pub use poses::{PoseError, Poses, is_pose_name, remove_pose, save_pose};
 pub use propose::{RULES, Rule};
@@ -42,7 +44,7 @@ pub use source::{Key, Source, Sources};
 pub use values::ArmValue;
 pub use warning::{Change, Warning};
 
-use crate::file::{FileError, Place, read_text};
+use crate::file::{FileError, Place, read_xml_or_text};
 
 #[cfg(not(feature = "urdf"))]
 mod urdf {
@@ -109,6 +111,8 @@ pub struct Arm {
     pub warnings: Vec<Warning>,
     /// Source of each number: the arm file, a proposal or a default.
     pub sources: Sources,
+    /// Values that the arm needs and does not have. The arm contains 0 in their place.
+    pub lacking: Vec<Lacking>,
 }
 
 impl Arm {
@@ -124,7 +128,7 @@ impl Arm {
     /// Returns an error with the position in the file if the file cannot be read, or if its format is unknown. Also returns an error if the
     /// arm is physically impossible or its drives cannot move it.
     pub fn load(path: &Path) -> Result<Self, FileError> {
-        let text = read_text(path)?;
+        let text = read_xml_or_text(path)?;
         Self::parse(&text).map_err(|e| e.in_file(path))
     }
 
@@ -159,14 +163,15 @@ impl Arm {
     }
 
     /// Imports an arm from a URDF file. `choice` selects the joints of the arm. For numbers that are missing in the
-    /// file, the [`RULES`] propose values. The arm contains a mark for each proposed value.
+    /// file, the [`RULES`] propose values. The arm contains a mark for each proposed value. No rule can propose masses
+    /// and inertias: [`Arm::lacking`] lists them, and the arm has no proposals that depend on them.
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be read, is not a valid URDF, or does not determine the six joints. Also
-    /// returns an error if the arm is physically impossible or its drives cannot move it.
+    /// returns an error if a value of the arm is physically impossible or its drives cannot move it.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
-        let text = read_text(path)?;
+        let text = read_xml_or_text(path)?;
         Self::import_text(&text, choice).map_err(|e| e.in_file(path))
     }
 
@@ -180,7 +185,8 @@ impl Arm {
             return Err(FileError::form("is not a robot description: a URDF is XML and begins with <"));
         }
         let Described { arm, gravity, friction } = urdf::read(text, choice)?;
-        let mut arm = arm.checked()?;
+        let mut arm = arm;
+        arm.is_importable()?;
         arm.propose(gravity, &friction);
         Ok(arm)
     }
@@ -191,14 +197,15 @@ impl Arm {
     ///
     /// Returns an error with the position in the file if the file cannot be read or its format is unknown.
     pub fn load_unchecked(path: &Path) -> Result<Self, FileError> {
-        let text = read_text(path)?;
-        let arm = if is_xml(&text) { Self::from_urdf(&text) } else { toml_form::read(&text) };
+        let text = read_xml_or_text(path)?;
+        let arm = if is_xml(&text) { Self::from_urdf(&text) } else { toml_form::read_incomplete(&text) };
         arm.map_err(|e| e.in_file(path))
     }
 
     /// Returns the arm, or an error if the arm is physically impossible or its drives cannot move it.
     fn checked(self) -> Result<Self, FileError> {
         self.is_physical()?;
+        self.is_complete()?;
         Ok(self)
     }
 
@@ -209,7 +216,11 @@ impl Arm {
     /// Returns an error with the first invalid number of the model or of the limits.
     pub fn is_physical(&self) -> Result<(), FileError> {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
-        // J-35, J-43: rejects joint limits that the drives do not support.
+        self.limits_are_valid()
+    }
+
+    /// Checks that the drives support the limits of the joints (J-35, J-43).
+    fn limits_are_valid(&self) -> Result<(), FileError> {
         self.config().check().map_err(|e| {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
@@ -280,6 +291,7 @@ impl Arm {
             poses: Poses::new(),
             warnings: Vec::new(),
             sources: Sources::default(),
+            lacking: Vec::new(),
         }
     }
 }

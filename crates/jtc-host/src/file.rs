@@ -68,6 +68,18 @@ pub enum FileError {
         /// Text that describes the joints of the robot description.
         problem: String,
     },
+    /// The file describes a robot in a format from which another program can make a URDF.
+    #[error("{}{place}: {element}: the file is {}, not URDF", path.display(), form.name())]
+    Foreign {
+        /// Path of the file.
+        path: PathBuf,
+        /// Line of the element from which the format was recognised.
+        place: Place,
+        /// Element from which the format was recognised.
+        element: String,
+        /// Format of the file.
+        form: Foreign,
+    },
     /// The file is not in one of the known formats.
     #[error("{}: {problem}", path.display())]
     Form {
@@ -76,6 +88,46 @@ pub enum FileError {
         /// Text that describes the content of the file and the known formats.
         problem: String,
     },
+}
+
+/// Format of a robot description that is not URDF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Foreign {
+    /// URDF with macros, which the program xacro replaces.
+    Xacro,
+    /// Robot description of the simulator MuJoCo.
+    Mjcf,
+    /// Robot description of the simulator Gazebo.
+    Sdf,
+}
+
+impl Foreign {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Xacro => "xacro",
+            Self::Mjcf => "MJCF (MuJoCo)",
+            Self::Sdf => "SDF (Gazebo)",
+        }
+    }
+
+    /// Returns the command that makes a URDF from `file`.
+    fn next(self, file: &str) -> String {
+        match self {
+            Self::Xacro => format!(
+                "expand the macros, then import the result: `xacro {file} > arm.urdf` (package xacro of ROS, or `pip install xacrodoc`, then \
+                 `xacrodoc {file} -o arm.urdf`)"
+            ),
+            Self::Mjcf => format!(
+                "import the URDF of the manufacturer, or convert the file: `pip install mjcf-urdf-simple-converter`, then `python3 -c 'from \
+                 mjcf_urdf_simple_converter import convert; convert(\"{file}\", \"arm.urdf\")'`; MJCF has no torque or velocity limits in the \
+                 form of a URDF, so add them"
+            ),
+            Self::Sdf => format!(
+                "import the URDF from which the file was made, or convert the file: `rosrun pysdf sdf2urdf.py {file} arm.urdf`"
+            ),
+        }
+    }
 }
 
 /// Position in a file: line, column and name.
@@ -142,6 +194,7 @@ impl Diagnose for FileError {
                  example"
                     .into()
             }
+            FileError::Foreign { path, form, .. } => form.next(&path.display().to_string()),
             FileError::At { .. } | FileError::Form { .. } => {
                 "`jtc help files` shows the forms of files, `jtc example` writes one of each".into()
             }
@@ -159,6 +212,7 @@ impl FileError {
         | FileError::Joints { path, .. }
         | FileError::Choice { path, .. }
         | FileError::FewJoints { path, .. }
+        | FileError::Foreign { path, .. }
         | FileError::Form { path, .. }) = &mut self;
         *path = file.to_owned();
         self
@@ -166,6 +220,11 @@ impl FileError {
 
     pub(crate) fn at(place: Place, problem: impl Into<String>) -> Self {
         FileError::At { path: PathBuf::new(), place, problem: problem.into() }
+    }
+
+    #[cfg(feature = "urdf")]
+    pub(crate) fn few_joints(problem: impl Into<String>) -> Self {
+        FileError::FewJoints { path: PathBuf::new(), problem: problem.into() }
     }
 
     #[cfg(feature = "urdf")]
@@ -180,14 +239,50 @@ impl FileError {
 
 /// Reads the whole text of a file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
+    utf8(read_bytes(path)?, path)
+}
+
+fn utf8(bytes: Vec<u8>, path: &Path) -> Result<String, FileError> {
+    String::from_utf8(bytes)
+        .map_err(|_| FileError::form("not a text file (its bytes are not valid UTF-8)").in_file(path))
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     let io = |source| FileError::Io { path: path.to_owned(), source };
     let bytes = std::fs::metadata(path).map_err(io)?.len();
     if bytes > FILE_MAX {
         return Err(FileError::TooLarge { path: path.to_owned(), bytes });
     }
-    let bytes = std::fs::read(path).map_err(io)?;
-    String::from_utf8(bytes)
-        .map_err(|_| FileError::form("not a text file (its bytes are not valid UTF-8)").in_file(path))
+    std::fs::read(path).map_err(io)
+}
+
+/// Reads the whole text of a file that may be XML. An XML file may have another encoding than UTF-8: the encoding of
+/// its byte order mark, or the encoding in its first line. Bytes that are not valid in this encoding are replaced,
+/// because most of them are in comments.
+pub(crate) fn read_xml_or_text(path: &Path) -> Result<String, FileError> {
+    let bytes = read_bytes(path)?;
+    let marked = encoding_rs::Encoding::for_bom(&bytes).map(|(encoding, _)| encoding);
+    let encoding = match &bytes[..] {
+        _ if marked.is_some() => marked,
+        [b'<', 0, ..] => Some(encoding_rs::UTF_16LE),
+        [0, b'<', ..] => Some(encoding_rs::UTF_16BE),
+        _ if bytes.trim_ascii_start().starts_with(b"<") => Some(declared(&bytes)),
+        _ => None,
+    };
+    match encoding {
+        None => utf8(bytes, path),
+        Some(encoding) => Ok(encoding.decode(&bytes).0.into_owned()),
+    }
+}
+
+/// Returns the encoding that the first line of an XML file declares, or UTF-8.
+fn declared(bytes: &[u8]) -> &'static encoding_rs::Encoding {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]);
+    let declaration = head.split("?>").next().filter(|head| head.trim_start().starts_with("<?xml"));
+    let label = declaration.and_then(|text| text.split("encoding").nth(1)?.split(['"', '\'']).nth(1));
+    let known = label.and_then(|label| encoding_rs::Encoding::for_label(label.as_bytes()));
+    // A file in UTF-16 without a byte order mark begins with `<` and 0, so this file is not in UTF-16.
+    known.filter(|encoding| encoding.is_ascii_compatible()).unwrap_or(encoding_rs::UTF_8)
 }
 
 /// Parses a number in the notations that occur in these files (`20.`, `-9.e-6`, ` 1`). The function rejects NaN and infinity.

@@ -1,6 +1,7 @@
 //! Check of an arm. The check lists all values that are physically impossible, missing, or outside the range that the
 //! controller accepts. The check also lists the joints whose drives cannot hold the weight of the arm.
 
+mod bodies;
 mod borne;
 mod limits;
 mod moving;
@@ -15,12 +16,12 @@ use serde::Serialize;
 
 pub use self::stability::RotorMargins;
 use super::source::JOINT_KEYS;
-use super::{Arm, PoseError, Source};
+use super::{Arm, Lacking, PoseError, Source};
 
 /// Finding from the check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmFinding {
-    /// Subject of the finding: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
+    /// Subject of the finding: `limit`, `physical`, `body`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
     /// `unit`, `pose` or `proposed`.
     pub code: &'static str,
     /// Severity, description, cause and advice. The controller refuses an arm with a finding of the severity `Problem`.
@@ -106,7 +107,8 @@ impl Arm {
         self.find_limits(&mut findings);
         self.find_model(&mut findings);
         let faulty: Vec<Joint> = findings.iter().filter_map(|f: &ArmFinding| f.joint).collect();
-        let sound = findings.iter().all(|f| f.finding.severity != Severity::Problem);
+        let sound =
+            self.lacking.is_empty() && findings.iter().all(|f| f.finding.severity != Severity::Problem);
         self.find_settings(&faulty, &mut findings);
         self.find_drives(&faulty, &mut findings);
         self.find_bounds(&faulty, &mut findings);
@@ -142,22 +144,32 @@ impl Arm {
     }
 
     fn find_model(&self, findings: &mut Vec<ArmFinding>) {
-        // The check of a model ends at the first fault. To find the faults of all joints and links, each of them is
-        // checked alone, in a model in which everything else is valid.
-        let good = Arm::avena().model;
-        for index in 0..=JOINTS {
-            let mut joint = ArmModel { links: good.links, ..good };
-            joint.joints[index] = self.model.joints[index];
-            let mut link = ArmModel { joints: good.joints, ..good };
-            link.links[index] = self.model.links[index];
-            let errors = [joint.check(), link.check()].into_iter().filter_map(Result::err);
-            findings.extend(errors.map(|error| self.unphysical(&error)));
-        }
-        if !findings.iter().any(|f| f.code == "physical") {
+        let lacking = |error: &ModelError| match error {
+            ModelError::MassZero { link } => self.lacking.contains(&Lacking::Mass(*link)),
+            _ => false,
+        };
+        let errors = self.model_errors().into_iter().filter(|error| !lacking(error));
+        findings.extend(errors.map(|error| self.unphysical(&error)));
+        self.find_bodies(findings);
+        if self.lacking.is_empty() && !findings.iter().any(|f| ["physical", "body"].contains(&f.code)) {
             let mass: f64 = self.model.links[1..].iter().map(|l: &Link| l.mass).sum();
             let what = format!("masses and inertias are physically consistent; {mass:.3} kg move");
             findings.push(ArmFinding::new(Severity::Good, "physical", what));
         }
+    }
+
+    /// Returns the faults of all joint origins and links. The check of a model ends at the first fault, so each joint
+    /// and each link is checked alone, in a model in which everything else is valid.
+    pub(super) fn model_errors(&self) -> Vec<ModelError> {
+        let good = Arm::avena().model;
+        let of = |index: usize| {
+            let mut joint = ArmModel { links: good.links, ..good };
+            joint.joints[index] = self.model.joints[index];
+            let mut link = ArmModel { joints: good.joints, ..good };
+            link.links[index] = self.model.links[index];
+            [joint.check(), link.check()]
+        };
+        (0..=JOINTS).flat_map(of).filter_map(Result::err).collect()
     }
 
     fn unphysical(&self, error: &ModelError) -> ArmFinding {
@@ -173,10 +185,7 @@ impl Arm {
             ModelError::NotFinite { value, .. } => ("a typing error", value, None),
             _ => ("a typing error", f64::NAN, None),
         };
-        // The error text begins with the number of the joint or link. The finding replaces this number with the name
-        // of the joint or link.
-        let text = error.to_string();
-        let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
+        let problem = without_number(error);
         let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
         let found = ArmFinding::new(Severity::Problem, "physical", what).because(why);
         let joint = error.is_of_joint().then(|| Joint::from_index(error.index())).flatten();
@@ -290,7 +299,32 @@ impl Arm {
         }
     }
 
+    /// Finds values that the arm needs and does not have. Each finding lists all joints or links without the value.
+    fn find_lacking(&self, findings: &mut Vec<ArmFinding>) {
+        for (key, owners) in self.lacking_by_key() {
+            let mut found = ArmFinding::new(
+                Severity::Problem,
+                "missing",
+                format!("{key}: missing for {}", together(&owners)),
+            );
+            found.name = Some(key);
+            let (why, next) = match key {
+                "mass_kg" | "inertia_kg_m2" => (
+                    "no rule can propose masses and inertias",
+                    "take them from the data sheet or the CAD program, add them to <inertial> of these links in the robot description, and run jtc arm \
+                     import again, which then proposes gains and limits; or enter them in this file",
+                ),
+                _ => (
+                    "the rule for this value needs the masses of the links",
+                    "add the masses and run jtc arm import again, or enter the value in this file",
+                ),
+            };
+            findings.push(found.because(why).next(next));
+        }
+    }
+
     fn find_missing(&self, findings: &mut Vec<ArmFinding>) {
+        self.find_lacking(findings);
         for part in self.parameter_set().missing() {
             findings.push(
                 ArmFinding::new(Severity::Problem, "missing", format!("{part}: not in the file"))
@@ -368,6 +402,25 @@ impl Arm {
             let what = format!("{name}: proposed for {joints}; not measured and not looked up");
             ArmFinding::new(Severity::Warning, "proposed", what).next(next)
         });
+    }
+}
+
+/// Returns the text of a model error without the number of the joint or link at its beginning. The caller writes the
+/// name of the joint or link instead.
+pub(super) fn without_number(error: &ModelError) -> String {
+    let text = error.to_string();
+    text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem).to_owned()
+}
+
+/// Joins names such as `link a` and `link b` to `links a, b`.
+fn together(owners: &[String]) -> String {
+    let names: Vec<&str> = owners.iter().map(|o| o.split_once(' ').map_or("", |(_, name)| name)).collect();
+    match owners {
+        [one] => one.clone(),
+        [first, ..] => {
+            format!("{}s {}", first.split_once(' ').map_or("", |(kind, _)| kind), names.join(", "))
+        }
+        [] => String::new(),
     }
 }
 

@@ -8,7 +8,7 @@ use jtc_wire::Joint;
 
 use super::csv::{self, Table};
 use super::{Arm, Change, ParameterSet, Warning, is_xml};
-use crate::file::{FileError, read_text};
+use crate::file::{FileError, read_xml_or_text};
 
 /// Choice between the friction table and the friction polynomial, for files that contain both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -104,7 +104,7 @@ impl ParameterFile {
     }
 
     fn file(&mut self, path: &Path, joints: &mut JointTables) -> Result<(), FileError> {
-        let text = read_text(path)?;
+        let text = read_xml_or_text(path)?;
         if is_arm(&text) {
             let arm = Arm::parse(&text).map_err(|e| e.in_file(path))?;
             self.take_arm(path, arm);

@@ -51,6 +51,7 @@ impl Arm {
     /// Returns `true` if the arm has its own value for a setting. A URDF file cannot contain gravity and rotor inertia.
     pub(super) fn gives(&self, setting: &Setting, joint: Option<Joint>) -> bool {
         match setting.name {
+            name if joint.is_some_and(|joint| self.lacks(joint, name)) => false,
             "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
             name if name.starts_with("gravity_") => self.gravity.is_some(),
             _ => true,

@@ -8,7 +8,7 @@ use jtc_dynamics::Origin;
 use jtc_wire::Joint;
 
 use super::toml_form::FORMAT;
-use super::{Arm, RULES, Rule};
+use super::{Arm, Lacking, RULES, Rule};
 
 fn list(values: &[f64]) -> String {
     // `{:?}` keeps the decimal point, because a TOML parser would read a number without a decimal point as an integer.
@@ -89,19 +89,24 @@ impl Arm {
             self.write_marks(&mut out, Joint::from_index(i));
         }
         for (i, link) in self.model.links.iter().enumerate() {
-            let _ = writeln!(
-                out,
-                "\n[[link]]\nname = {}\nmass_kg = {:?}",
-                quoted(&self.link_names[i]),
-                link.mass
-            );
+            let _ = writeln!(out, "\n[[link]]\nname = {}", quoted(&self.link_names[i]));
+            if self.lacking.contains(&Lacking::Mass(i)) {
+                out += "# mass_kg is missing: enter the mass of this link\n";
+            } else {
+                let _ = writeln!(out, "mass_kg = {:?}", link.mass);
+            }
             let _ = writeln!(
                 out,
                 "com_xyz_m = {}\ncom_rpy_rad = {}",
                 list(&link.origin.xyz),
                 list(&link.origin.rpy)
             );
-            let _ = writeln!(out, "inertia_kg_m2 = {} # ixx, ixy, ixz, iyy, iyz, izz", list(&link.inertia));
+            if self.lacking.contains(&Lacking::Inertia(i)) {
+                out += "# inertia_kg_m2 is missing: enter [ixx, ixy, ixz, iyy, iyz, izz] about the centre of mass\n";
+            } else {
+                let _ =
+                    writeln!(out, "inertia_kg_m2 = {} # ixx, ixy, ixz, iyy, iyz, izz", list(&link.inertia));
+            }
         }
         if !self.others.is_empty() {
             out += "\n[settings]\n";

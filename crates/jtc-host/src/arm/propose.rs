@@ -12,7 +12,7 @@ use super::gains::{PROPOSED_RANGE, all_stable, is_heavy_enough, is_light_enough,
 use super::source::JOINT_KEYS;
 use super::statics::{Inertia, Ranges, inertia, worst_gravity};
 use super::toml_form::TEACH_DAMPING_DEFAULT;
-use super::{Arm, Change, Source, Warning};
+use super::{Arm, Change, Lacking, Source, Warning};
 
 /// Rule that proposes a value for one key.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -66,6 +66,8 @@ pub const RULES: [Rule; 11] = [
     },
 ];
 
+/// Keys of a joint for which the rules compute a value from the masses of the links.
+const NEED_MASSES: [&str; 3] = ["torque_max_nm", "acceleration_max_rad_s2", "teach_damping_nm_s_rad"];
 /// Upper limit of the proposed damping in Teaching, divided by the least inertia of the joint, 1/s (J-25). The
 /// damping reduces a speed at this rate.
 const TEACH_DAMPING_RATE: f64 = 100.0;
@@ -130,6 +132,42 @@ impl Arm {
             self.sources.propose((None, "gravity_m_s2"));
         }
         self.others.push(SettingValue { setting: TOOL_SPEED, joint: 0, value: TOOL_SPEED_MAX });
+        if self.has_masses() {
+            self.propose_from_masses(gravity);
+        } else {
+            self.leave_out_what_needs_masses();
+        }
+        if self.friction().is_none() {
+            self.propose_friction(friction);
+        }
+        for joint in Joint::ALL {
+            for key in JOINT_KEYS {
+                let open = self.sources.of((Some(joint), key)) == Source::Default;
+                if open && !self.lacks(joint, key) {
+                    self.sources.propose((Some(joint), key));
+                }
+            }
+        }
+    }
+
+    /// Records that the arm lacks the values that the rules compute from the masses. If the user adds the masses to
+    /// the description and imports it again, the rules propose these values.
+    fn leave_out_what_needs_masses(&mut self) {
+        for joint in Joint::ALL {
+            for key in NEED_MASSES {
+                if self.sources.of((Some(joint), key)) == Source::Default {
+                    self.lacking.push(Lacking::OfJoint(joint, key));
+                }
+            }
+            let to = &mut self.joints[joint.index()];
+            if self.sources.of((Some(joint), "torque_max_nm")) == Source::Default {
+                to.torque_max = 0.0;
+            }
+        }
+    }
+
+    /// Proposes the values that depend on the masses of the links.
+    fn propose_from_masses(&mut self, gravity: [f64; 3]) {
         let ranges = self.ranges();
         let worst = worst_gravity(&self.model, gravity, &ranges).map(|w| w.torque);
         self.propose_torques(&worst, &ranges);
@@ -162,16 +200,6 @@ impl Arm {
                 let lag = ERROR_PART * to.position_error_max * kp / unknown;
                 let most = left.min(lag).clamp(LEAST_ACCELERATION, ACCELERATION_SCALE);
                 to.acceleration_max = rounded(most, 3);
-            }
-        }
-        if self.friction().is_none() {
-            self.propose_friction(friction);
-        }
-        for joint in Joint::ALL {
-            for key in JOINT_KEYS {
-                if self.sources.of((Some(joint), key)) == Source::Default {
-                    self.sources.propose((Some(joint), key));
-                }
             }
         }
     }

@@ -18,7 +18,7 @@ pub(super) use joint::{
 
 use super::parameters::check_table;
 use super::source::{ARM_KEYS, JOINT_KEYS};
-use super::{Arm, Change, Source, Sources, Warning};
+use super::{Arm, Change, Lacking, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
 
 /// Format number of the arm files that this program reads. The program reads older files without a format number in the same way.
@@ -54,13 +54,13 @@ struct ArmForm {
 struct LinkForm {
     #[serde(default)]
     name: String,
-    mass_kg: f64,
+    mass_kg: Option<f64>,
     #[serde(deserialize_with = "exactly")]
     com_xyz_m: [f64; 3],
     #[serde(deserialize_with = "exactly")]
     com_rpy_rad: [f64; 3],
-    #[serde(deserialize_with = "exactly")]
-    inertia_kg_m2: [f64; 6],
+    #[serde(default, deserialize_with = "exactly_or_none")]
+    inertia_kg_m2: Option<[f64; 6]>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -89,8 +89,16 @@ impl Arm {
     }
 }
 
-/// Reads an arm from the text of a TOML file without a check of the numbers.
+/// Reads an arm from the text of a TOML file without a check of the numbers. Returns an error if a number is missing
+/// that has no default.
 pub(super) fn read(text: &str) -> Result<Arm, FileError> {
+    let arm = read_incomplete(text)?;
+    arm.is_complete()?;
+    Ok(arm)
+}
+
+/// Like [`read`], but accepts a file without some numbers. [`Arm::lacking`] lists the missing numbers.
+pub(super) fn read_incomplete(text: &str) -> Result<Arm, FileError> {
     let wrong = |e: toml::de::Error| {
         let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
         FileError::at(Place { line, ..Place::default() }, e.message().to_owned())
@@ -140,10 +148,15 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         teach_damping: 0.0,
     }; JOINTS];
     let mut sources = Sources::default();
+    let mut lacking = Vec::new();
     mark(&mut sources, None, &form.proposed)?;
     for (number, (limit, joint)) in Joint::ALL.into_iter().zip(limits.iter_mut().zip(joints)) {
-        *limit = joint.limits(number, &mut warnings, &mut sources)?;
+        *limit = joint.limits(number, &mut warnings, &mut sources, &mut lacking);
         mark(&mut sources, Some((number, joint)), &joint.proposed)?;
+    }
+    for (i, link) in form.link.iter().enumerate() {
+        lacking.extend(link.mass_kg.is_none().then_some(Lacking::Mass(i)));
+        lacking.extend(link.inertia_kg_m2.is_none().then_some(Lacking::Inertia(i)));
     }
     let proposed = sources.proposed().count();
     if proposed > 0 {
@@ -176,6 +189,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         others: others(&form.settings)?,
         warnings,
         sources,
+        lacking,
     })
 }
 
@@ -274,8 +288,8 @@ impl LinkForm {
     fn link(&self) -> Link {
         Link {
             origin: Origin { xyz: self.com_xyz_m, rpy: self.com_rpy_rad },
-            inertia: self.inertia_kg_m2,
-            mass: self.mass_kg,
+            inertia: self.inertia_kg_m2.unwrap_or_default(),
+            mass: self.mass_kg.unwrap_or_default(),
         }
     }
 }

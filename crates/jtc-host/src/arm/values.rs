@@ -6,7 +6,7 @@ use jtc_wire::Joint;
 use serde::Serialize;
 
 use super::toml_form::{ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, VELOCITY_DEFAULT};
-use super::{Arm, Source};
+use super::{Arm, Lacking, Source};
 
 /// Number of an arm, with its unit, range, default and source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -147,6 +147,10 @@ impl Arm {
             let mut add = |v: ArmValue| all.push(ArmValue { joint: Some(joint), ..v });
             for row in settings::TABLE.iter().filter(|row| row.of_joint() && row.of_arm()) {
                 let given = self.gives(row, Some(joint));
+                if self.lacks(joint, row.name) {
+                    add(value(setting(row, &drives), None, Source::Missing));
+                    continue;
+                }
                 let from = if given { self.sources.of((Some(joint), row.name)) } else { Source::Default };
                 add(value(setting(row, &drives), row.get(&config, joint.number()), from));
             }
@@ -169,10 +173,18 @@ impl Arm {
         let bounds = drives.parameter_bounds;
         for (i, link) in self.model.links.iter().enumerate() {
             let mass = kind("mass_kg", "kg", Some(0.0), Some(bounds.link_mass_max));
-            all.push(ArmValue { link: Some(i), ..value(mass, Some(link.mass), Source::File) });
+            let (known, from) = match self.lacking.contains(&Lacking::Mass(i)) {
+                true => (None, Source::Missing),
+                false => (Some(link.mass), Source::File),
+            };
+            all.push(ArmValue { link: Some(i), ..value(mass, known, from) });
             all.extend(listed(&COM, "m", &link.origin.xyz, i, None));
             all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
-            all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
+            let inertia = listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max));
+            all.extend(inertia.into_iter().map(|v| match self.lacking.contains(&Lacking::Inertia(i)) {
+                true => ArmValue { value: None, from: Source::Missing, ..v },
+                false => v,
+            }));
         }
         // The list already contains gravity, so gravity is left out of the controller settings here.
         let of_controller =

@@ -21,6 +21,10 @@ pub enum Change {
     LimitCut,
     /// A limit is missing or unusable, so another value is used.
     LimitAssumed,
+    /// A value that no rule can propose is missing.
+    Missing,
+    /// A body is physically impossible by a small amount. The check of the arm file refuses it.
+    Impossible,
     /// A number of the robot description is not imported.
     NotCarried,
     /// A value of the robot description is doubtful, so it is used only as a starting value.
@@ -44,6 +48,10 @@ impl Change {
             Self::LeftOut => "left out: joints other than the six, held at 0",
             Self::LimitCut => "cut: limits beyond those of the drives",
             Self::LimitAssumed => "missing: limits that are absent or not usable",
+            Self::Missing => {
+                "missing: values that no rule can propose; a controller refuses this arm without them"
+            }
+            Self::Impossible => "impossible: inertias of no physical body; a controller refuses this arm",
             Self::NotCarried => "not imported",
             Self::Doubtful => "starting values only",
             Self::Proposed => "proposed",

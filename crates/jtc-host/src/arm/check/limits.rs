@@ -15,7 +15,7 @@ pub(in crate::arm) struct LimitFault {
 impl Arm {
     /// Returns the invalid limits of all joints.
     pub(in crate::arm) fn limit_faults(&self) -> Vec<(Joint, LimitFault)> {
-        let mut all = Vec::new();
+        let mut all: Vec<(Joint, LimitFault)> = Vec::new();
         for (joint, limits) in Joint::ALL.into_iter().zip(&self.joints) {
             let mut fault = |key, value, problem| all.push((joint, LimitFault { key, value, problem }));
             for (key, v) in [
@@ -48,6 +48,7 @@ impl Arm {
                 }
             }
         }
+        all.retain(|(joint, fault)| !self.lacks(*joint, fault.key));
         all
     }
 }

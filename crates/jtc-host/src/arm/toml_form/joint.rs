@@ -5,7 +5,7 @@ use jtc_wire::Joint;
 use serde::{Deserialize, Serialize};
 
 use super::exactly;
-use crate::arm::{Change, Sources, Warning};
+use crate::arm::{Change, Lacking, Sources, Warning};
 use crate::file::{FileError, Place};
 
 /// Velocity limit that is used if a file does not contain one, rad/s. The next two constants are the default acceleration limit, rad/s²,
@@ -67,10 +67,16 @@ impl JointForm {
         number: Joint,
         warnings: &mut Vec<Warning>,
         sources: &mut Sources,
-    ) -> Result<JointConfig, FileError> {
-        let need = |key: &str, v: Option<f64>| {
-            v.ok_or_else(|| FileError::at(Place::name(format!("joint {}, {key}", self.name)), "missing"))
+        lacking: &mut Vec<Lacking>,
+    ) -> JointConfig {
+        let mut need = |key: &'static str, v: Option<f64>| {
+            v.unwrap_or_else(|| {
+                lacking.push(Lacking::OfJoint(number, key));
+                0.0
+            })
         };
+        let position_min = need("position_min_rad", self.position_min_rad);
+        let position_max = need("position_max_rad", self.position_max_rad);
         for (key, given) in [
             ("torque_gain", self.torque_gain.is_some()),
             ("teach_damping_nm_s_rad", self.teach_damping_nm_s_rad.is_some()),
@@ -79,7 +85,7 @@ impl JointForm {
                 sources.fill_in((Some(number), key));
             }
         }
-        let torque_max = need("torque_max_nm", self.torque_max_nm)?;
+        let torque_max = need("torque_max_nm", self.torque_max_nm);
         let mut or = |key: &'static str, v: Option<f64>, default: f64| {
             v.unwrap_or_else(|| {
                 let problem = format!("{key} not given: {default} is used");
@@ -88,9 +94,9 @@ impl JointForm {
                 default
             })
         };
-        Ok(JointConfig {
-            position_min: need("position_min_rad", self.position_min_rad)?,
-            position_max: need("position_max_rad", self.position_max_rad)?,
+        JointConfig {
+            position_min,
+            position_max,
             velocity_max: or("velocity_max_rad_s", self.velocity_max_rad_s, VELOCITY_DEFAULT),
             acceleration_max: or(
                 "acceleration_max_rad_s2",
@@ -106,7 +112,7 @@ impl JointForm {
             rotor_inertia: self.rotor_inertia_kg_m2.unwrap_or(0.0),
             torque_gain: self.torque_gain.unwrap_or(1.0),
             teach_damping: self.teach_damping_nm_s_rad.unwrap_or(TEACH_DAMPING_DEFAULT * torque_max),
-        })
+        }
     }
 
     pub(super) fn polynomial(&self) -> Result<Option<[f64; 6]>, FileError> {

@@ -4,11 +4,10 @@
 //! importer treats a held joint as fixed at position 0. Examples of held joints are the finger of a gripper, the wheel of a cart, and the
 //! seventh joint of a redundant arm.
 
-use std::path::PathBuf;
-
 use jtc_core::JOINTS;
-use urdf_rs::{Joint, JointType, Robot};
 
+use super::hints::not_six;
+use super::robot::{Joint, Kind, Robot};
 use crate::arm::ArmChoice;
 use crate::file::{FileError, Place};
 
@@ -21,9 +20,9 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
         (None, None) => moving(robot, robot.joints.iter().collect()),
     };
     let six = <[&Joint; JOINTS]>::try_from(candidates.as_slice()).ok();
-    let six = six.filter(|six| six.iter().all(|j| rotary(j)) && first_branch(robot, six).is_none());
+    let six = six.filter(|six| six.iter().all(|j| j.kind.is_rotary()) && first_branch(robot, six).is_none());
     let Some(six) = six else { return Err(not_six(robot, &candidates, choice)) };
-    if let Some(joint) = six.iter().find(|j| j.mimic.is_some()) {
+    if let Some(joint) = six.iter().find(|j| j.is_mimic()) {
         return Err(unfit_joint(
             joint,
             "follows another joint (mimic), so it cannot be one of the six driven joints",
@@ -44,7 +43,7 @@ pub(super) fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
 }
 
 /// Returns an error about the joints or links that the user selected.
-fn unfit(problem: impl Into<String>) -> FileError {
+pub(super) fn unfit(problem: impl Into<String>) -> FileError {
     FileError::choice(Place::default(), problem)
 }
 
@@ -52,17 +51,9 @@ fn unfit_joint(joint: &Joint, problem: impl Into<String>) -> FileError {
     FileError::choice(Place::name(format!("joint {}", joint.name)), problem)
 }
 
-fn rotary(joint: &Joint) -> bool {
-    matches!(joint.joint_type, JointType::Revolute | JointType::Continuous)
-}
-
-fn above<'a>(robot: &'a Robot, link: &str) -> Option<&'a Joint> {
-    robot.joints.iter().find(|j| j.child.link == link)
-}
-
 /// Returns the joints between `link` and the root, beginning at `link`. The description must not contain loops.
-fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint> {
-    std::iter::successors(above(robot, link), |j| above(robot, &j.parent.link))
+pub(super) fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint> {
+    std::iter::successors(robot.above(link), |j| robot.above(&j.parent))
 }
 
 /// Checks that the description does not contain a loop. Without loops, each chain of parent links ends at a root.
@@ -70,7 +61,7 @@ fn no_loops(robot: &Robot) -> Result<(), FileError> {
     for joint in &robot.joints {
         let mut at = joint;
         for depth in 0.. {
-            let Some(parent) = above(robot, &at.parent.link) else { break };
+            let Some(parent) = robot.above(&at.parent) else { break };
             at = parent;
             if depth > robot.joints.len() {
                 return Err(about(joint, "its chain of parents forms a loop"));
@@ -82,7 +73,7 @@ fn no_loops(robot: &Robot) -> Result<(), FileError> {
 
 /// Returns the joints from the root to `link`, in this order.
 fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError> {
-    if !robot.links.iter().any(|l| l.name == link) {
+    if robot.link(link).is_none() {
         let links: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
         return Err(unfit(format!("link {link} does not exist; the links are {}", links.join(", "))));
     }
@@ -94,22 +85,22 @@ fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError>
 /// Returns the joints that can move independently, beginning at the root. Fixed joints and joints that mimic another joint are not
 /// included.
 fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
-    let driven = |j: &&Joint| j.joint_type != JointType::Fixed && j.mimic.is_none();
+    let driven = |j: &&Joint| j.kind != Kind::Fixed && !j.is_mimic();
     let mut joints: Vec<&Joint> = joints.into_iter().filter(driven).collect();
-    joints.sort_by_key(|j| way_down(robot, &j.parent.link).count());
+    joints.sort_by_cached_key(|j| way_down(robot, &j.parent).count());
     joints
 }
 
 /// Returns the joints with the names that the user has selected.
 fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, FileError> {
     let find = |name: &String| -> Result<&'a Joint, FileError> {
-        let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
+        let joint = robot.joint(name).ok_or_else(|| {
             let others = names(&moving(robot, robot.joints.iter().collect())).join(", ");
             unfit(format!("joint {name} does not exist; the moving joints are {others}"))
         })?;
-        match rotary(joint) {
+        match joint.kind.is_rotary() {
             true => Ok(joint),
-            false => Err(unfit_joint(joint, format!("is {}, not rotary", kind(joint)))),
+            false => Err(unfit_joint(joint, format!("is {}, not rotary", joint.kind.name()))),
         }
     };
     let joints = wanted.iter().map(find).collect::<Result<Vec<_>, _>>()?;
@@ -125,45 +116,10 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
 /// Returns the first joint that does not descend from the previous joint in the list.
 fn first_branch<'a>(robot: &'a Robot, joints: &[&'a Joint]) -> Option<&'a Joint> {
     joints.windows(2).map(|pair| (pair[0], pair[1])).find_map(|(below, joint)| {
-        (!way_down(robot, &joint.parent.link).any(|j| j.name == below.name)).then_some(joint)
+        (!way_down(robot, &joint.parent).any(|j| j.name == below.name)).then_some(joint)
     })
 }
 
-fn names<'a>(joints: &[&'a Joint]) -> Vec<&'a str> {
+pub(super) fn names<'a>(joints: &[&'a Joint]) -> Vec<&'a str> {
     joints.iter().map(|j| j.name.as_str()).collect()
-}
-
-fn kind(joint: &Joint) -> String {
-    format!("{:?}", joint.joint_type).to_lowercase()
-}
-
-/// Returns an error that explains why the joints are not a six-axis arm and names the option that selects the joints.
-fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
-    // The message names the longest chain of rotary joints.
-    let chain_to = |end: &Joint| -> Vec<&Joint> {
-        let way = way_to(robot, &end.child.link).unwrap_or_default();
-        way.into_iter().filter(|j| rotary(j) && candidates.iter().any(|c| c.name == j.name)).collect()
-    };
-    let longest = candidates.iter().map(|end| chain_to(end)).max_by_key(Vec::len).unwrap_or_default();
-    let others: Vec<String> = candidates
-        .iter()
-        .filter(|c| !longest.iter().any(|j| j.name == c.name))
-        .map(|c| format!("{} ({})", c.name, kind(c)))
-        .collect();
-    let mut text = format!(
-        "{} rotary joints form a chain ({}), expected six",
-        longest.len(),
-        names(&longest).join(", ")
-    );
-    if !others.is_empty() {
-        text += &format!("; {} move{} as well", others.join(", "), if others.len() == 1 { "s" } else { "" });
-    }
-    if longest.len() < JOINTS {
-        if choice.tip.is_some() {
-            text += "; check that --tip names the last link of the arm";
-            return unfit(text);
-        }
-        return FileError::FewJoints { path: PathBuf::new(), problem: text };
-    }
-    FileError::Joints { path: PathBuf::new(), problem: text, six: names(&longest[..JOINTS]).join(",") }
 }

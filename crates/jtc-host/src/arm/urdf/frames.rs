@@ -55,6 +55,12 @@ impl Frame {
         Origin { xyz: self.position, rpy }
     }
 
+    /// Returns `origin` if it describes this frame, which keeps its numbers exact, and otherwise the origin of this
+    /// frame.
+    pub(super) fn plain_origin(&self, origin: Origin) -> Origin {
+        if *self == Self::of(&origin) { origin } else { self.origin() }
+    }
+
     pub(super) fn is_identity(&self) -> bool {
         *self == Self::IDENTITY
     }

@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 
 use jtc_core::{Config, JOINTS, JointConfig, WORKING_AREA};
 use jtc_wire::Joint as Number;
-use urdf_rs::{Joint, JointType};
 
 use super::Chain;
 use super::choice::about;
+use super::robot::{Joint, Kind, Limit};
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
@@ -38,8 +38,7 @@ fn fastest() -> f64 {
 /// Rejects position limits that are not a valid range in rad. Invalid limits are not replaced by the whole range of
 /// the drives, because the arm could then hit its end stops. Returns `true` if the joint can turn more than one full
 /// turn in each direction, like some wrists.
-fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
-    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+fn turns_more_than_once(joint: &Joint, (lower, upper): (f64, f64)) -> Result<bool, FileError> {
     if let Some(limit) = [lower, upper].into_iter().find(|limit| limit.is_nan()) {
         return Err(about(
             joint,
@@ -85,13 +84,14 @@ impl Chain<'_> {
         for (number, joint) in Number::ALL.into_iter().zip(self.rotary) {
             let to = &mut all[number.index()];
             to.rotor_inertia = 0.0;
-            self.position(number, joint, to)?;
-            self.dynamic_limits(number, joint, to);
+            let limit = joint.limit()?;
+            self.position(number, joint, &limit, to)?;
+            self.dynamic_limits(number, joint, &limit, to);
             for key in ["position_error_max_rad", "torque_gain", "teach_damping_nm_s_rad"] {
                 self.sources.fill_in((Some(number), key));
             }
             let place = format!("joint {}", joint.name);
-            if joint.safety_controller.is_some() {
+            if joint.has_safety_controller() {
                 self.warn(Change::NotCarried, place, "safety_controller");
             }
         }
@@ -99,17 +99,28 @@ impl Chain<'_> {
         Ok(all)
     }
 
-    fn position(&mut self, number: Number, joint: &Joint, to: &mut JointConfig) -> Result<(), FileError> {
-        let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-        let endless = joint.joint_type == JointType::Continuous;
-        let given = !endless && !self.without_ranges.contains(&joint.name);
-        let ends = if given { (lower, upper) } else { (f64::NEG_INFINITY, f64::INFINITY) };
-        (to.position_min, to.position_max) = ends;
-        if given && turns_more_than_once(joint)? {
-            for key in ["position_min_rad", "position_max_rad"] {
-                self.sources.fill_in((Some(number), key));
+    fn position(
+        &mut self,
+        number: Number,
+        joint: &Joint,
+        limit: &Limit,
+        to: &mut JointConfig,
+    ) -> Result<(), FileError> {
+        const WHOLE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+        let endless = joint.kind == Kind::Continuous;
+        let ends = match limit.range {
+            None => WHOLE,
+            Some(range) if endless => self.credible(joint, range),
+            Some(range) => {
+                if turns_more_than_once(joint, range)? {
+                    for key in ["position_min_rad", "position_max_rad"] {
+                        self.sources.fill_in((Some(number), key));
+                    }
+                }
+                range
             }
-        }
+        };
+        (to.position_min, to.position_max) = ends;
         // If a position limit is missing, the limit of the drives is used, because the description does not contain
         // the end stops of the joint.
         let mut assumed = Vec::new();
@@ -138,8 +149,28 @@ impl Chain<'_> {
         Ok(())
     }
 
-    fn dynamic_limits(&mut self, number: Number, joint: &Joint, to: &mut JointConfig) {
-        let (place, limit) = (format!("joint {}", joint.name), &joint.limit);
+    /// Returns the limits of a continuous joint that the description contains all the same. A limit that is not an
+    /// angle in rad within one turn is not used. The joint has no stops, so the range of the drives is used instead.
+    fn credible(&mut self, joint: &Joint, (lower, upper): (f64, f64)) -> (f64, f64) {
+        let believed = |limit: f64| limit.abs() <= TURN;
+        let ends = (
+            if believed(lower) { lower } else { f64::NEG_INFINITY },
+            if believed(upper) { upper } else { f64::INFINITY },
+        );
+        let range = (ends.0.max(-WORKING_AREA), ends.1.min(WORKING_AREA));
+        let all_believed = [lower, upper].into_iter().all(|limit| limit.is_infinite() || believed(limit));
+        if range.0 < range.1 && all_believed {
+            return ends;
+        }
+        let problem = format!(
+            "position limits {lower}..{upper} of a continuous joint are not a range in rad within one turn: what is beyond is not used"
+        );
+        self.warn(Change::LimitAssumed, format!("joint {}", joint.name), problem);
+        if range.0 < range.1 { ends } else { (f64::NEG_INFINITY, f64::INFINITY) }
+    }
+
+    fn dynamic_limits(&mut self, number: Number, joint: &Joint, limit: &Limit, to: &mut JointConfig) {
+        let place = format!("joint {}", joint.name);
         if is_limit(limit.velocity) && limit.velocity <= BELIEVABLE_SPEED {
             to.velocity_max = limit.velocity;
         } else if is_limit(limit.velocity) {

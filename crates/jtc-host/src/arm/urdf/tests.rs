@@ -440,17 +440,27 @@ fn what_cannot_be_read_is_named_with_its_place() {
     };
     let twice = format!("{LIMIT}{LIMIT}");
     for (from, to, place, problem) in [
-        ("velocity=\"1.2\"", "velocity=\"fast\"", ", line 9, joint a1", "velocity is \"fast\", not a number"),
-        (LIMIT, twice.as_str(), ", line 9, joint a1", "duplicate field `limit`"),
-        ("<mass value=\"1\"/>", "<mass/>", ", line 6, link b1", "missing field `value`"),
+        (
+            "velocity=\"1.2\"",
+            "velocity=\"fast\"",
+            ", line 12, joint a1",
+            "velocity is \"fast\", not a number",
+        ),
+        (LIMIT, twice.as_str(), ", line 13, joint a1", "second element <limit>, the first is in line 12"),
+        ("<mass value=\"1\"/>", "<mass/>", ", line 7, link b1", "<mass> has no attribute value"),
         (
             "<mass value=\"1\"/>",
             "<mass value=\"1\"/><mass value=\"1\"/>",
-            ", line 6, link b1",
-            "duplicate field `mass`",
+            ", line 7, link b1",
+            "second element <mass>, the first is in line 7",
         ),
-        ("xyz=\"0.05 0 0.02\"", "xyz=\"0.05 0\"", ", line 6, link b1", "expected 3 found 2"),
-        ("<child link=\"b1\"/>", "", ", line 9, joint a1", "missing field `child`"),
+        (
+            "xyz=\"0.05 0 0.02\"",
+            "xyz=\"0.05 0\"",
+            ", line 7, link b1",
+            "<origin> xyz has 2 numbers, expected 3",
+        ),
+        ("<child link=\"b1\"/>", "", ", line 9, joint a1", "has no element <child>"),
         ("type=\"revolute\"", "type=\"hinge\"", ", line 9, joint a1", "hinge"),
     ] {
         let text = error_of(from, to);
@@ -485,7 +495,7 @@ fn j06_masses_that_are_none_are_named_by_their_link() {
         assert!(text.contains(place), "{text}");
     }
     let text = Arm::parse(&good.replace("izz=\"0.01\"", "izz=\"0.5\"")).unwrap_err().to_string();
-    assert!(text.contains("link b0: link 0: largest principal moment"), "{text}");
+    assert!(text.contains("link b1: link 1: largest principal moment"), "{text}");
 }
 
 /// If an arm is mounted upside down or on a wall, the proposed gravity still points down.

@@ -19,9 +19,12 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     let proposed: Vec<ArmValue> = arm.values().into_iter().filter(|v| v.from == Source::Proposed).collect();
     let rules: Vec<_> =
         RULES.iter().filter(|rule| arm.sources.proposed().any(|(_, key)| key == rule.name)).collect();
+    let mut missing: Vec<String> = arm.parameter_set().missing().iter().map(ToString::to_string).collect();
+    missing
+        .extend(arm.lacking_by_key().iter().map(|(key, owners)| format!("{key} of {}", owners.join(", "))));
     let value = json!({
         "file": name, "arm": arm.name, "joints": arm.joint_names, "links": arm.link_names, "flange": arm.flange_name,
-        "warnings": arm.warnings, "proposed": proposed, "rules": rules, "missing": arm.parameter_set().missing(),
+        "warnings": arm.warnings, "proposed": proposed, "rules": rules, "missing": missing,
     });
     out.result(&value, || {
         let numbered =
@@ -36,7 +39,11 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
         for rule in rules {
             text += &format!("  {}: {}\n", rule.name, rule.rule);
         }
-        text + &format!("next: jtc arm check {name}, then jtc arm show {name}")
+        if arm.lacking.is_empty() {
+            text + &format!("next: jtc arm check {name}, then jtc arm show {name}")
+        } else {
+            text + "next: add the missing values to the robot description and import it again; jtc arm check lists them"
+        }
     });
     Ok(())
 }

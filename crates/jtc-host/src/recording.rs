@@ -13,6 +13,8 @@
 
 #[cfg(feature = "mcap")]
 mod cdr;
+#[cfg(all(test, feature = "mcap"))]
+mod channel_tests;
 mod csv;
 mod error;
 #[cfg(feature = "mcap")]

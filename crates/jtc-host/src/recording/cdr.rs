@@ -70,6 +70,13 @@ impl Encoder {
         self
     }
 
+    /// Writes a `std_msgs/UInt8MultiArray` without dimensions.
+    pub(super) fn byte_array(&mut self, bytes: &[u8]) -> &mut Self {
+        self.u32(0).u32(0).u32(bytes.len() as u32);
+        self.bytes.extend(bytes);
+        self
+    }
+
     /// Writes a `std_msgs/Header` with a time stamp in ns since 1970.
     pub(super) fn header(&mut self, stamp_ns: u64, frame: &str) -> &mut Self {
         self.u32((stamp_ns / 1_000_000_000) as u32).u32((stamp_ns % 1_000_000_000) as u32).string(frame)
@@ -124,6 +131,19 @@ impl<'a> Decoder<'a> {
         let len = self.u32()? as usize;
         self.at = self.at.checked_add(len).filter(|&end| end <= self.body.len())?;
         Some(())
+    }
+
+    /// Reads the bytes of a `std_msgs/UInt8MultiArray`. Dimensions, which only name parts of the bytes, are skipped.
+    pub(super) fn byte_array(&mut self) -> Option<&'a [u8]> {
+        for _ in 0..self.u32()? {
+            self.skip_string()?;
+            (self.u32()?, self.u32()?);
+        }
+        self.u32()?;
+        let len = self.u32()? as usize;
+        let bytes = self.body.get(self.at..self.at.checked_add(len)?)?;
+        self.at += len;
+        Some(bytes)
     }
 
     pub(super) fn array(&mut self) -> Option<[f64; 6]> {

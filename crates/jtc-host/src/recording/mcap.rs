@@ -12,7 +12,10 @@ use mcap::{Compression, McapError, WriteOptions};
 
 use super::cdr::{Decoder, Encoder};
 use super::frames::Frames;
-use super::messages::{self, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC, STATES_TOPIC};
+use super::messages::{
+    self, COMMANDS_TOPIC, CONTROL_TOPIC, DESCRIPTION_TOPIC, STATE_TOPIC, STATES_TOPIC, TRANSFORMS_TOPIC,
+    Topic,
+};
 use super::reassemble::{Late, Reassembler};
 use super::{Ending, Found, RecordingError, RecordingInfo, Writer, schema};
 use crate::sample::Sample;
@@ -22,6 +25,9 @@ use crate::trajectory::{Loaded, Trajectory};
 const METADATA: &str = "openjtc";
 /// Name of the metadata record with the [`Ending`], after all messages.
 const END: &str = "openjtc_end";
+/// Encoding of the trajectories and the log in recordings of version 0.2.0 and earlier. These messages have no schema and contain only the
+/// text or the bytes. No program of ROS 2 opens a file with such a channel, so the writer does not use this encoding.
+const WITHOUT_SCHEMA: &str = "openjtc";
 /// Topic of a flight recorder log, with the bytes that were fetched from the device (J-56).
 const LOG_TOPIC: &str = "/jtc/log";
 /// Topic of the executed trajectory, as a table with 19 columns of integers and without a header.
@@ -37,11 +43,6 @@ impl From<McapError> for RecordingError {
         }
     }
 }
-
-/// Topic of the robot description, which is written at the beginning of the file.
-const DESCRIPTION_TOPIC: &str = "/robot_description";
-/// Topic of the poses of the links.
-const TRANSFORMS_TOPIC: &str = "/tf";
 
 /// Writer of MCAP files, which writes each sample as four messages.
 pub(super) struct McapWriter<W: Write + Seek> {
@@ -66,21 +67,20 @@ impl<W: Write + Seek> McapWriter<W> {
             .compression(Some(Compression::Lz4))
             .create(out)?;
         out.write_metadata(&Metadata { name: METADATA.into(), metadata: info.to_map() })?;
-        let none = BTreeMap::new();
+        let (none, mut cdr) = (BTreeMap::new(), Encoder::default());
         let joint = out.add_schema(schema::JOINT_STATE, "ros2msg", schema::JOINT_STATE_TEXT.as_bytes())?;
         let control = out.add_schema(schema::CONTROL, "ros2msg", schema::CONTROL_TEXT.as_bytes())?;
         let state = out.add_schema(schema::STATE, "ros2msg", schema::STATE_TEXT.as_bytes())?;
         for (topic, trajectory) in [(TRAJECTORY_TOPIC, &info.commanded), (THEN_TOPIC, &info.then)] {
             let Some(text) = trajectory.as_ref().and_then(|t| t.to_int16_csv().ok()) else { continue };
-            let channel = out.add_channel(0, topic, "openjtc", &none)?;
-            let time = info.start_unix_ns;
-            let header =
-                MessageHeader { channel_id: channel, sequence: 0, log_time: time, publish_time: time };
-            out.write_to_known_channel(&header, text.as_bytes())?;
+            let message = cdr.start().string(&text).bytes();
+            write_once(&mut out, topic, Topic::Description.schema(), info.start_unix_ns, message)?;
         }
         let frames = match &info.description {
             Some(description) => {
-                describe(&mut out, description, info.start_unix_ns)?;
+                let message = cdr.start().string(description).bytes();
+                let (time, schema) = (info.start_unix_ns, Topic::Description.schema());
+                write_once(&mut out, DESCRIPTION_TOPIC, schema, time, message)?;
                 let text = schema::TRANSFORMS_TEXT.as_bytes();
                 let transforms = out.add_schema(schema::TRANSFORMS, "ros2msg", text)?;
                 let channel = out.add_channel(transforms, TRANSFORMS_TOPIC, "cdr", &none)?;
@@ -98,21 +98,21 @@ impl<W: Write + Seek> McapWriter<W> {
             start_ns: info.start_unix_ns,
             frames,
             sequence: 0,
-            cdr: Encoder::default(),
+            cdr,
         })
     }
 }
 
-/// Writes a robot description in the format that robot viewers read.
-fn describe<W: Write + Seek>(
+/// Writes one CDR message to a channel of its own. `schema` is the name and the text of the ROS 2 message definition.
+fn write_once<W: Write + Seek>(
     out: &mut mcap::Writer<W>,
-    description: &str,
+    topic: &str,
+    (name, text): (&str, &str),
     time: u64,
+    message: &[u8],
 ) -> Result<(), RecordingError> {
-    let schema = out.add_schema(schema::STRING, "ros2msg", schema::STRING_TEXT.as_bytes())?;
-    let channel_id = out.add_channel(schema, DESCRIPTION_TOPIC, "cdr", &BTreeMap::new())?;
-    let mut cdr = Encoder::default();
-    let message = cdr.start().string(description).bytes();
+    let schema = out.add_schema(name, "ros2msg", text.as_bytes())?;
+    let channel_id = out.add_channel(schema, topic, "cdr", &BTreeMap::new())?;
     let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
     Ok(out.write_to_known_channel(&header, message)?)
 }
@@ -120,14 +120,9 @@ fn describe<W: Write + Seek>(
 impl<W: Write + Seek> McapWriter<W> {
     /// Writes a log of a flight recorder as one message.
     pub(super) fn write_log(&mut self, log: &[u8]) -> Result<(), RecordingError> {
-        let channel = self.out.add_channel(0, LOG_TOPIC, "openjtc", &BTreeMap::new())?;
-        let header = MessageHeader {
-            channel_id: channel,
-            sequence: 0,
-            log_time: self.start_ns,
-            publish_time: self.start_ns,
-        };
-        Ok(self.out.write_to_known_channel(&header, log)?)
+        let schema = (schema::BYTES, schema::BYTES_TEXT);
+        let message = self.cdr.start().byte_array(log).bytes();
+        write_once(&mut self.out, LOG_TOPIC, schema, self.start_ns, message)
     }
 }
 
@@ -136,10 +131,19 @@ pub(super) fn read_log(file: impl Read) -> Result<Option<Vec<u8>>, RecordingErro
     let (mut channel, mut log) = (None, None);
     let read = each_record(file, |record| {
         match record {
-            records::Record::Channel(found) if found.topic == LOG_TOPIC => channel = Some(found.id),
-            records::Record::Message { header, data } if Some(header.channel_id) == channel => {
-                log = Some(data.into_owned());
+            records::Record::Channel(found) if found.topic == LOG_TOPIC => {
+                channel = Some((found.id, found.message_encoding));
             }
+            records::Record::Message { header, data } => match &channel {
+                Some((id, encoding)) if *id == header.channel_id => {
+                    log = if encoding == WITHOUT_SCHEMA {
+                        Some(data.into_owned())
+                    } else {
+                        Decoder::new(&data).and_then(|mut cdr| cdr.byte_array().map(<[u8]>::to_vec))
+                    };
+                }
+                _ => {}
+            },
             _ => {}
         }
         Ok::<_, RecordingError>(())
@@ -204,18 +208,20 @@ const SAMPLE_TOPICS: [&str; 4] = [STATES_TOPIC, COMMANDS_TOPIC, CONTROL_TOPIC, S
 enum Carries {
     /// Messages with a part of each sample; the number is the index into [`SAMPLE_TOPICS`].
     Sample(u8),
-    Trajectory,
-    Then,
+    /// The executed trajectory and that of the later runs; `true` if the message has no schema ([`WITHOUT_SCHEMA`]).
+    Trajectory(bool),
+    Then(bool),
     Description,
     Other,
 }
 
 impl Carries {
-    fn of(topic: &str) -> Self {
+    fn of(channel: &records::Channel) -> Self {
+        let (topic, bare) = (channel.topic.as_str(), channel.message_encoding == WITHOUT_SCHEMA);
         match SAMPLE_TOPICS.iter().position(|known| *known == topic) {
             Some(i) => Self::Sample(i as u8),
-            None if topic == TRAJECTORY_TOPIC => Self::Trajectory,
-            None if topic == THEN_TOPIC => Self::Then,
+            None if topic == TRAJECTORY_TOPIC => Self::Trajectory(bare),
+            None if topic == THEN_TOPIC => Self::Then(bare),
             None if topic == DESCRIPTION_TOPIC => Self::Description,
             None => Self::Other,
         }
@@ -261,7 +267,7 @@ pub(super) fn scan(
                 ending = Some(RecordingInfo::from_map(&metadata.metadata).ending);
             }
             records::Record::Channel(channel) => {
-                channels.insert(channel.id, Carries::of(&channel.topic));
+                channels.insert(channel.id, Carries::of(&channel));
             }
             records::Record::Message { header, data } => {
                 let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
@@ -277,8 +283,8 @@ pub(super) fn scan(
                             time_s,
                         })?;
                     }
-                    Carries::Trajectory => commanded = trajectory(&data),
-                    Carries::Then => then = trajectory(&data),
+                    Carries::Trajectory(bare) => commanded = trajectory(&data, bare),
+                    Carries::Then(bare) => then = trajectory(&data, bare),
                     Carries::Description => {
                         description = Decoder::new(&data).and_then(|mut cdr| cdr.string().map(Arc::from));
                     }
@@ -307,9 +313,10 @@ pub(super) fn scan(
     Ok(Found { info, ending, cut })
 }
 
-fn trajectory(data: &[u8]) -> Option<Arc<Trajectory>> {
-    let read = std::str::from_utf8(data).ok().and_then(|text| Loaded::parse(text, None).ok());
-    read.map(|read| Arc::new(read.trajectory))
+/// Reads the text of a trajectory. A `bare` message contains only the text.
+fn trajectory(data: &[u8], bare: bool) -> Option<Arc<Trajectory>> {
+    let text = if bare { std::str::from_utf8(data).ok()? } else { Decoder::new(data)?.string()? };
+    Loaded::parse(text, None).ok().map(|read| Arc::new(read.trajectory))
 }
 
 fn decode(topic: &str, data: &[u8], sample: &mut Sample) -> Option<()> {

@@ -32,10 +32,27 @@ float64[] effort
 "
 );
 
-/// Name of the message that contains a robot description.
+/// Name of the message that contains a text: a robot description or a trajectory.
 pub(super) const STRING: &str = "std_msgs/msg/String";
-/// Definition of the description message.
+/// Definition of the message that contains a text.
 pub(super) const STRING_TEXT: &str = "string data\n";
+
+/// Name of the message that contains the bytes of a flight recorder log.
+pub(super) const BYTES: &str = "std_msgs/msg/UInt8MultiArray";
+/// Definition of the message with bytes, with all definitions that this message needs.
+pub(super) const BYTES_TEXT: &str = "\
+std_msgs/MultiArrayLayout layout
+uint8[] data
+================================================================================
+MSG: std_msgs/MultiArrayLayout
+std_msgs/MultiArrayDimension[] dim
+uint32 data_offset
+================================================================================
+MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+";
 
 /// Name of the message with transforms between frames.
 pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";

@@ -18,8 +18,8 @@ TOPICS = {
     "/jtc/control": "openjtc_msgs/msg/JointControl",
     "/jtc/state": "openjtc_msgs/msg/ControllerState",
 }
-# Topics that check_standalone.py checks.
-OTHERS = {"/robot_description", "/tf"}
+# Topics that check_standalone.py and check_readers.py check.
+OTHERS = {"/robot_description", "/tf", "/jtc/trajectory", "/jtc/trajectory_then", "/jtc/log"}
 
 
 def same(a, b):

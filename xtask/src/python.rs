@@ -69,7 +69,7 @@ struct Check {
     demo_files: &'static [&'static str],
 }
 
-static CHECKS: [Check; 24] = [
+static CHECKS: [Check; 25] = [
     Check { script: "dynamics/check_codegen.py", program: None, demo_files: &[] },
     Check { script: "dynamics/check_pinocchio.py", program: Some("examples/reference"), demo_files: &[] },
     Check { script: "plan/check_plan.py", program: Some("examples/plans"), demo_files: &[] },
@@ -87,6 +87,7 @@ static CHECKS: [Check; 24] = [
     },
     Check { script: "agent/check_api.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "recording/check_standalone.py", program: None, demo_files: &["recording.mcap"] },
+    Check { script: "recording/check_readers.py", program: Some("jtc"), demo_files: &["recording.mcap"] },
     Check { script: "agent/check_metrics.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "agent/check_foxglove.py", program: Some("jtc"), demo_files: &[] },
     Check { script: "agent/check_ucom_api.py", program: Some("ucom"), demo_files: &[] },

@@ -24,7 +24,7 @@ pub use duration::duration_ns;
 pub use frame::{Format, Frame, FrameError, MAX_LEN};
 pub use joint::Joint;
 pub use request::{Request, Target};
-pub use scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE};
+pub use scale::{DRIVE_TORQUE_MAX, POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE};
 pub use state::NodeState;
 
 /// Number of joints on the bus (nodes 0..5).

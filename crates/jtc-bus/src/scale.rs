@@ -6,6 +6,9 @@
 pub const POSITION_FULL_SCALE: f64 = 3.141592;
 /// Torque that the largest 16-bit value represents, N·m.
 pub const TORQUE_FULL_SCALE: f64 = 360.0;
+/// Largest torque that each of the known drives supplies, base to wrist, N·m. A drive limits a larger torque command to this value without a
+/// report.
+pub const DRIVE_TORQUE_MAX: [f64; 6] = [364.0, 364.0, 364.0, 79.0, 79.0, 79.0];
 
 /// Full-scale values of the quantities that drives report (J-11). The scales of position (3.141592) and torque (360) are constants of the
 /// protocol.

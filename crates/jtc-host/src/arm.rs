@@ -95,6 +95,9 @@ pub struct Arm {
     /// For each joint, base to wrist: `true` if the file contains the rotor inertia of the joint. If the value is `false`, the rotor
     /// inertia in `joints` is 0.
     pub rotors_given: [bool; JOINTS],
+    /// Largest torque that the drive of each joint supplies, base to wrist, N·m. A controller does not know this number. The torque limit
+    /// of a joint must not exceed it, because a drive limits a larger torque without a report.
+    pub drive_torque_max: [f64; JOINTS],
     /// Acceleration of gravity in the base frame, m/s². If the value is `None`, the controller's setting is used.
     pub gravity: Option<[f64; 3]>,
     /// Controller settings from the `[settings]` table of the arm file.
@@ -225,7 +228,14 @@ impl Arm {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
             FileError::at(Place::name(format!("joint {name}")), e.to_string())
-        })
+        })?;
+        match self.drive_faults().into_iter().next() {
+            None => Ok(()),
+            Some((joint, fault)) => {
+                let name = &self.joint_names[joint.index()];
+                Err(FileError::at(Place::name(format!("joint {name}, {}", fault.key)), fault.problem))
+            }
+        }
     }
 
     /// Returns the name of the joint or link that has the model error. The name is the name in the file.
@@ -283,6 +293,7 @@ impl Arm {
             model: ArmModel::default(),
             joints: Config::avena().joints,
             rotors_given: [false; JOINTS],
+            drive_torque_max: jtc_bus::DRIVE_TORQUE_MAX,
             gravity: None,
             others: Vec::new(),
             pid: None,

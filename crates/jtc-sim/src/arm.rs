@@ -70,7 +70,7 @@ pub struct SimArm {
     /// Elasticity of the gears, which are rigid by default. An elastic gear transfers 0.01 kg·m² of the rotor's inertia
     /// to its link.
     pub gears: [Gear; JOINTS],
-    /// Largest torque of the drive, N·m. The drive limits larger torque commands, but does not report this limitation.
+    /// Largest torque of each drive, N·m; that of the known drives by default. The drive limits larger torque commands, but does not report this limitation.
     pub torque_ceiling: JointVec,
     /// Temperature of the air, and of the bearings at the start, °C.
     pub ambient: f64,
@@ -97,7 +97,7 @@ impl SimArm {
             friction_model: FrictionModel::default(),
             stops: config.joints.map(|j| (j.position_min - 0.04, j.position_max + 0.04)),
             gears: [Gear::RIGID; JOINTS],
-            torque_ceiling: [364.0, 364.0, 364.0, 79.0, 79.0, 79.0],
+            torque_ceiling: jtc_bus::DRIVE_TORQUE_MAX,
             ambient: 24.0,
         }
     }

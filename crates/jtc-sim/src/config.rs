@@ -121,6 +121,13 @@ impl Default for SimConfig {
 }
 
 impl SimConfig {
+    /// Returns the configuration with other largest torques of the drives, N·m.
+    #[must_use]
+    pub fn with_drive_torques(mut self, torque_max: JointVec) -> Self {
+        self.arm.torque_ceiling = torque_max;
+        self
+    }
+
     /// Creates the configuration for a controller with these settings and an arm with these parameters.
     pub fn new(controller: Config, parameters: &Parameters) -> Self {
         let drives = core::array::from_fn(|j| DriveConfig {

@@ -35,7 +35,9 @@ impl SimulatedArm<'_> {
         let arm = self.arm.as_ref().map(|arm| &*arm.get().inner);
         let mut config = match arm {
             None => SimConfig::default(),
-            Some(arm) => SimConfig::new(arm.config(), &arm.parameters()),
+            Some(arm) => {
+                SimConfig::new(arm.config(), &arm.parameters()).with_drive_torques(arm.drive_torque_max)
+            }
         };
         (config.controller, config.stored_arm) = of_arm(arm)?;
         config.seed = self.seed;

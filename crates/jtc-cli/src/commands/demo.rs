@@ -163,7 +163,10 @@ fn execute(
 ) -> Result<Run, Failure> {
     let arm = Arm::avena();
     let trajectory = jtc_host::example::demo_motion();
-    let world = World::new(SimConfig { seed: SEED, ..SimConfig::new(arm.config(), &arm.parameters()) });
+    let world = World::new(SimConfig {
+        seed: SEED,
+        ..SimConfig::new(arm.config(), &arm.parameters()).with_drive_torques(arm.drive_torque_max)
+    });
     let percent = |true_value: f64, believed: f64| {
         let off = if believed > 0.0 { ((true_value / believed - 1.0) * 100.0).round() + 0.0 } else { 0.0 };
         format!("{off:+} %")

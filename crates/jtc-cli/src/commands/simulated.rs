@@ -30,7 +30,7 @@ pub(super) fn simulated(
         (None, Some(path)) => arm.image().map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?,
         (kept, _) => kept,
     };
-    let mut config = SimConfig::new(arm.config(), &arm.parameters());
+    let mut config = SimConfig::new(arm.config(), &arm.parameters()).with_drive_torques(arm.drive_torque_max);
     if stored.is_some() {
         // Like a board, the simulated controller starts with the built-in settings, and then reads its arm from the
         // stored image.

@@ -18,11 +18,16 @@ pub use self::stability::RotorMargins;
 use super::source::JOINT_KEYS;
 use super::{Arm, Lacking, PoseError, Source};
 
+/// Smallest difference between two torque commands on the joint bus, N·m.
+const TORQUE_STEP: f64 = jtc_bus::TORQUE_FULL_SCALE / i16::MAX as f64;
+/// Number of these steps in a torque limit, below which the check reports the resolution.
+const FEW_STEPS: f64 = 100.0;
+
 /// Finding from the check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmFinding {
     /// Subject of the finding: `limit`, `physical`, `body`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
-    /// `unit`, `pose` or `proposed`.
+    /// `unit`, `resolution`, `pose` or `proposed`.
     pub code: &'static str,
     /// Severity, description, cause and advice. The controller refuses an arm with a finding of the severity `Problem`.
     #[serde(flatten)]
@@ -197,7 +202,10 @@ impl Arm {
         for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
             let mut config = good.clone();
             config.joints[joint.index()] = self.joints[joint.index()];
-            let Err(error) = config.check() else { continue };
+            let Err(error) = config.check() else {
+                self.find_drive_torque(joint, findings);
+                continue;
+            };
             let (name, value, limit, unit) = match error {
                 ConfigError::Position { value, limit, .. } => {
                     let key = if value < 0.0 { "position_min_rad" } else { "position_max_rad" };
@@ -224,6 +232,36 @@ impl Arm {
                     .measured(value, limit, unit)
                     .because("the limits of the mechanism may exceed those of its drives")
                     .next(format!("lower {name} to {most} {unit} at most (absolute value)")),
+            );
+        }
+    }
+
+    /// Finds a torque limit that the drive does not reach, and a torque limit of few steps of the joint bus.
+    fn find_drive_torque(&self, joint: Joint, findings: &mut Vec<ArmFinding>) {
+        for (_, fault) in self.drive_faults().into_iter().filter(|(of, _)| *of == joint) {
+            let what = format!("{}, {}: {}", self.titled(joint), fault.key, fault.problem);
+            let most = self.drive_torque_max[joint.index()];
+            findings.push(
+                ArmFinding::new(Severity::Problem, "drives", what)
+                    .of(joint, fault.key)
+                    .measured(fault.value, most, "N·m")
+                    .because("a drive limits a larger torque without a report, so the arm would lag behind its plan")
+                    .next(format!("lower {} to {most} N·m at most, or correct drive_torque_max_nm", fault.key)),
+            );
+        }
+        let (torque, step) = (self.joints[joint.index()].torque_max, TORQUE_STEP);
+        if torque < FEW_STEPS * step {
+            let what = format!(
+                "{}, torque_max_nm: {torque} N·m are {:.0} steps of the joint bus, which has {step:.3} N·m",
+                self.titled(joint),
+                torque / step
+            );
+            findings.push(
+                ArmFinding::new(Severity::Warning, "resolution", what)
+                    .of(joint, "torque_max_nm")
+                    .measured(torque, FEW_STEPS * step, "N·m")
+                    .because("the torque of the joint moves in these steps, so the joint follows its set values coarsely")
+                    .next("nothing, if the accuracy suffices; otherwise use a drive with a finer torque command"),
             );
         }
     }

@@ -76,6 +76,9 @@ impl Arm {
                     let _ = writeln!(out, "{} = {value:?}", row.name);
                 }
             }
+            if self.drive_torque_max[i] != jtc_bus::DRIVE_TORQUE_MAX[i] {
+                let _ = writeln!(out, "drive_torque_max_nm = {:?}", self.drive_torque_max[i]);
+            }
             if let Some(g) = self.pid.map(|p| p[i]) {
                 let _ = writeln!(
                     out,

@@ -80,6 +80,10 @@ impl Arm {
             name: image.name.to_string(),
             joints: config.joints,
             rotors_given: [true; JOINTS],
+            // A controller does not know the drives. Its arm was checked with the drives before it was sent.
+            drive_torque_max: std::array::from_fn(|i| {
+                jtc_bus::DRIVE_TORQUE_MAX[i].max(config.joints[i].torque_max * config.joints[i].torque_gain)
+            }),
             gravity: Some(config.gravity),
             others: others(&config),
             pid: Some(gains(&image.pid)),

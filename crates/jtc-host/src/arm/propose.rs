@@ -249,9 +249,9 @@ impl Arm {
             let moving = ENOUGH_ACCELERATION / ACCELERATION_PART;
             let rotor = PROPOSED_RANGE.up / ROTOR_ACCELERATION;
             let enough = (worst[j] + moving * links[j].most) / (1.0 - moving * rotor);
-            let torque =
-                (2.0 * worst[j]).max(strongest / 20.0).max(enough).clamp(0.1, jtc_bus::TORQUE_FULL_SCALE);
-            let fine = rounded(1.01 * torque, 3).min(jtc_bus::TORQUE_FULL_SCALE);
+            let drive = self.drive_torque_max[j].min(jtc_bus::TORQUE_FULL_SCALE);
+            let torque = (2.0 * worst[j]).max(strongest / 20.0).max(enough).clamp(0.1, drive);
+            let fine = rounded(1.01 * torque, 3).min(drive);
             let coarse = rounded(torque, 2);
             self.joints[j].torque_max = if coarse < enough { fine } else { coarse };
             let place = format!("joint {}", self.joint_names[j]);
@@ -286,7 +286,7 @@ impl Arm {
                     "friction {coulomb} N·m and damping {viscous} N·m·s/rad are more than the controller accepts: 0 is proposed"
                 )
             };
-            let change = if within { Change::Doubtful } else { Change::NotCarried };
+            let change = if used { Change::Doubtful } else { Change::NotCarried };
             self.warnings.push(Warning::new(change, format!("joint {}", self.joint_names[j]), problem));
         }
         self.polynomial = Some(all);

@@ -254,7 +254,8 @@ fn a_joint_that_is_held_keeps_its_place() {
     let text = plain
         .replace("<parent link=\"l3\"/>", "<parent link=\"of_elbow\"/>")
         .replace("</robot>", &format!("{elbow}</robot>"));
-    let choice = ArmChoice { joints: Some((1..7).map(|j| format!("j{j}")).collect()), tip: None };
+    let choice =
+        ArmChoice { joints: Some((1..7).map(|j| format!("j{j}")).collect()), ..ArmChoice::default() };
     let arm = Arm::from_urdf_with(&text, &choice).unwrap();
     assert_eq!(arm.model.links[3].mass, Arm::avena().model.links[3].mass + 1.0);
     let (a, b) = (&arm.model.joints[3], &Arm::avena().model.joints[3]);

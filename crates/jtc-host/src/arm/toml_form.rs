@@ -184,6 +184,9 @@ pub(super) fn read_incomplete(text: &str) -> Result<Arm, FileError> {
         name: form.name,
         model,
         joints: limits,
+        drive_torque_max: std::array::from_fn(|i| {
+            joints[i].drive_torque_max_nm.unwrap_or(jtc_bus::DRIVE_TORQUE_MAX[i])
+        }),
         rotors_given: std::array::from_fn(|i| joints[i].rotor_inertia_kg_m2.is_some()),
         gravity: form.gravity_m_s2,
         others: others(&form.settings)?,

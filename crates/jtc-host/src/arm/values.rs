@@ -154,6 +154,15 @@ impl Arm {
                 let from = if given { self.sources.of((Some(joint), row.name)) } else { Source::Default };
                 add(value(setting(row, &drives), row.get(&config, joint.number()), from));
             }
+            let drive = Kind {
+                default: Some(jtc_bus::DRIVE_TORQUE_MAX[j]),
+                ..kind("drive_torque_max_nm", "N·m", Some(0.0), None)
+            };
+            let from = match self.sources.of((Some(joint), "drive_torque_max_nm")) {
+                Source::File if self.drive_torque_max[j] == jtc_bus::DRIVE_TORQUE_MAX[j] => Source::Default,
+                other => other,
+            };
+            add(value(drive, Some(self.drive_torque_max[j]), from));
             let source =
                 |key, lacks: bool| if lacks { Source::Missing } else { self.sources.of((Some(joint), key)) };
             for (kind, get) in gains(&drives.parameter_bounds) {
@@ -225,10 +234,10 @@ mod tests {
         );
         assert_eq!((of("pid.kd", 1).from, of("pid.kd", 1).value), (Source::Proposed, Some(80.0)));
         assert_eq!(of("friction_polynomial.c0", 3).value, arm.polynomial.map(|c| c[2][0]));
-        // Expected number of values: 3 for gravity, 19 for each of 6 joints, 6 for each of 7 frames and 13 for each
+        // Expected number of values: 3 for gravity, 20 for each of 6 joints, 6 for each of 7 frames and 13 for each
         // of 7 links. `own` is the number of controller settings that do not belong to these groups.
         let own = settings::count(true) - 6 * 8 - 3;
-        assert_eq!(all.len(), 3 + 6 * 19 + 7 * 6 + 7 * 13 + own);
+        assert_eq!(all.len(), 3 + 6 * 20 + 7 * 6 + 7 * 13 + own);
         let missing = Arm { pid: None, ..arm }.values();
         let kp = missing.iter().find(|v| v.name == "pid.kp").unwrap();
         assert_eq!((kp.value, kp.from), (None, Source::Missing));

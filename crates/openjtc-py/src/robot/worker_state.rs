@@ -194,7 +194,7 @@ fn simulator(
     let image = named.as_ref().map(|arm| arm.image()).transpose();
     let image = image.map_err(|error| Failure::usage(format!("{}: {error}", arm.name)))?.flatten();
     let stored = image.is_some();
-    let mut config = SimConfig::new(arm.config(), &arm.parameters());
+    let mut config = SimConfig::new(arm.config(), &arm.parameters()).with_drive_torques(arm.drive_torque_max);
     if stored {
         // The controller reads the arm from its memory, as on a board.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), image);

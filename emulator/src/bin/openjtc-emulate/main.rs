@@ -103,7 +103,7 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let mut config = BoardConfig { seed: args.seed, ..BoardConfig::default() };
     if let Some(path) = &args.arm {
         let arm = Arm::load(path)?;
-        config.sim = SimConfig::new(arm.config(), &arm.parameters());
+        config.sim = SimConfig::new(arm.config(), &arm.parameters()).with_drive_torques(arm.drive_torque_max);
     }
     config.sim.seed = args.seed;
     if let Some(path) = &args.bank2 {

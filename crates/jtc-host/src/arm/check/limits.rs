@@ -23,6 +23,7 @@ impl Arm {
                 ("acceleration_max_rad_s2", limits.acceleration_max),
                 ("torque_max_nm", limits.torque_max),
                 ("position_error_max_rad", limits.position_error_max),
+                ("drive_torque_max_nm", self.drive_torque_max[joint.index()]),
             ] {
                 if !(v > 0.0 && v.is_finite()) {
                     fault(key, v, format!("{v} is not a positive number"));
@@ -50,5 +51,22 @@ impl Arm {
         }
         all.retain(|(joint, fault)| !self.lacks(*joint, fault.key));
         all
+    }
+
+    /// Returns the torque limits that the drives do not reach. A drive limits a larger torque without a report: the controller would then
+    /// plan with a torque that the arm does not have.
+    pub(in crate::arm) fn drive_faults(&self) -> Vec<(Joint, LimitFault)> {
+        let excess = |joint: Joint| {
+            let (limits, most) = (&self.joints[joint.index()], self.drive_torque_max[joint.index()]);
+            let torque = limits.torque_max * limits.torque_gain;
+            (torque > most).then(|| {
+                let problem = format!(
+                    "{torque} N·m exceed the {most} N·m that the drive supplies: lower torque_max_nm, or write the number of the data sheet \
+                     as drive_torque_max_nm"
+                );
+                (joint, LimitFault { key: "torque_max_nm", value: torque, problem })
+            })
+        };
+        Joint::ALL.into_iter().filter_map(excess).collect()
     }
 }

@@ -268,3 +268,43 @@ fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     assert_eq!(warned(advice - 1.0), None, "{}", warning.finding.next);
     assert!(warned(advice + 100.0).is_some());
 }
+
+/// The drives of the wrist supply at most 79 N·m. A limit above this maximum is refused in the file, by the check and for a plan, unless
+/// the file names stronger drives.
+#[test]
+fn a_torque_limit_above_the_drive_is_a_finding() {
+    let text = AVENA_TOML.replacen("torque_max_nm = 40.0", "torque_max_nm = 140.0", 1);
+    let arm = toml_form::read(&text).unwrap();
+    let found: Vec<_> = arm.check().findings.into_iter().filter(|f| f.code == "drives").collect();
+    let [finding] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!((finding.value, finding.limit), (Some(140.0), Some(79.0)));
+    assert_eq!((finding.joint.map(Joint::number), finding.name), (Some(5), Some("torque_max_nm")));
+    assert!(finding.finding.what.contains("joint 5") && arm.check().is_refused(), "{finding:?}");
+    let error = Arm::parse(&text).unwrap_err().to_string();
+    assert!(error.contains("joint_5, torque_max_nm: 140 N·m exceed the 79 N·m"), "{error}");
+
+    let stronger =
+        text.replacen("torque_max_nm = 140.0", "torque_max_nm = 140.0\ndrive_torque_max_nm = 150.0", 1);
+    let arm = Arm::parse(&stronger).unwrap();
+    assert_eq!(arm.drive_torque_max, [364.0, 364.0, 364.0, 79.0, 150.0, 79.0]);
+    assert!(!arm.check().findings.iter().any(|f| f.code == "drives"));
+    assert_eq!(Arm::parse(&arm.to_toml()).unwrap().drive_torque_max, arm.drive_torque_max);
+    let weaker =
+        AVENA_TOML.replacen("torque_max_nm = 180.0", "torque_max_nm = 180.0\ndrive_torque_max_nm = 90.0", 1);
+    assert!(Arm::parse(&weaker).unwrap_err().to_string().contains("180 N·m exceed the 90 N·m"));
+    for wrong in ["0.0", "-5.0", "nan"] {
+        let text = stronger.replacen("150.0", wrong, 1);
+        assert!(Arm::parse(&text).unwrap_err().to_string().contains("drive_torque_max_nm"), "{wrong}");
+    }
+}
+
+/// The joint bus carries torques in steps of 0.011 N·m. Below 100 steps the check says so.
+#[test]
+fn a_torque_limit_of_few_steps_of_the_bus_is_a_finding() {
+    let found = |torque: f64| {
+        let mut arm = Arm::avena();
+        arm.joints[5].torque_max = torque;
+        arm.check().findings.into_iter().filter(|f| f.code == "resolution").count()
+    };
+    assert_eq!((found(1.0), found(1.2), found(40.0)), (1, 0, 0));
+}

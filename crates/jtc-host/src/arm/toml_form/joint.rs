@@ -30,6 +30,8 @@ pub(super) struct JointForm {
     pub(super) velocity_max_rad_s: Option<f64>,
     pub(super) acceleration_max_rad_s2: Option<f64>,
     pub(super) torque_max_nm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) drive_torque_max_nm: Option<f64>,
     pub(super) position_error_max_rad: Option<f64>,
     pub(super) rotor_inertia_kg_m2: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -79,6 +81,7 @@ impl JointForm {
         let position_max = need("position_max_rad", self.position_max_rad);
         for (key, given) in [
             ("torque_gain", self.torque_gain.is_some()),
+            ("drive_torque_max_nm", self.drive_torque_max_nm.is_some()),
             ("teach_damping_nm_s_rad", self.teach_damping_nm_s_rad.is_some()),
         ] {
             if !given {

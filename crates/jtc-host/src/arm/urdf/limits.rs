@@ -87,7 +87,9 @@ impl Chain<'_> {
             let limit = joint.limit()?;
             self.position(number, joint, &limit, to)?;
             self.dynamic_limits(number, joint, &limit, to);
-            for key in ["position_error_max_rad", "torque_gain", "teach_damping_nm_s_rad"] {
+            let defaults =
+                ["position_error_max_rad", "torque_gain", "drive_torque_max_nm", "teach_damping_nm_s_rad"];
+            for key in defaults {
                 self.sources.fill_in((Some(number), key));
             }
             let place = format!("joint {}", joint.name);
@@ -210,8 +212,8 @@ impl Chain<'_> {
     fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) -> Result<(), FileError> {
         let drives = Config::avena();
         let fastest = fastest();
-        let strongest = jtc_bus::TORQUE_FULL_SCALE;
-        for (rotary, to) in self.rotary.into_iter().zip(joints) {
+        let bus = jtc_bus::TORQUE_FULL_SCALE;
+        for ((rotary, to), drive) in self.rotary.into_iter().zip(joints).zip(jtc_bus::DRIVE_TORQUE_MAX) {
             let place = format!("joint {}", rotary.name);
             self.narrow_position(rotary, to)?;
             if to.velocity_max > fastest {
@@ -223,12 +225,15 @@ impl Chain<'_> {
                 to.velocity_max = fastest;
                 self.warn(Change::LimitCut, &place, problem);
             }
-            if to.torque_max > strongest {
-                let problem = format!(
-                    "effort limit {}: {strongest} N·m is used, the maximum of the joint bus",
-                    to.torque_max
-                );
-                to.torque_max = strongest;
+            if to.torque_max > drive.min(bus) {
+                let why = if drive < bus {
+                    "the maximum of the known drives at this joint; for a stronger drive, set torque_max_nm and drive_torque_max_nm in the file"
+                } else {
+                    "the maximum of the joint bus"
+                };
+                let problem =
+                    format!("effort limit {}: {} N·m is used, {why}", to.torque_max, drive.min(bus));
+                to.torque_max = drive.min(bus);
                 self.warn(Change::LimitCut, &place, problem);
             }
         }

@@ -72,7 +72,7 @@ fn parts() -> Vec<Part> {
 }
 
 fn six(names: &str) -> ArmChoice {
-    ArmChoice { joints: Some(names.split(',').map(String::from).collect()), tip: None }
+    ArmChoice { joints: Some(names.split(',').map(String::from).collect()), ..ArmChoice::default() }
 }
 
 fn changes(arm: &Arm, change: Change) -> Vec<String> {

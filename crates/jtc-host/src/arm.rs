@@ -66,6 +66,9 @@ pub struct ArmChoice {
     /// Name of the last link of the arm. Only joints between the base and this link can belong to the arm. With
     /// `None`, the arm ends at the flange that is fixed to the last joint.
     pub tip: Option<String>,
+    /// `true` if the friction compensation is proposed from friction and damping of the description. By default it is 0, because these
+    /// numbers are often made for a simulator, and too much compensation drives a joint.
+    pub friction: bool,
 }
 
 /// Arm that was read from a robot description, with the gravity and the friction that the description contains.
@@ -110,6 +113,9 @@ pub struct Arm {
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
     /// Named joint positions, rad. Poses are not sent to a controller and are not part of the hash of an arm.
     pub poses: Poses,
+    /// Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint in a robot description that is not used for the compensation; 0 if the
+    /// arm has none. An arm file has these numbers only in comments.
+    pub friction_unused: [[f64; 2]; JOINTS],
     /// Warnings about values of the file that the loader ignored, changed or completed with defaults.
     pub warnings: Vec<Warning>,
     /// Source of each number: the arm file, a proposal or a default.
@@ -190,7 +196,7 @@ impl Arm {
         let Described { arm, gravity, friction } = urdf::read(text, choice)?;
         let mut arm = arm;
         arm.is_importable()?;
-        arm.propose(gravity, &friction);
+        arm.propose(gravity, &friction, choice.friction);
         Ok(arm)
     }
 
@@ -300,6 +306,7 @@ impl Arm {
             polynomial: None,
             table: None,
             poses: Poses::new(),
+            friction_unused: [[0.0; 2]; JOINTS],
             warnings: Vec::new(),
             sources: Sources::default(),
             lacking: Vec::new(),

@@ -41,9 +41,14 @@ impl Arm {
 
     /// Imports a robot description. If data is missing, the import proposes values and marks these values.
     #[staticmethod]
-    #[pyo3(signature = (path, joints=None, tip=None))]
-    fn import_urdf(path: PathBuf, joints: Option<Vec<String>>, tip: Option<String>) -> Result<Self, Failure> {
-        Ok(Self::of(HostArm::import(&path, &ArmChoice { joints, tip })?))
+    #[pyo3(signature = (path, joints=None, tip=None, friction=false))]
+    fn import_urdf(
+        path: PathBuf,
+        joints: Option<Vec<String>>,
+        tip: Option<String>,
+        friction: bool,
+    ) -> Result<Self, Failure> {
+        Ok(Self::of(HostArm::import(&path, &ArmChoice { joints, tip, friction })?))
     }
 
     /// Returns the built-in arm.

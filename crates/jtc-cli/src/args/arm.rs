@@ -124,6 +124,12 @@ pub(crate) struct ImportArgs {
     /// Use this link of the URDF as the flange
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
+    /// Compensate the friction and damping of the URDF.
+    ///
+    /// By default the file compensates no friction, and has these numbers in comments: they are often made for a simulator, and
+    /// too much compensation drives a joint
+    #[arg(long)]
+    pub friction: bool,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
 }

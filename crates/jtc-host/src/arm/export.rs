@@ -89,6 +89,15 @@ impl Arm {
             if let Some(c) = self.polynomial.map(|p| p[i]) {
                 let _ = writeln!(out, "friction_polynomial = {} # c0..c5, ascending", list(&c));
             }
+            if let [coulomb, viscous] = self.friction_unused[i]
+                && coulomb + viscous > 0.0
+            {
+                let _ = writeln!(
+                    out,
+                    "# friction_polynomial = {} # friction and damping of the robot description, not used",
+                    list(&[coulomb, viscous, 0.0, 0.0, 0.0, 0.0])
+                );
+            }
             self.write_marks(&mut out, Joint::from_index(i));
         }
         for (i, link) in self.model.links.iter().enumerate() {

@@ -62,7 +62,7 @@ pub const RULES: [Rule; 11] = [
     },
     Rule {
         name: "friction_polynomial",
-        rule: "friction and damping of the robot description, else 0: no compensation is safe, too much compensation is not",
+        rule: "0: no compensation is safe, too much compensation is not; with --friction, the friction and damping of the robot description",
     },
 ];
 
@@ -125,8 +125,9 @@ impl Arm {
     }
 
     /// Fills in the numbers that are missing in the description, and marks them as proposed. `gravity` is in the base frame, m/s².
-    /// `friction` is the Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint, or 0 if the description does not contain it.
-    pub(super) fn propose(&mut self, gravity: [f64; 3], friction: &[[f64; 2]; JOINTS]) {
+    /// `friction` is the Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint, or 0 if the description does not contain it. The
+    /// friction compensation uses it only if `use_friction` is `true`.
+    pub(super) fn propose(&mut self, gravity: [f64; 3], friction: &[[f64; 2]; JOINTS], use_friction: bool) {
         if self.gravity.is_none() {
             self.gravity = Some(gravity);
             self.sources.propose((None, "gravity_m_s2"));
@@ -138,7 +139,7 @@ impl Arm {
             self.leave_out_what_needs_masses();
         }
         if self.friction().is_none() {
-            self.propose_friction(friction);
+            self.propose_friction(friction, use_friction);
         }
         for joint in Joint::ALL {
             for key in JOINT_KEYS {
@@ -263,7 +264,7 @@ impl Arm {
         }
     }
 
-    fn propose_friction(&mut self, friction: &[[f64; 2]; JOINTS]) {
+    fn propose_friction(&mut self, friction: &[[f64; 2]; JOINTS], use_friction: bool) {
         let bounds = self.config().parameter_bounds;
         let mut all = [[0.0; 6]; JOINTS];
         for (joint, to) in Joint::ALL.into_iter().zip(&mut all) {
@@ -275,13 +276,21 @@ impl Arm {
             }
             let polynomial = [coulomb, viscous, 0.0, 0.0, 0.0, 0.0];
             let within = bounds.check_polynomial(&polynomial, &self.joints[j]).is_ok();
-            let problem = if within {
+            let used = within && use_friction;
+            let problem = if used {
                 *to = polynomial;
                 format!(
                     "friction {coulomb} N·m and damping {viscous} N·m·s/rad: such numbers are often chosen only for a simulator, and too much \
                      friction compensation drives the joint"
                 )
+            } else if within {
+                self.friction_unused[j] = friction[j];
+                format!(
+                    "friction {coulomb} N·m and damping {viscous} N·m·s/rad: 0 is proposed, because too much friction compensation drives the \
+                     joint; `jtc arm import --friction` uses these numbers"
+                )
             } else {
+                self.friction_unused[j] = friction[j];
                 format!(
                     "friction {coulomb} N·m and damping {viscous} N·m·s/rad are more than the controller accepts: 0 is proposed"
                 )

@@ -200,7 +200,7 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
 
     let names = |text: &str| Some(text.split(',').map(String::from).collect());
     let import = |text: &str, joints, tip: Option<&str>| {
-        Arm::from_urdf_with(text, &ArmChoice { joints, tip: tip.map(String::from) })
+        Arm::from_urdf_with(text, &ArmChoice { joints, tip: tip.map(String::from), friction: false })
     };
     for (text, body) in [(&seven, "gripper"), (&finger, "finger")] {
         let arm = import(text, names("j1,j2,j3,j4,j5,j6"), None).unwrap();

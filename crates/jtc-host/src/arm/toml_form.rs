@@ -190,6 +190,7 @@ pub(super) fn read_incomplete(text: &str) -> Result<Arm, FileError> {
         rotors_given: std::array::from_fn(|i| joints[i].rotor_inertia_kg_m2.is_some()),
         gravity: form.gravity_m_s2,
         others: others(&form.settings)?,
+        friction_unused: [[0.0; 2]; JOINTS],
         warnings,
         sources,
         lacking,

@@ -146,7 +146,10 @@ class Arm:
     def parse(text: str) -> Arm: ...
     @staticmethod
     def import_urdf(
-        path: str | PathLike[str], joints: Sequence[str] | None = None, tip: str | None = None
+        path: str | PathLike[str],
+        joints: Sequence[str] | None = None,
+        tip: str | None = None,
+        friction: bool = False,
     ) -> Arm: ...
     @staticmethod
     def avena() -> Arm: ...

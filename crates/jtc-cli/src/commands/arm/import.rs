@@ -11,7 +11,7 @@ use super::show::number;
 use crate::args::ImportArgs;
 
 pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
-    let choice = ArmChoice { joints: args.joints.clone(), tip: args.tip.clone() };
+    let choice = ArmChoice { joints: args.joints.clone(), tip: args.tip.clone(), friction: args.friction };
     let arm = Arm::import(&args.urdf, &choice)?;
     let file = OutputFile::open(&args.out, args.overwrite.overwrite, &[&args.urdf])?;
     let name = file.name();

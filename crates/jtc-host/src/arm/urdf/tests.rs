@@ -525,7 +525,7 @@ fn proposals_are_marked_in_the_file_and_found_again() {
         "<dynamics damping=\"0.5\" friction=\"0.25\"/><limit effort=\"50\"/>",
         1,
     );
-    let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
+    let arm = Arm::import_text(&text, &ArmChoice { friction: true, ..ArmChoice::default() }).unwrap();
     let file = arm.to_toml();
     let back = Arm::parse(&file).unwrap();
     assert_eq!(Arm { warnings: arm.warnings.clone(), ..back.clone() }, arm);
@@ -544,4 +544,35 @@ fn proposals_are_marked_in_the_file_and_found_again() {
     assert!(text.contains("joint a1, proposed") && text.contains("\"gains\" is not a key"), "{text}");
     let list = file.lines().find(|l| l.starts_with("rotor_inertia")).unwrap();
     assert!(marked(list, "").contains("rotor_inertia_kg_m2 is listed as proposed, but has no value"));
+}
+
+/// Friction of a description is often made for a simulator, and too much compensation drives a joint. The import therefore compensates
+/// friction only on request, but the file keeps the numbers in comments.
+#[test]
+fn friction_of_a_description_is_compensated_only_on_request() {
+    let dynamics = "<dynamics damping=\"0.5\" friction=\"0.25\"/><limit effort=\"50\"/>";
+    let text = robot(&parts(), "").replacen(LIMIT, dynamics, 1);
+    let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
+    assert_eq!(arm.polynomial, Some([[0.0; 6]; 6]));
+    let found = changes(&arm, Change::NotCarried);
+    assert!(
+        found.len() == 1 && found[0].contains("0.25 N·m") && found[0].contains("--friction"),
+        "{found:?}"
+    );
+    let file = arm.to_toml();
+    let comments = file.matches("# friction_polynomial = [0.25, 0.5, 0.0, 0.0, 0.0, 0.0]").count();
+    assert_eq!(comments, 1, "{file}");
+    assert_eq!(Arm::parse(&file).unwrap().polynomial, arm.polynomial);
+}
+
+/// A drive limits a torque above its maximum without a report, so an imported limit is cut to this maximum.
+#[test]
+fn an_effort_above_the_drive_of_the_joint_is_cut() {
+    let mut text = robot(&parts(), "");
+    text = text.replace(LIMIT, &LIMIT.replace("effort=\"50\"", "effort=\"140\""));
+    assert!(text.contains("effort=\"140\""), "{text}");
+    let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
+    assert_eq!(arm.joints.map(|j| j.torque_max), [140.0, 140.0, 140.0, 79.0, 79.0, 79.0]);
+    let cut = changes(&arm, Change::LimitCut);
+    assert!(cut.iter().filter(|c| c.contains("effort limit 140: 79 N·m")).count() == 3, "{cut:?}");
 }

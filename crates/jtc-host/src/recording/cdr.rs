@@ -137,7 +137,8 @@ impl<'a> Decoder<'a> {
     pub(super) fn byte_array(&mut self) -> Option<&'a [u8]> {
         for _ in 0..self.u32()? {
             self.skip_string()?;
-            (self.u32()?, self.u32()?);
+            self.u32()?;
+            self.u32()?;
         }
         self.u32()?;
         let len = self.u32()? as usize;

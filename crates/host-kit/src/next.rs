@@ -84,6 +84,8 @@ actions! {
     AcceptDeviceLimits: "--accept-device-limits", "accept_device_limits: true", "accept_device_limits=True";
     /// Specify positions in degrees.
     Degrees: "--deg", "degrees: true", "degrees=True";
+    /// Take the joints of a file in the order of the numbers in their names.
+    JointsByNumber: "--joints-by-number", "joints_by_number: true", "openjtc.Trajectory.load(…, joints_by_number=True)";
     /// Choose the bit rate of the serial line.
     Baud: "--baud", "jtc serve --baud", "baud=";
     /// Monitor the state and the connection.

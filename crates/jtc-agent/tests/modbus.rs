@@ -56,7 +56,7 @@ impl Cell {
         let owner = Owner::new(LivePort::new(world), observer);
         let log = Arc::new(Mutex::new(CommandLog::open(None, LIMIT, |_| {}).expect("none")));
         let jobs = Jobs::new(owner.line(), Store::in_memory(), arm);
-        jobs.store.put(3, "there and back", &there_and_back(), false).expect("a trajectory");
+        jobs.store.put(3, "there and back", &there_and_back(), false, None).expect("a trajectory");
         let plc = Plc::new(owner.line(), jobs.clone(), log, true, FIRST);
         let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
         let address = listener.local_addr().expect("it listens");

@@ -45,6 +45,7 @@ pub use values::ArmValue;
 pub use warning::{Change, Warning};
 
 use crate::file::{FileError, Place, read_xml_or_text};
+use crate::trajectory::ArmNames;
 
 #[cfg(not(feature = "urdf"))]
 mod urdf {
@@ -128,6 +129,11 @@ impl Arm {
     /// Returns the default arm.
     pub fn avena() -> Self {
         Self::from_toml(AVENA_TOML).expect("the delivered arm file is good: tests read it")
+    }
+
+    /// Returns the names of the arm and of its joints, for files that name the joints.
+    pub fn names(&self) -> ArmNames<'_> {
+        ArmNames { arm: &self.name, joints: &self.joint_names }
     }
 
     /// Loads an arm from a TOML or URDF file. The content of the file determines the format.

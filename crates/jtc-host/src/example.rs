@@ -204,7 +204,7 @@ mod tests {
         for example in
             EXAMPLES.iter().filter(|e| !e.file.ends_with(".toml") && !e.file.ends_with("-waypoints.csv"))
         {
-            let read = Loaded::parse(&example.text(), Some(&arm.joint_names)).unwrap();
+            let read = Loaded::parse(&example.text(), Some(arm.names())).unwrap();
             let config = Config::avena();
             let friction = arm.friction();
             let checker = Checker {
@@ -276,7 +276,7 @@ mod tests {
                         .unwrap_or_else(|e| panic!("{e}: {text}"));
                 }
                 "csv" | "json" | "yaml" => {
-                    Loaded::parse(text, Some(&arm.joint_names)).unwrap_or_else(|e| panic!("{e}: {text}"));
+                    Loaded::parse(text, Some(arm.names())).unwrap_or_else(|e| panic!("{e}: {text}"));
                 }
                 "toml" => assert!(
                     text.lines()

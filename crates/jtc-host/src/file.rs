@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use host_kit::{Diagnose, Diagnosis, ErrorKind};
+use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
+
+use crate::table::lines;
 
 /// Size limit for files, bytes. Larger files are not read.
 pub const FILE_MAX: u64 = 64 << 20;
@@ -39,6 +41,16 @@ pub enum FileError {
         place: Place,
         /// Text that describes the problem, with the value.
         problem: String,
+    },
+    /// The joints in the file are not the joints of the arm.
+    #[error("{}, joint_names: {problem}", path.display())]
+    JointNames {
+        /// Path of the file.
+        path: PathBuf,
+        /// Text with the names in the file and the names of the arm.
+        problem: String,
+        /// `true` if the numbers at the ends of the names give an order of six joints.
+        numbered: bool,
     },
     /// The robot description has more than six joints, so the caller must select the six joints of the arm.
     #[error("{}: {problem}", path.display())]
@@ -177,13 +189,14 @@ impl std::fmt::Display for Place {
 
 impl Diagnose for FileError {
     fn diagnosis(&self) -> Diagnosis {
-        let next = match self {
+        let next: Next = match self {
             FileError::Io { .. } => "check the name and the rights of the file".into(),
             FileError::TooLarge { .. } => "check that this is the right file".into(),
             FileError::Joints { path, six, .. } => format!(
                 "name the six joints of the arm; the others are held at 0: jtc arm import {} --joints {six} -o arm.toml",
                 path.display()
-            ),
+            )
+            .into(),
             FileError::Choice { .. } => {
                 "--joints takes the names of six joints from the base to the wrist, separated by commas. --tip takes the link of the flange, which \
                  the sixth joint carries: `jtc arm import --help`"
@@ -195,6 +208,11 @@ impl Diagnose for FileError {
                     .into()
             }
             FileError::Foreign { path, form, .. } => form.next(&path.display().to_string()),
+            FileError::JointNames { numbered: true, .. } => next!(
+                "name the arm of this file, or use {} to take the joints in the order of the numbers in their names",
+                JointsByNumber
+            ),
+            FileError::JointNames { .. } => "name the arm of this file, or rename the joints in the file".into(),
             FileError::At { .. } | FileError::Form { .. } => {
                 "`jtc help files` shows the forms of files, `jtc example` writes one of each".into()
             }
@@ -209,6 +227,7 @@ impl FileError {
         let (FileError::Io { path, .. }
         | FileError::TooLarge { path, .. }
         | FileError::At { path, .. }
+        | FileError::JointNames { path, .. }
         | FileError::Joints { path, .. }
         | FileError::Choice { path, .. }
         | FileError::FewJoints { path, .. }
@@ -239,12 +258,11 @@ impl FileError {
 
 /// Reads the whole text of a file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
-    utf8(read_bytes(path)?, path)
+    text_of(read_bytes(path)?, path)
 }
 
-fn utf8(bytes: Vec<u8>, path: &Path) -> Result<String, FileError> {
-    String::from_utf8(bytes)
-        .map_err(|_| FileError::form("not a text file (its bytes are not valid UTF-8)").in_file(path))
+fn text_of(bytes: Vec<u8>, path: &Path) -> Result<String, FileError> {
+    decoded(bytes).map_err(|problem| FileError::form(problem).in_file(path))
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
@@ -270,7 +288,7 @@ pub(crate) fn read_xml_or_text(path: &Path) -> Result<String, FileError> {
         _ => None,
     };
     match encoding {
-        None => utf8(bytes, path),
+        None => text_of(bytes, path),
         Some(encoding) => Ok(encoding.decode(&bytes).0.into_owned()),
     }
 }
@@ -283,6 +301,20 @@ fn declared(bytes: &[u8]) -> &'static encoding_rs::Encoding {
     let known = label.and_then(|label| encoding_rs::Encoding::for_label(label.as_bytes()));
     // A file in UTF-16 without a byte order mark begins with `<` and 0, so this file is not in UTF-16.
     known.filter(|encoding| encoding.is_ascii_compatible()).unwrap_or(encoding_rs::UTF_8)
+}
+
+/// Decodes UTF-8, or UTF-16 with a byte order mark, as some programs for Windows write it.
+fn decoded(bytes: Vec<u8>) -> Result<String, &'static str> {
+    let word: fn([u8; 2]) -> u16 = match bytes.get(..2) {
+        Some([0xFF, 0xFE]) => u16::from_le_bytes,
+        Some([0xFE, 0xFF]) => u16::from_be_bytes,
+        _ => return String::from_utf8(bytes).map_err(|_| "not a text file (its bytes are not valid UTF-8)"),
+    };
+    let (pairs, rest) = bytes[2..].as_chunks::<2>();
+    let text = String::from_utf16(&pairs.iter().map(|pair| word(*pair)).collect::<Vec<_>>());
+    text.ok()
+        .filter(|_| rest.is_empty())
+        .ok_or("the text begins as UTF-16, but is not valid UTF-16; save the file as UTF-8")
 }
 
 /// Parses a number in the notations that occur in these files (`20.`, `-9.e-6`, ` 1`). The function rejects NaN and infinity.
@@ -299,19 +331,28 @@ pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileE
     }
 }
 
-/// Shortens a text to at most 40 characters for an error line.
+/// Shortens a text to at most 40 characters for an error line, and escapes control characters.
 pub(crate) fn short(text: &str) -> String {
+    short_to(text, 40)
+}
+
+/// Like [`short`], with another number of characters.
+pub(crate) fn short_to(text: &str, most: usize) -> String {
     let text = text.trim();
-    if text.chars().count() <= 40 {
-        text.to_owned()
-    } else {
-        text.chars().take(37).chain("...".chars()).collect()
+    let (shown, end) =
+        if text.chars().count() <= most { (most, "") } else { (most.saturating_sub(3), "...") };
+    let mut out = String::new();
+    for c in text.chars().take(shown) {
+        // These characters change the direction of the text, or are invisible.
+        let invisible = matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}');
+        if c.is_control() || invisible { out.extend(c.escape_default()) } else { out.push(c) }
     }
+    out + end
 }
 
 /// Returns rows of cells that are separated by commas, semicolons or spaces. Blank lines and lines that begin with `#` are skipped.
 pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
-    text.trim_start_matches('\u{feff}').lines().enumerate().filter_map(|(i, line)| {
+    lines(text).enumerate().filter_map(|(i, line)| {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             return None;

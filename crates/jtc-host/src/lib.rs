@@ -23,6 +23,7 @@ pub mod report;
 pub mod run;
 pub mod sample;
 pub mod session;
+mod table;
 pub mod trajectory;
 pub mod waypoints;
 

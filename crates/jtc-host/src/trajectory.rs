@@ -1,7 +1,14 @@
 //! Trajectories of points at a fixed time step. This module reads trajectories from common file formats.
 
+mod columns;
 mod csv;
+pub(crate) mod document;
 pub mod fit;
+mod header;
+mod joints;
+pub(crate) mod message;
+#[cfg(test)]
+mod other_tools;
 mod overshoot;
 mod replay;
 mod segments;
@@ -9,6 +16,7 @@ mod spline;
 mod structured;
 #[cfg(test)]
 mod tests;
+mod times;
 
 use std::path::Path;
 
@@ -81,17 +89,28 @@ pub struct Loaded {
     pub units_named: bool,
 }
 
+/// Names of an arm and of its joints, for files that name the joints.
+#[derive(Clone, Copy, Debug)]
+pub struct ArmNames<'a> {
+    /// Name of the arm. In a file, this name can precede the names of the joints.
+    pub arm: &'a str,
+    /// Names of the joints, base to wrist.
+    pub joints: &'a [String; JOINTS],
+}
+
 impl Loaded {
     fn fitted(fitted: fit::Fitted, form: Form) -> Self {
         let fit::Fitted { trajectory, notes, overshoot } = fitted;
         Self { trajectory, form, notes, overshoot, units_named: matches!(form, Form::Json | Form::Recording) }
     }
 
-    /// Reads a file of any of these formats. `joint_names` are the names of the arm's joints, if the caller knows them.
+    /// Reads a file of any of these formats. A file that names other joints than the joints of the arm is refused. Without `names`, the
+    /// numbers at the ends of the names in the file determine the order of the joints.
+    ///
     /// # Errors
     ///
     /// Returns an error with line and column if the file cannot be read or is not a trajectory of a known format.
-    pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
+    pub fn load(path: &Path, names: Option<ArmNames<'_>>) -> Result<Self, FileError> {
         if replay::is_recording(path, None) {
             return replay::load(path);
         }
@@ -100,8 +119,7 @@ impl Loaded {
             return replay::load(path);
         }
         let yaml = path.extension().is_some_and(|e| e == "yaml" || e == "yml");
-        let read =
-            if yaml { structured::read_yaml(&text, joint_names) } else { Self::parse(&text, joint_names) };
+        let read = if yaml { structured::read_yaml(&text, names) } else { Self::parse(&text, names) };
         read.map_err(|e| e.in_file(path))
     }
 
@@ -138,16 +156,57 @@ impl Loaded {
     /// # Errors
     ///
     /// Returns an error with line and column if the text is not a trajectory of a known format.
-    pub fn parse(text: &str, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
+    pub fn parse(text: &str, names: Option<ArmNames<'_>>) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
-        let keyed = || start.lines().any(|l| l.trim_start_matches([' ', '-']).starts_with("joint_names:"));
-        if start.starts_with('{') {
-            structured::read_json(start, joint_names)
-        } else if keyed() {
-            structured::read_yaml(start, joint_names)
+        if is_json(start) {
+            structured::read_json(start, names)
+        } else if is_yaml(start) {
+            structured::read_yaml(start, names)
         } else {
-            csv::read(text)
+            csv::read(text, names)
         }
+    }
+}
+
+/// Returns `true` if the text is JSON. The first line of a CSV file can begin with a unit in brackets.
+fn is_json(start: &str) -> bool {
+    let after = start.strip_prefix('[').map(str::trim_start);
+    start.starts_with('{')
+        || after.is_some_and(|rest| rest.starts_with(['[', '{', '"', ']', '-']) || starts_with_digit(rest))
+}
+
+fn starts_with_digit(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// Returns `true` if the text is YAML: it has a key of a message, or begins with a key.
+fn is_yaml(text: &str) -> bool {
+    let first =
+        text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
+    let begins =
+        first.trim_end() == "---" || first.split_whitespace().next().is_some_and(|word| word.ends_with(':'));
+    begins || has_message(text)
+}
+
+/// Returns `true` if the text has a key of a JointTrajectory.
+fn has_message(text: &str) -> bool {
+    let known = |line: &str| {
+        let key = line.trim_start_matches([' ', '-']);
+        ["points:", "joint_trajectory:"].iter().any(|known| key.starts_with(known))
+    };
+    ["joint_names:", "\"joint_names\":"].iter().any(|key| text.contains(key)) || text.lines().any(known)
+}
+
+/// Returns `true` if the text is a trajectory in a message, or a trajectory of this project in JSON. The text is not a valid waypoint file.
+pub(crate) fn is_message(text: &str) -> bool {
+    let start = text.trim_start_matches('\u{feff}').trim_start();
+    if is_json(start) {
+        let own = || start.contains("\"position_rad\"");
+        own()
+            || start.contains("joint_names")
+                && document::json(start).is_ok_and(|values| message::has_trajectory(&values))
+    } else {
+        has_message(start)
     }
 }
 

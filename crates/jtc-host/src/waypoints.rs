@@ -35,6 +35,7 @@ use crate::arm::{Arm, PoseError};
 use crate::error::facts;
 use crate::file::{FileError, Place, UNITS_KNOWN, read_text, short};
 use crate::plan::PlanError;
+use crate::trajectory::is_message;
 
 /// Maximum number of waypoints in a file.
 pub const WAYPOINTS_MAX: usize = 10_000;
@@ -159,6 +160,9 @@ impl WaypointFile {
     /// Returns the errors of [`load`](Self::load).
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
+        if is_message(start) {
+            return Err(FileError::form("a trajectory, not waypoints: `jtc traj run` runs it directly"));
+        }
         let file = if start.starts_with(['{', '[']) { json::read(start)? } else { csv::read(text)? };
         let count = file.waypoints.len();
         if count > WAYPOINTS_MAX {

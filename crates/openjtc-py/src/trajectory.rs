@@ -75,18 +75,39 @@ impl Trajectory {
         Ok(Self::of(HostTrajectory { step_ms, points: points.collect() }))
     }
 
-    /// Loads a file in any format that `jtc traj run` reads.
+    /// Loads a file in any format that `jtc traj run` reads. A file that names the joints of another arm than `arm`
+    /// (default: the built-in arm) is refused. With `joints_by_number`, the numbers in the names of the joints determine their order.
     #[staticmethod]
-    #[pyo3(signature = (path, arm=None, degrees=false))]
-    fn load(py: Python<'_>, path: PathBuf, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
-        py.detach(|| Self::loaded(Loaded::load(&path, arm.map(|arm| &arm.inner.joint_names))?, degrees))
+    #[pyo3(signature = (path, arm=None, degrees=false, joints_by_number=false))]
+    fn load(
+        py: Python<'_>,
+        path: PathBuf,
+        arm: Option<&Arm>,
+        degrees: bool,
+        joints_by_number: bool,
+    ) -> Result<Self, Failure> {
+        py.detach(|| {
+            let arm = arm.map_or_else(|| Arc::new(jtc_host::Arm::avena()), |arm| arm.inner.clone());
+            let names = (!joints_by_number).then(|| arm.names());
+            Self::loaded(Loaded::load(&path, names)?, degrees)
+        })
     }
 
     /// Parses the text of a trajectory file.
     #[staticmethod]
-    #[pyo3(signature = (text, arm=None, degrees=false))]
-    fn parse(py: Python<'_>, text: &str, arm: Option<&Arm>, degrees: bool) -> Result<Self, Failure> {
-        py.detach(|| Self::loaded(Loaded::parse(text, arm.map(|arm| &arm.inner.joint_names))?, degrees))
+    #[pyo3(signature = (text, arm=None, degrees=false, joints_by_number=false))]
+    fn parse(
+        py: Python<'_>,
+        text: &str,
+        arm: Option<&Arm>,
+        degrees: bool,
+        joints_by_number: bool,
+    ) -> Result<Self, Failure> {
+        py.detach(|| {
+            let arm = arm.map_or_else(|| Arc::new(jtc_host::Arm::avena()), |arm| arm.inner.clone());
+            let names = (!joints_by_number).then(|| arm.names());
+            Self::loaded(Loaded::parse(text, names)?, degrees)
+        })
     }
 
     /// Loads the measured motion from a recording.

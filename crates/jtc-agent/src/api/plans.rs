@@ -375,8 +375,9 @@ fn kept(
 ) -> Result<PlanObject, Problem> {
     let Planned { trajectory, verdict, binding, waypoint_times, notes } = planned;
     let text = trajectory.to_exact_csv();
-    let keep =
-        |KeepRequest { number, name, new }: &KeepRequest| keep(agent, (*number, *new), name, (&text, false));
+    let keep = |KeepRequest { number, name, new }: &KeepRequest| {
+        keep(agent, (*number, *new), name, (&text, false, None))
+    };
     let kept = request.keep.as_ref().map(keep).transpose()?;
     Ok(PlanObject {
         duration_s: trajectory.duration_s(),

@@ -8,6 +8,7 @@ use axum::http::StatusCode;
 use axum::{Extension, Json};
 use jtc_host::check::Verdict;
 use jtc_host::error::Facts;
+use jtc_host::trajectory::ArmNames;
 use jtc_host::{Arm, CheckError, CheckOptions, CheckedTrajectory, Error, ErrorKind, Session};
 use jtc_wire::Joint;
 use serde_json::json;
@@ -35,6 +36,10 @@ pub(super) struct TrajectoryRequest {
     /// `true` if the angles are in degrees.
     #[serde(default)]
     pub degrees: bool,
+    /// `true` if the numbers in the names of the joints determine their order. Otherwise, the agent refuses a file that
+    /// names the joints of another arm.
+    #[serde(default)]
+    pub joints_by_number: bool,
 }
 
 /// Kept trajectory.
@@ -234,8 +239,9 @@ pub(super) async fn put(
     caller.operator()?;
     let own = agent.clone();
     let kept = read(&agent, request, move |request| {
-        let TrajectoryRequest { name, text, degrees } = request;
-        let kept = keep(&own, (number, place.new), &name, (&text, degrees));
+        let TrajectoryRequest { name, text, degrees, joints_by_number } = request;
+        let names = (!joints_by_number).then(|| own.jobs.arm().names());
+        let kept = keep(&own, (number, place.new), &name, (&text, degrees, names));
         let (from, why) = (caller.peer.to_string(), kept.as_ref().err().map(|error| error.message.clone()));
         own.note("trajectory", json!({ "number": number, "from": from, "why_not": why }));
         kept
@@ -249,12 +255,12 @@ pub(super) fn keep(
     agent: &Agent,
     (number, new): (u16, bool),
     name: &str,
-    (text, degrees): (&str, bool),
+    (text, degrees, names): (&str, bool, Option<ArmNames<'_>>),
 ) -> Result<TrajectoryObject, Problem> {
     let (store, name) = (&agent.jobs.store, plain(name));
     let stored = match new {
-        true => store.put_new(number, &name, text, degrees),
-        false => store.put(number, &name, text, degrees),
+        true => store.put_new(number, &name, text, degrees, names),
+        false => store.put(number, &name, text, degrees, names),
     };
     stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| Problem::of(&e))
 }

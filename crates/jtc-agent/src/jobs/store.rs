@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use jtc_host::Trajectory;
 use jtc_host::file::FileError;
-use jtc_host::trajectory::{Loaded, POINTS_MAX, Point};
+use jtc_host::trajectory::{ArmNames, Loaded, POINTS_MAX, Point};
 use sha2::{Digest as _, Sha256};
 
 use super::{PoseStore, PoseStoreError};
@@ -153,13 +153,20 @@ impl Store {
     }
 
     /// Stores the trajectory in `text`, and replaces the trajectory that has the same number. `text` is a file in
-    /// any format that [`Loaded::parse`] accepts. A run that has already begun continues with the old trajectory.
+    /// any format that [`Loaded::parse`] accepts, with `names`. A run that has already begun continues with the old trajectory.
     ///
     /// # Errors
     ///
     /// A [`StoreError`]; the trajectory that has this number is then unchanged.
-    pub fn put(&self, number: u16, name: &str, text: &str, degrees: bool) -> Result<Arc<Stored>, StoreError> {
-        self.keep((number, name), (text, degrees), false)
+    pub fn put(
+        &self,
+        number: u16,
+        name: &str,
+        text: &str,
+        degrees: bool,
+        names: Option<ArmNames<'_>>,
+    ) -> Result<Arc<Stored>, StoreError> {
+        self.keep((number, name), (text, degrees, names), false)
     }
 
     /// Like [`put`](Self::put), but never replaces a trajectory.
@@ -173,8 +180,9 @@ impl Store {
         name: &str,
         text: &str,
         degrees: bool,
+        names: Option<ArmNames<'_>>,
     ) -> Result<Arc<Stored>, StoreError> {
-        self.keep((number, name), (text, degrees), true)
+        self.keep((number, name), (text, degrees, names), true)
     }
 
     /// Checks that no trajectory has this number.
@@ -192,14 +200,14 @@ impl Store {
     fn keep(
         &self,
         (number, name): (u16, &str),
-        (text, degrees): (&str, bool),
+        (text, degrees, names): (&str, bool, Option<ArmNames<'_>>),
         new: bool,
     ) -> Result<Arc<Stored>, StoreError> {
         if !(1..=NUMBER_MAX).contains(&number) {
             return Err(StoreError::Number(number));
         }
         let named = |error: FileError| error.in_file(Path::new(if name.is_empty() { "text" } else { name }));
-        let loaded = Loaded::parse(text, None).map_err(named)?;
+        let loaded = Loaded::parse(text, names).map_err(named)?;
         let loaded = if degrees { loaded.in_degrees().map_err(named)? } else { loaded };
         let points = loaded.trajectory.points.len();
         if points > POINTS_MAX {
@@ -318,11 +326,13 @@ mod tests {
     fn what_is_kept_outlasts_the_agent_under_its_number_and_name() {
         let directory = tempfile::tempdir().expect("a directory");
         let store = Store::open(directory.path()).expect("it is empty");
-        store.put(7, "pick", TEXT, false).expect("a trajectory");
-        store.put(7, "place", TEXT, false).expect("another one");
-        store.put(8, &"ä/".repeat(60), TEXT, false).expect("a long name");
-        assert!(store.put(0, "x", TEXT, false).is_err() && store.put(100, "x", TEXT, false).is_err());
-        assert!(store.put(7, "bad", "no trajectory", false).is_err());
+        store.put(7, "pick", TEXT, false, None).expect("a trajectory");
+        store.put(7, "place", TEXT, false, None).expect("another one");
+        store.put(8, &"ä/".repeat(60), TEXT, false, None).expect("a long name");
+        assert!(
+            store.put(0, "x", TEXT, false, None).is_err() && store.put(100, "x", TEXT, false, None).is_err()
+        );
+        assert!(store.put(7, "bad", "no trajectory", false, None).is_err());
         let names =
             |store: &Store| store.list().iter().map(|s| (s.number, s.name.clone())).collect::<Vec<_>>();
         let again = Store::open(directory.path()).expect("its own files");
@@ -343,7 +353,7 @@ mod tests {
     fn a_digest_is_that_of_what_is_executed_alone() {
         let store = Store::in_memory();
         let digest = |name: &str, text: &str, degrees| {
-            store.put(1, name, text, degrees).expect("a trajectory").digest.clone()
+            store.put(1, name, text, degrees, None).expect("a trajectory").digest.clone()
         };
         let first = digest("a", TEXT, false);
         assert!(first.len() == 16 && first.chars().all(|c| c.is_ascii_hexdigit()), "{first}");
@@ -364,13 +374,13 @@ mod tests {
     #[test]
     fn what_is_new_takes_the_place_of_nothing() {
         let store = Store::in_memory();
-        store.put_new(7, "pick", TEXT, false).expect("it is free");
-        let error = store.put_new(7, "place", TEXT, false).expect_err("it is taken");
+        store.put_new(7, "pick", TEXT, false, None).expect("it is free");
+        let error = store.put_new(7, "place", TEXT, false, None).expect_err("it is taken");
         assert!(matches!(&error, StoreError::Taken { number: 7, name } if name == "pick"), "{error}");
         assert_eq!(store.get(7).map(|kept| kept.name.clone()), Some("pick".to_owned()));
         assert!(store.is_free(7).is_err() && store.is_free(8).is_ok());
-        store.put(7, "place", TEXT, false).expect("that is what is asked for");
-        assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false).is_ok());
+        store.put(7, "place", TEXT, false, None).expect("that is what is asked for");
+        assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false, None).is_ok());
     }
 
     /// While the disk is full, the stored trajectory stays in the store, even after a restart of the agent. When
@@ -380,10 +390,10 @@ mod tests {
     fn a_full_disk_leaves_what_had_the_number() {
         let directory = tempfile::tempdir().expect("a directory");
         let store = Store::open(directory.path()).expect("it is empty");
-        store.put(7, "pick", TEXT, false).expect("a trajectory");
+        store.put(7, "pick", TEXT, false, None).expect("a trajectory");
         std::os::unix::fs::symlink("/dev/full", directory.path().join("7-pick.part")).expect("a link");
         let longer = format!("{TEXT}2,0,0,0,0,0,0\n");
-        let error = store.put(7, "pick", &longer, false).expect_err("there is no room");
+        let error = store.put(7, "pick", &longer, false, None).expect_err("there is no room");
         assert!(error.to_string().contains("7-pick.csv: No space left"), "{error}");
         for store in [&store, &Store::open(directory.path()).expect("its own files")] {
             let kept = store.get(7).expect("it is there");
@@ -394,7 +404,7 @@ mod tests {
             1,
             "no part of it is left"
         );
-        store.put(7, "pick", &longer, false).expect("there is room");
+        store.put(7, "pick", &longer, false, None).expect("there is room");
         assert_eq!(
             Store::open(directory.path()).expect("its own files").list()[0].trajectory.points.len(),
             3

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use jtc_host::trajectory::ArmNames;
 
 use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 
@@ -54,12 +55,23 @@ pub(crate) struct CheckArgs {
     /// degrees
     #[arg(long)]
     pub deg: bool,
+    /// Order joints by the numbers in their names.
+    ///
+    /// Use this option for files that name the joints of another arm, for example left_joint_1 to left_joint_6. Without
+    /// this option, such files are refused
+    #[arg(long)]
+    pub joints_by_number: bool,
 }
 
 impl CheckArgs {
     /// Returns the speed in percent of the speed in the file.
     pub(crate) fn speed(&self) -> f64 {
         self.speed.unwrap_or(100.0)
+    }
+
+    /// Returns the names of the joints that a file must have. Returns `None` if the numbers in the names determine the order.
+    pub(crate) fn names_of<'a>(&self, arm: &'a jtc_host::Arm) -> Option<ArmNames<'a>> {
+        (!self.joints_by_number).then(|| arm.names())
     }
 }
 
@@ -102,6 +114,12 @@ pub(crate) enum TrajCommand {
         /// Use this option for files that do not contain units
         #[arg(long)]
         deg: bool,
+        /// Order joints by the numbers in their names.
+        ///
+        /// Use this option for files that name the joints of another arm, for example left_joint_1 to left_joint_6. Without
+        /// this option, such files are refused
+        #[arg(long)]
+        joints_by_number: bool,
     },
     /// Check, upload and execute a trajectory, then report
     #[command(after_help = RUN_EXAMPLES)]
@@ -249,6 +267,11 @@ pub(crate) struct ContinueArgs {
     /// Default: the arm of the controller, or the built-in arm if the controller cannot report its arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
+    /// Order joints by the numbers in their names.
+    ///
+    /// Use this option for a file of --trajectory that names the joints of another arm
+    #[arg(long)]
+    pub joints_by_number: bool,
     #[command(flatten)]
     pub execute: ExecuteArgs,
 }

@@ -110,7 +110,8 @@ impl Left {
 /// Returns the trajectory of the interrupted run.
 fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajectory, Failure> {
     if let Some(file) = &args.trajectory {
-        return Ok(Loaded::load(file, Some(&arm.joint_names)).map_err(Failure::nothing_sent)?.trajectory);
+        let names = (!args.joints_by_number).then(|| arm.names());
+        return Ok(Loaded::load(file, names).map_err(Failure::nothing_sent)?.trajectory);
     }
     let held = recording.info.as_ref().and_then(|info| info.commanded.as_deref());
     held.cloned().ok_or_else(|| {

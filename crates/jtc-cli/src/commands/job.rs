@@ -72,7 +72,7 @@ impl Job {
     /// Reads the trajectory file and the arm file. Prints notes and warnings on stderr.
     pub(super) fn load(file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         let arm = arm_of(args, out)?;
-        let loaded = Loaded::load(file, Some(&arm.joint_names))?;
+        let loaded = Loaded::load(file, args.names_of(&arm))?;
         Self::with(arm, loaded, file, args, out)
     }
 
@@ -94,7 +94,8 @@ impl Job {
         };
         let config = arm.config();
         let arm_words = named_arm::typed_option(args.arm.as_deref());
-        let words = typed(file) + if args.deg { " --deg" } else { "" } + &arm_words;
+        let by_number = if args.joints_by_number { " --joints-by-number" } else { "" };
+        let words = typed(file) + if args.deg { " --deg" } else { "" } + by_number + &arm_words;
         let device = Config::avena();
         Ok(Self {
             loaded,

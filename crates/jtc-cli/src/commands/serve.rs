@@ -46,7 +46,7 @@ pub(super) fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let store = args.trajectories.as_deref().map_or_else(|| Ok(Store::in_memory()), Store::open)?;
     if args.sim && args.arm.is_none() && args.trajectories.is_none() {
         // For a simulated arm, the agent stores an example motion, because a new user has no trajectory yet.
-        store.put(1, "example motion", &demo_motion().to_exact_csv(), false)?;
+        store.put(1, "example motion", &demo_motion().to_exact_csv(), false, None)?;
     }
     let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
     let tls = tls.map(|(certificate, key)| tls::load(certificate, key)).transpose()?;

@@ -23,7 +23,10 @@ pub(super) fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
         TrajCommand::Check { file, check: args, payload } => {
             check(file, args, payload.unwrap_or_default(), out)
         }
-        TrajCommand::Info { file, deg } => info(file, *deg, out),
+        TrajCommand::Info { file, deg, joints_by_number } => {
+            let args = CheckArgs { arm: None, speed: None, deg: *deg, joints_by_number: *joints_by_number };
+            info(file, &args, out)
+        }
         TrajCommand::Run(args) => run::run(args, out),
         TrajCommand::Replay { run: args, measured } => replay(args, *measured, out),
         TrajCommand::Continue(args) => continued::continued(args, out),
@@ -124,9 +127,8 @@ fn figures(verdict: &Verdict) -> String {
     table(&["", ">position rad", ">peak rad/s", ">peak rad/s²", ">peak N·m"], &rows)
 }
 
-fn info(file: &Path, deg: bool, out: &Output) -> Result<(), Failure> {
-    let args = CheckArgs { arm: None, speed: None, deg };
-    let job = Job::load(file, &args, out)?;
+fn info(file: &Path, args: &CheckArgs, out: &Output) -> Result<(), Failure> {
+    let job = Job::load(file, args, out)?;
     let (t, upload) = (&job.trajectory, UploadOptions::default());
     let verdict = job.verdict(t, None, upload);
     let per_segment = upload.segment_points(t.points.len());

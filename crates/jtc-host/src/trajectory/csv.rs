@@ -4,23 +4,28 @@
 use std::fmt::Write as _;
 
 use jtc_core::JOINTS;
-use jtc_wire::RawPoint;
+use jtc_wire::{POSITION_SCALE, RawPoint};
 
 use super::fit::{FitError, Samples};
-use super::{Form, Loaded, Point, ScaleError, Trajectory};
-use crate::file::{FileError, Place, number, rows, short};
-use crate::waypoints;
+use super::{ArmNames, Form, Loaded, Point, ScaleError, Trajectory, header, times};
+use crate::file::{FileError, Place, number, short};
+use crate::table::{self, Row, rows};
+
+/// Largest position that could be a number of whole rad.
+const SMALL: f64 = 3.0;
 
 /// Number of columns in the formats without a header: 1 time, 6 positions, 6 velocities and 6 accelerations.
 const COLUMNS: usize = 1 + 3 * JOINTS;
 
-pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
-    let Some((line, first)) = rows(text).next() else {
+pub(super) fn read(text: &str, names: Option<ArmNames<'_>>) -> Result<Loaded, FileError> {
+    let rows = rows(text);
+    let Some((line, first)) = rows.first() else {
         return Err(FileError::form("the file is empty, not a trajectory"));
     };
+    let line = *line;
     let headed = first.iter().any(|c| c.chars().any(|c| c.is_alphabetic()) && c.parse::<f64>().is_err());
     if headed {
-        return with_header(text, line, &first);
+        return with_header(&rows, names);
     }
     match first.len() {
         COLUMNS => {}
@@ -49,30 +54,31 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
         }
     }
     // Only the float format contains decimal points, and it contains them in every file.
-    let whole = rows(text)
+    let whole = rows
+        .iter()
         .all(|(_, cells)| cells.iter().all(|c| c.bytes().all(|b| b.is_ascii_digit() || b"+-".contains(&b))));
-    if whole { int16(text) } else { float(text) }
+    if whole { int16(&rows) } else { float(&rows) }
 }
 
-fn width(line: usize, cells: &[&str], want: usize) -> Result<(), FileError> {
+fn width((line, cells): &Row<'_>, want: usize) -> Result<(), FileError> {
     if cells.len() == want {
         return Ok(());
     }
-    Err(FileError::at(
-        Place::line(line),
-        format!("{} columns, but the lines before have {want}", cells.len()),
-    ))
+    let why = table::decimal_comma(cells, want);
+    let problem = format!("{} columns, but the lines before have {want}{why}", cells.len());
+    Err(FileError::at(Place::line(*line), problem))
 }
 
-fn int16(text: &str) -> Result<Loaded, FileError> {
+fn int16(rows: &[Row<'_>]) -> Result<Loaded, FileError> {
     let mut points = Vec::new();
     let mut times: Vec<(usize, i64)> = Vec::new();
-    for (line, cells) in rows(text) {
-        width(line, &cells, COLUMNS)?;
+    for row in rows {
+        width(row, COLUMNS)?;
+        let (line, cells) = (row.0, &row.1);
         let time = cells[0].parse::<i64>().map_err(|_| {
             FileError::at(
                 Place::cell(line, 1).named("time"),
-                format!("\"{}\" is not a time in ms", short(cells[0])),
+                format!("\"{}\" is not a time in ms", short(&cells[0])),
             )
         })?;
         times.push((line, time));
@@ -88,6 +94,15 @@ fn int16(text: &str) -> Result<Loaded, FileError> {
         points.push(Point::from(&raw));
     }
     let mut notes = Vec::new();
+    let largest =
+        points.iter().flat_map(|p: &Point| p.position).map(|v| (v / POSITION_SCALE * 32767.0).abs());
+    let largest = largest.fold(0.0, f64::max).round();
+    if (1.0..=SMALL).contains(&largest) && times.len() > 1 {
+        notes.push(format!(
+            "19 columns of whole numbers are in the scale of the protocol (times in ms, 32767 is {POSITION_SCALE} rad), so the largest position \
+             is {largest} of 32767; for s and rad, write decimal points"
+        ));
+    }
     let step_ms = match times[..] {
         [(_, first), (line, second), ..] => match second.checked_sub(first) {
             Some(step @ 1..=1000) => step as u16,
@@ -116,21 +131,23 @@ fn int16(text: &str) -> Result<Loaded, FileError> {
     })
 }
 
-fn float(text: &str) -> Result<Loaded, FileError> {
+fn float(rows: &[Row<'_>]) -> Result<Loaded, FileError> {
     let mut samples =
         Samples { velocity: Some(Vec::new()), acceleration: Some(Vec::new()), ..Samples::default() };
     let mut lines = Vec::new();
-    for (line, cells) in rows(text) {
-        width(line, &cells, COLUMNS)?;
-        let mut row = [0.0; COLUMNS];
-        for (c, (to, cell)) in row.iter_mut().zip(&cells).enumerate() {
+    for row in rows {
+        width(row, COLUMNS)?;
+        let (line, cells) = (row.0, &row.1);
+        let mut values = [0.0; COLUMNS];
+        for (c, (to, cell)) in values.iter_mut().zip(cells).enumerate() {
             let name = || if c == 0 { "time".to_owned() } else { channel_name(c - 1) };
             *to = number(cell, || Place::cell(line, c + 1).named(name()))?;
         }
         lines.push(line);
-        samples.push(row[0], |c| row[1 + c]);
+        samples.push(values[0], |c| values[1 + c]);
     }
-    finish(samples, &lines, Form::Float)
+    let notes = times::in_seconds(&mut samples.times, "time");
+    finish(samples, notes, &lines, Form::Float)
 }
 
 impl Samples {
@@ -147,15 +164,24 @@ impl Samples {
     }
 }
 
-fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileError> {
+fn finish(
+    samples: Samples,
+    mut notes: Vec<String>,
+    lines: &[usize],
+    form: Form,
+) -> Result<Loaded, FileError> {
     let times = samples.times.clone();
     match samples.fit() {
-        Ok(fitted) => Ok(Loaded::fitted(fitted, form)),
+        Ok(fitted) => {
+            let mut loaded = Loaded::fitted(fitted, form);
+            notes.append(&mut loaded.notes);
+            Ok(Loaded { notes, ..loaded })
+        }
         Err(FitError::Time(i)) => {
             let problem = format!("{} s is not after {} s of the line before", times[i], times[i - 1]);
             Err(FileError::at(Place::line(lines[i]).named("time"), problem))
         }
-        Err(other) => Err(FileError::form(other.to_string())),
+        Err(other) => Err(FileError::form(other.to_string() + times::hint(&times, &other))),
     }
 }
 
@@ -164,82 +190,37 @@ fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Returns the number of the column for a name in a header, and the conversion factor of the unit in this name. Column 0 is the time. All
-/// other columns are in the order of the formats without a header.
-fn column_of(name: &str) -> Option<(usize, f64)> {
-    let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
-    if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
-        return Some((0, 1.0));
-    }
-    // The name may contain a unit, as in q1_rad, qd1_rad_s, qdd1_rad_s2, q1_deg, qd1_deg_s, qdd1_deg_s2.
-    let (name, unit) = match (name.split_once("_rad"), name.split_once("_deg")) {
-        (Some((head, _)), _) => (head, 1.0),
-        (None, Some((head, _))) => (head, 1f64.to_radians()),
-        (None, None) => (name.as_str(), 1.0),
-    };
-    (0..3 * JOINTS).find(|c| channel_name(*c) == name).map(|c| (c + 1, unit))
-}
-
-fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded, FileError> {
-    let mut place_of = [None; COLUMNS];
-    for (i, name) in header.iter().enumerate() {
-        let at = |problem: &str| {
-            FileError::at(
-                Place::cell(header_line, i + 1).named(format!("\"{}\"", short(name))),
-                problem.to_owned(),
-            )
-        };
-        let (column, unit) = column_of(name).ok_or_else(|| {
-            at(if waypoints::is_column(name) {
-                "a column of waypoints, not of a trajectory: `jtc plan` makes a trajectory from waypoints"
-            } else {
-                "unknown column, expected t, q1..q6 (rad) or q1_deg..q6_deg, qd1..qd6 (rad/s), qdd1..qdd6 (rad/s²)"
-            })
-        })?;
-        if place_of[column].replace((i, unit)).is_some() {
-            return Err(at("this column occurs twice"));
-        }
-    }
-    let missing = |from: usize| (from..from + JOINTS).find(|c| place_of[*c].is_none());
-    let none = |from: usize| (from..from + JOINTS).all(|c| place_of[c].is_none());
-    if place_of[0].is_none() {
-        return Err(FileError::at(
-            Place::line(header_line),
-            "column t (time in s) is missing; `jtc plan` makes a trajectory from waypoints without times",
-        ));
-    }
-    for from in [1, 1 + JOINTS, 1 + 2 * JOINTS] {
-        if let Some(c) = missing(from).filter(|_| from == 1 || !none(from)) {
-            return Err(FileError::at(
-                Place::line(header_line),
-                format!("column {} is missing", channel_name(c - 1)),
-            ));
-        }
-    }
-    let has = |from: usize| (!none(from)).then(Vec::new);
+fn with_header(rows: &[Row<'_>], names: Option<ArmNames<'_>>) -> Result<Loaded, FileError> {
+    let header = header::Header::of(rows, names)?;
+    let [_, velocity, acceleration] = &header.channels;
+    let list = |channel: &Option<_>| channel.is_some().then(Vec::new);
     let mut samples =
-        Samples { velocity: has(1 + JOINTS), acceleration: has(1 + 2 * JOINTS), ..Samples::default() };
-    if samples.velocity.is_none() && samples.acceleration.is_some() {
-        return Err(FileError::at(Place::line(header_line), "qdd1..qdd6 without qd1..qd6"));
-    }
+        Samples { velocity: list(velocity), acceleration: list(acceleration), ..Samples::default() };
     let mut lines = Vec::new();
-    for (line, cells) in rows(text).skip(1) {
-        width(line, &cells, header.len())?;
-        let mut row = [0.0; COLUMNS];
-        for (to, place) in row.iter_mut().zip(&place_of) {
-            if let Some((i, unit)) = place {
-                *to = unit * number(cells[*i], || Place::cell(line, i + 1).named(header[*i]))?;
+    for row in &rows[header.rows..] {
+        let (line, cells) = (row.0, &row.1);
+        width(row, header.names.len())?;
+        let value = |i: usize| number(&cells[i], || Place::cell(line, i + 1).named(short(&header.names[i])));
+        let mut values = [0.0; COLUMNS];
+        for (c, channel) in header.channels.iter().enumerate() {
+            for (j, (i, unit)) in channel.iter().flatten().enumerate() {
+                values[c * JOINTS + j] = unit * value(*i)?;
             }
         }
         lines.push(line);
-        samples.push(row[0], |c| row[1 + c]);
+        samples.push(value(header.time.0)?, |c| values[c]);
     }
     if lines.is_empty() {
-        return Err(FileError::at(Place::line(header_line), "the file has a header but no points"));
+        let problem = format!("the file has a header but no points{}", header.left_out_words("; "));
+        return Err(FileError::at(Place::line(rows[0].0), problem));
     }
-    let named = |name: &&str| ["_rad", "_deg"].iter().any(|unit| name.to_ascii_lowercase().contains(unit));
-    let loaded = finish(samples, &lines, Form::Csv)?;
-    Ok(Loaded { units_named: header.iter().any(named), ..loaded })
+    let mut notes = header.notes.clone();
+    match header.time.1 {
+        Some(unit) => samples.times.iter_mut().for_each(|t| *t *= unit),
+        None => notes.append(&mut times::in_seconds(&mut samples.times, &header.names[header.time.0])),
+    }
+    let loaded = finish(samples, notes, &lines, Form::Csv)?;
+    Ok(Loaded { units_named: header.angles_named, ..loaded })
 }
 
 impl Trajectory {

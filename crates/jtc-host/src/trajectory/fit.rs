@@ -80,6 +80,12 @@ pub struct Fitted {
 const STEP_MS: u16 = 10;
 /// Maximum deviation of a time from the grid, s.
 const REGULAR: f64 = 50e-6;
+/// Maximum deviation of a time from the mean step, if the times were rounded to 1 ms, s.
+const ROUNDED: f64 = 1.1e-3;
+/// Shortest step of a trajectory, s.
+const STEP_MIN: f64 = 1e-3;
+/// Longest step of a trajectory that is not resampled, s.
+const STEP_MAX: f64 = 1.0;
 /// Longest duration that is resampled, s. With a longer duration, the trajectory would have more points than the
 /// controller can store, at any useful step.
 const DURATION_MAX: f64 = 86_400.0;
@@ -144,7 +150,7 @@ impl Samples {
             return Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot });
         }
         let step_ms = resampled_step(duration);
-        notes.push(format!("times are irregular or not whole milliseconds: resampled to {step_ms} ms"));
+        notes.push(format!("{}: resampled to {step_ms} ms", self.why_resampled()));
         let points = self.resample(&points, step_ms);
         Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot })
     }
@@ -172,11 +178,26 @@ impl Samples {
     fn regular_step(&self) -> Option<u16> {
         let [first, second, ..] = self.times[..] else { return Some(STEP_MS) };
         let step = ((second - first) * 1e3).round();
-        if !(1.0..=1000.0).contains(&step) {
+        if !(STEP_MIN * 1e3..=STEP_MAX * 1e3).contains(&step) {
             return None;
         }
         let regular = |(i, t): (usize, &f64)| (t - first - i as f64 * step * 1e-3).abs() < REGULAR;
         self.times.iter().enumerate().all(regular).then_some(step as u16)
+    }
+
+    /// Returns the reason why the times are not the times of a trajectory.
+    fn why_resampled(&self) -> String {
+        let (first, count) = (self.times[0], self.times.len());
+        let step = (self.times[count - 1] - first) / (count - 1) as f64;
+        // Many programs write three decimals, so that the times of a regular step are rounded to 1 ms.
+        let even = |(i, t): (usize, &f64)| (t - first - i as f64 * step).abs() < ROUNDED;
+        if step < STEP_MIN || !self.times.iter().enumerate().all(even) {
+            "times are irregular".to_owned()
+        } else if step > STEP_MAX {
+            format!("the step of {} s is longer than {STEP_MAX} s", figure(step))
+        } else {
+            format!("the step of {} ms is not whole milliseconds", figure(step * 1e3))
+        }
     }
 
     /// Returns the samples with their velocities and accelerations.
@@ -219,6 +240,12 @@ impl Samples {
         }
         out
     }
+}
+
+/// Formats a number with at most three decimals.
+fn figure(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// Returns 10 ms, or a longer step if a step of 10 ms would result in too many points.
@@ -276,6 +303,23 @@ mod tests {
         assert_eq!((fitted.trajectory.step_ms, fitted.trajectory.points.len()), (10, 201));
         agrees(&fitted, 1e-4, 5e-3, 0.4);
         assert_eq!(fitted.notes.len(), 2);
+    }
+
+    /// A regular step is not called irregular. The note contains the step, and the reason why the points are resampled.
+    #[test]
+    fn a_note_names_the_reason_for_resampling() {
+        let note = |step: f64, digits: f64| {
+            let times = (0..20).map(|i| (f64::from(i) * step * digits).round() / digits).collect();
+            samples(times, true).fit().unwrap().notes.pop().unwrap()
+        };
+        assert_eq!(note(2.0, 1e9), "the step of 2 s is longer than 1 s: resampled to 10 ms");
+        assert_eq!(
+            note(1.0 / 120.0, 1e9),
+            "the step of 8.333 ms is not whole milliseconds: resampled to 10 ms"
+        );
+        assert!(note(1.0 / 120.0, 1e3).contains("ms is not whole milliseconds"));
+        let irregular = samples(vec![0.0, 0.013, 0.05, 0.07], true).fit().unwrap();
+        assert_eq!(irregular.notes[1], "times are irregular: resampled to 10 ms");
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! JSON in the format of this project, and `trajectory_msgs/JointTrajectory` as JSON or YAML.
+//! JSON in the format of this project, and files that are JSON or YAML.
 
 use jtc_core::JOINTS;
 use serde::{Deserialize, Serialize};
 
+use super::document::{json, json_error, yaml};
 use super::fit::{FitError, Samples};
-use super::{Form, Loaded, Trajectory};
+use super::{ArmNames, Form, Loaded, Trajectory, message, times};
 use crate::file::{FileError, Place};
 
 /// JSON format of this project.
@@ -26,76 +27,27 @@ struct JsonPoint {
     acceleration_rad_s2: Option<[f64; JOINTS]>,
 }
 
-/// `trajectory_msgs/JointTrajectory`, alone or inside another message.
-#[derive(Deserialize)]
-struct RosForm {
-    joint_names: Option<Vec<String>>,
-    points: Option<Vec<RosPoint>>,
-    joint_trajectory: Option<Box<RosForm>>,
-    trajectory: Option<Box<RosForm>>,
-    goal: Option<Box<RosForm>>,
-}
-
-#[derive(Deserialize)]
-struct RosPoint {
-    #[serde(default)]
-    positions: Vec<f64>,
-    #[serde(default)]
-    velocities: Vec<f64>,
-    #[serde(default)]
-    accelerations: Vec<f64>,
-    time_from_start: RosTime,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum RosTime {
-    Parts {
-        #[serde(alias = "secs")]
-        sec: f64,
-        #[serde(alias = "nsecs", alias = "nsec", default)]
-        nanosec: f64,
-    },
-    Seconds(f64),
-}
-
-impl RosTime {
-    fn seconds(&self) -> f64 {
-        match self {
-            RosTime::Parts { sec, nanosec } => sec + nanosec * 1e-9,
-            RosTime::Seconds(s) => *s,
-        }
+/// Reads a file that is JSON.
+pub(super) fn read_json(text: &str, names: Option<ArmNames<'_>>) -> Result<Loaded, FileError> {
+    if !text.contains("position_rad") {
+        return message::read(&json(text)?, names);
     }
-}
-
-pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    let wrong = |e: serde_json::Error| FileError::at(Place::line(e.line()), format!("JSON: {e}"));
-    // The ROS format is tried only if the text is not in the format of this project.
-    match serde_json::from_str::<JsonForm>(text) {
-        Ok(form) => own(form),
-        Err(e) if text.contains("position_rad") => Err(wrong(e)),
-        Err(_) => ros(serde_json::from_str::<RosForm>(text).map_err(wrong)?, names),
-    }
-}
-
-pub(super) fn read_yaml(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    // The reader must accept more YAML nodes than by default, because a trajectory of 12,000 points has about 300,000
-    // nodes.
-    let options = serde_saphyr::options! {
-        budget: serde_saphyr::budget! { max_nodes: 2_000_000, max_events: 4_000_000 },
-        with_snippet: false,
+    // A list of points has no step of its own, so each point must have a time.
+    let form = if text.starts_with('[') {
+        serde_json::from_str(text).map(|points| JsonForm { step_ms: None, points })
+    } else {
+        serde_json::from_str(text)
     };
-    // `ros2 topic echo` writes a line of dashes after each message.
-    let text = text.trim_end().trim_end_matches("---");
-    let form = serde_saphyr::from_str_with_options::<RosForm>(text, options).map_err(|e| {
-        let line = e.location().map(|l| l.line() as usize);
-        let words = e.to_string();
-        FileError::at(
-            Place { line, ..Place::default() },
-            format!("YAML: {}", words.lines().next().unwrap_or("")),
-        )
-    })?;
-    ros(form, names)
+    match form {
+        Ok(form) => own(form),
+        Err(_) if json(text).is_ok_and(|values| values.len() > 1) => message::read(&json(text)?, names),
+        Err(e) => Err(json_error(&e, text)),
+    }
+}
+
+/// Reads a file that is YAML.
+pub(super) fn read_yaml(text: &str, names: Option<ArmNames<'_>>) -> Result<Loaded, FileError> {
+    message::read(&[yaml(text)?], names)
 }
 
 fn own(form: JsonForm) -> Result<Loaded, FileError> {
@@ -127,7 +79,7 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
 }
 
 /// Returns the values if all points have values. Returns `None` if no point has values.
-fn all_or_none<P, const N: usize>(
+pub(super) fn all_or_none<P, const N: usize>(
     points: &[P],
     name: &str,
     get: impl Fn(&P) -> Option<[f64; N]>,
@@ -146,46 +98,7 @@ fn all_or_none<P, const N: usize>(
     }
 }
 
-fn ros(form: RosForm, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    let RosForm { joint_names, points, joint_trajectory, trajectory, goal } = form;
-    if let Some(inner) = joint_trajectory.or(trajectory).or(goal) {
-        return ros(*inner, names);
-    }
-    let (Some(found), Some(points)) = (joint_names, points) else {
-        return Err(FileError::form(
-            "neither a trajectory of this program nor a JointTrajectory (joint_names and points)",
-        ));
-    };
-    let (order, mut notes) = joint_order(&found, names)?;
-    let mut samples = Samples::default();
-    let pick = |i: usize, name: &str, values: &[f64]| -> Result<Option<[f64; JOINTS]>, FileError> {
-        if values.is_empty() {
-            return Ok(None);
-        }
-        if values.len() != found.len() {
-            let problem = format!("{} values, but {} joint names", values.len(), found.len());
-            return Err(FileError::at(Place::name(format!("point {i}, {name}")), problem));
-        }
-        Ok(Some(order.map(|j| values[j])))
-    };
-    let mut channels = [Vec::new(), Vec::new()];
-    for (i, p) in points.iter().enumerate() {
-        samples.times.push(p.time_from_start.seconds());
-        let Some(position) = pick(i, "positions", &p.positions)? else {
-            return Err(FileError::at(Place::name(format!("point {i}, positions")), "missing"));
-        };
-        samples.position.push(position);
-        channels[0].push(pick(i, "velocities", &p.velocities)?);
-        channels[1].push(pick(i, "accelerations", &p.accelerations)?);
-    }
-    samples.velocity = all_or_none(&channels[0], "velocities", |v| *v)?;
-    samples.acceleration = all_or_none(&channels[1], "accelerations", |v| *v)?;
-    let mut loaded = finish(samples, Form::JointTrajectory)?;
-    notes.append(&mut loaded.notes);
-    Ok(Loaded { notes, ..loaded })
-}
-
-fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
+pub(super) fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
     if samples.times.is_empty() {
         return Err(FileError::form("no points"));
     }
@@ -205,65 +118,8 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
             let problem = format!("time {} s is not after {} s of the point before", times[i], times[i - 1]);
             Err(FileError::at(Place::name(format!("point {i}")), problem))
         }
-        Err(other) => Err(FileError::form(other.to_string())),
+        Err(other) => Err(FileError::form(other.to_string() + times::hint(&times, &other))),
     }
-}
-
-/// Returns the index in the file of each joint of the arm, from base to wrist.
-fn joint_order(
-    found: &[String],
-    names: Option<&[String; JOINTS]>,
-) -> Result<([usize; JOINTS], Vec<String>), FileError> {
-    let wrong = |problem: String| FileError::at(Place::name("joint_names"), problem);
-    let mut twice = found.iter().enumerate().filter(|(i, n)| found[..*i].contains(n));
-    if let Some((_, name)) = twice.next() {
-        return Err(wrong(format!("{name} occurs twice")));
-    }
-    let mut order = [0; JOINTS];
-    let by_name = |name: &String| found.iter().position(|f| f == name);
-    let mut notes = Vec::new();
-    let exact = names.and_then(|names| names.iter().map(by_name).collect::<Option<Vec<_>>>());
-    if let Some(exact) = exact {
-        order.copy_from_slice(&exact);
-    } else {
-        // Files for the same arm may use different prefixes in the joint names. Therefore only the number at the end
-        // of a name is used as the joint number.
-        let mut ends: Vec<(u32, usize)> =
-            found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
-        ends.sort_unstable();
-        let first = ends.first().map_or(0, |e| e.0);
-        let counted = ends.len() == JOINTS
-            && found.len() == JOINTS
-            && first <= 1
-            && ends.iter().enumerate().all(|(i, e)| e.0 == first + i as u32);
-        if !counted {
-            let expected = names.map_or("six names that end in 1..6".to_owned(), |n| n.join(", "));
-            return Err(wrong(format!("{} found; expected: {expected}", found.join(", "))));
-        }
-        for (to, (_, i)) in order.iter_mut().zip(ends) {
-            *to = i;
-        }
-        if names.is_some() {
-            notes.push(format!(
-                "joint names {}: used in the order of the numbers at their ends",
-                found.join(", ")
-            ));
-        }
-    }
-    if found.len() > JOINTS {
-        let extra: Vec<&str> =
-            found.iter().enumerate().filter(|(i, _)| !order.contains(i)).map(|(_, n)| n.as_str()).collect();
-        notes.push(format!("{} not of this arm: ignored", extra.join(", ")));
-    }
-    if !order.is_sorted() {
-        notes.push("the joints of the file have another order: sorted by their names".to_owned());
-    }
-    Ok((order, notes))
-}
-
-fn last_number(name: &str) -> Option<u32> {
-    let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-    name[name.len() - digits..].parse().ok()
 }
 
 impl Trajectory {

@@ -152,9 +152,12 @@ fn joint_trajectories_are_read_in_the_order_of_their_names() {
     assert_eq!(points[0].position, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
     assert!((points[150].position[1] - 0.3).abs() < 1e-9);
     let names = std::array::from_fn(|i| format!("arm_joint_{}", i + 1));
-    assert_eq!(Loaded::parse(ROS, Some(&names)).unwrap().trajectory, loaded.trajectory);
+    assert_eq!(
+        Loaded::parse(ROS, Some(ArmNames { arm: "", joints: &names })).unwrap().trajectory,
+        loaded.trajectory
+    );
     let other = ROS.replace("arm_joint_6", "elbow");
-    let text = Loaded::parse(&other, Some(&names)).unwrap_err().to_string();
+    let text = Loaded::parse(&other, Some(ArmNames { arm: "", joints: &names })).unwrap_err().to_string();
     assert!(text.contains("elbow") && text.contains("arm_joint_6"), "{text}");
 }
 

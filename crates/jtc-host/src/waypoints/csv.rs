@@ -5,11 +5,17 @@ use jtc_plan::kinematics::LegKind;
 
 use super::flange::{self, ANGLES, NAMES};
 use super::{FileWaypoint, Target, WaypointFile};
-use crate::file::{FileError, Place, number, rows, short};
+use std::borrow::Cow;
+
+use crate::file::{FileError, Place, number, short};
+use crate::table::{self, Unit, named, rows, units};
 
 /// Description of the known columns.
 pub(super) const KNOWN: &str = "expected q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
+
+/// Number of columns of a trajectory without a header.
+const TRAJECTORY_COLUMNS: usize = 19;
 
 /// Meaning of a table column, or of a key in a JSON object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +33,7 @@ pub(super) enum Column {
 #[derive(Default)]
 struct Header {
     names: Vec<String>,
-    time: Option<usize>,
+    time: Option<(usize, f64)>,
     pose: Option<usize>,
     leg: Option<usize>,
     joints: [Option<(usize, f64)>; JOINTS],
@@ -35,55 +41,68 @@ struct Header {
 }
 
 pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
-    let mut rows = rows(text);
-    let Some((line, names)) = rows.next() else {
+    let rows = rows(text);
+    let Some((line, names)) = rows.first() else {
         return Err(FileError::form("the file is empty, expected waypoints"));
     };
+    let line = *line;
     if names.iter().all(|name| name.parse::<f64>().is_ok()) {
+        let more = if names.len() == TRAJECTORY_COLUMNS {
+            "; 19 columns can be a trajectory, which `jtc traj run` runs directly"
+        } else {
+            ""
+        };
         let problem = format!(
-            "{} columns without a header: write q1,q2,q3,q4,q5,q6 before all other lines",
+            "{} columns without a header: write q1,q2,q3,q4,q5,q6 before all other lines{more}",
             names.len()
         );
         return Err(FileError::at(Place::line(line), problem));
     }
-    let header = header(line, &names)?;
-    let waypoints = rows.map(|(line, cells)| header.waypoint(line, &cells)).collect::<Result<Vec<_>, _>>()?;
+    let below = rows.get(1).filter(|row| row.1.len() == names.len()).and_then(|row| units(&row.1));
+    let header = header(line, names, below.as_deref().unwrap_or_default())?;
+    let rows = rows.iter().skip(1 + usize::from(below.is_some()));
+    let waypoints = rows.map(|(line, cells)| header.waypoint(*line, cells)).collect::<Result<Vec<_>, _>>()?;
     if waypoints.is_empty() {
         return Err(FileError::at(Place::line(line), "the file has a header but no waypoints"));
     }
-    let units_named = names.iter().any(|name| names_unit(name));
+    let angle = |unit: &Option<Unit>| matches!(unit, Some(Unit::Angle(..)));
+    let units_named = names.iter().any(|name| names_unit(name)) || below.iter().flatten().any(angle);
     Ok(WaypointFile { waypoints, units_named, ..WaypointFile::default() })
 }
 
 /// Returns `true` if the name of a column contains a unit of angle, in upper or lower case.
 pub(super) fn names_unit(name: &str) -> bool {
-    let name = name.to_ascii_lowercase();
-    name.contains("_deg") || name.contains("_rad")
+    matches!(named(name).1, Ok(Some(Unit::Angle(..))))
 }
 
 /// Returns the column with this name, in upper or lower case, and the factor that converts its unit to s, m or rad.
 pub(super) fn column(name: &str) -> Option<(Column, f64)> {
-    let name = name.trim_matches('"').to_ascii_lowercase();
-    match name.as_str() {
-        "t" | "t_s" | "time" | "time_s" => return Some((Column::Time, 1.0)),
-        "pose" | "name" => return Some((Column::Pose, 1.0)),
-        "leg" => return Some((Column::Leg, 1.0)),
-        _ => {}
-    }
-    let metres = name.strip_suffix("_m").unwrap_or(&name);
+    let name = name.trim().to_lowercase();
+    // Metres are not a unit of the table of units, because only the position of the flange has this unit.
+    let metres = ["_m", " (m)", "(m)", " [m]", "[m]"].into_iter().find_map(|unit| name.strip_suffix(unit));
+    let metres = metres.unwrap_or(&name);
     if let Some(i) = NAMES[..ANGLES.start].iter().position(|known| *known == metres) {
         return Some((Column::Flange(i), 1.0));
     }
-    let (name, unit) = match (name.strip_suffix("_rad"), name.strip_suffix("_deg")) {
-        (Some(head), _) => (head, 1.0),
-        (_, Some(head)) => (head, 1f64.to_radians()),
-        _ => (name.as_str(), 1.0),
-    };
-    if let Some(i) = NAMES[ANGLES].iter().position(|known| *known == name) {
-        return Some((Column::Flange(ANGLES.start + i), unit));
+    let (base, unit) = named(&name);
+    let unit = unit.ok()?;
+    match (base.as_str(), unit) {
+        ("t" | "time", None) => return Some((Column::Time, 1.0)),
+        ("t" | "time", Some(Unit::Time(factor))) => return Some((Column::Time, factor)),
+        ("pose" | "name", None) => return Some((Column::Pose, 1.0)),
+        ("leg", None) => return Some((Column::Leg, 1.0)),
+        _ => {}
     }
-    let joint = name.strip_prefix('q')?.parse::<usize>().ok()?;
-    (1..=JOINTS).contains(&joint).then(|| (Column::Joint(joint - 1), unit))
+    let factor = match unit {
+        None => 1.0,
+        Some(Unit::Angle(factor, 0)) => factor,
+        Some(_) => return None,
+    };
+    if let Some(i) = NAMES[ANGLES].iter().position(|known| *known == base) {
+        return Some((Column::Flange(ANGLES.start + i), factor));
+    }
+    let joint = base.strip_prefix('q')?.parse::<usize>().ok()?;
+    (1..=JOINTS).contains(&joint).then(|| (Column::Joint(joint - 1), factor))
 }
 
 /// Returns `true` if waypoint files have a column of this name.
@@ -91,7 +110,18 @@ pub(crate) fn is_column(name: &str) -> bool {
     column(name).is_some()
 }
 
-fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
+/// Returns the factor to s or rad of a column for the unit in the row below the names.
+fn factor(column: Column, unit: f64, below: Option<Unit>) -> Option<f64> {
+    match (column, below) {
+        (_, None) => Some(unit),
+        (Column::Time, Some(Unit::Time(factor))) => Some(factor),
+        (Column::Joint(_), Some(Unit::Angle(factor, 0))) => Some(factor),
+        (Column::Flange(k), Some(Unit::Angle(factor, 0))) if k >= ANGLES.start => Some(factor),
+        _ => None,
+    }
+}
+
+fn header(line: usize, names: &[Cow<'_, str>], below: &[Option<Unit>]) -> Result<Header, FileError> {
     let mut header = Header { names: names.iter().map(|name| short(name)).collect(), ..Header::default() };
     for (i, name) in names.iter().enumerate() {
         let wrong = |problem: String| {
@@ -107,8 +137,15 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
             };
             return Err(wrong(problem));
         };
+        let below = below.get(i).copied().flatten();
+        let stated = named(name).1.ok().flatten();
+        let unit =
+            factor(column, unit, below).filter(|_| stated.is_none() || below.is_none() || stated == below);
+        let Some(unit) = unit else {
+            return Err(wrong("the unit in the row below this name is not valid for the column".into()));
+        };
         let before = match column {
-            Column::Time => header.time.replace(i).is_some(),
+            Column::Time => header.time.replace((i, unit)).is_some(),
             Column::Pose => header.pose.replace(i).is_some(),
             Column::Leg => header.leg.replace(i).is_some(),
             Column::Joint(j) => header.joints[j].replace((i, unit)).is_some(),
@@ -129,14 +166,15 @@ fn header(line: usize, names: &[&str]) -> Result<Header, FileError> {
 }
 
 impl Header {
-    fn waypoint(&self, line: usize, cells: &[&str]) -> Result<FileWaypoint, FileError> {
+    fn waypoint(&self, line: usize, cells: &[Cow<'_, str>]) -> Result<FileWaypoint, FileError> {
         if cells.len() != self.names.len() {
-            let problem = format!("{} columns, but the header has {}", cells.len(), self.names.len());
+            let why = table::decimal_comma(cells, self.names.len());
+            let problem = format!("{} columns, but the header has {}{why}", cells.len(), self.names.len());
             return Err(FileError::at(Place::line(line), problem));
         }
-        let value = |i: usize| number(cells[i], || Place::cell(line, i + 1).named(&self.names[i]));
+        let value = |i: usize| number(&cells[i], || Place::cell(line, i + 1).named(&self.names[i]));
         let time = match self.time {
-            Some(i) if !cells[i].is_empty() => Some(value(i)?),
+            Some((i, unit)) if !cells[i].is_empty() => Some(unit * value(i)?),
             _ => None,
         };
         let leg = match self.leg {
@@ -183,13 +221,13 @@ impl Header {
     }
 
     /// Returns a flange pose, or only its position if `point` is set. Empty cells are treated as missing.
-    fn flange(&self, line: usize, cells: &[&str], point: bool) -> Result<Target, FileError> {
+    fn flange(&self, line: usize, cells: &[Cow<'_, str>], point: bool) -> Result<Target, FileError> {
         let mut given = [None; NAMES.len()];
         for (to, column) in given.iter_mut().zip(&self.flange) {
             if let Some((i, unit)) = column
                 && !cells[*i].is_empty()
             {
-                *to = Some(unit * number(cells[*i], || Place::cell(line, i + 1).named(&self.names[*i]))?);
+                *to = Some(unit * number(&cells[*i], || Place::cell(line, i + 1).named(&self.names[*i]))?);
             }
         }
         let wrong = |problem: String| FileError::at(Place::line(line), problem);

@@ -12,6 +12,7 @@ use super::csv::{Column, KNOWN, column, names_unit};
 use super::flange::{self, NAMES};
 use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place, short};
+use crate::trajectory::document::json_error;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -34,18 +35,12 @@ struct Entry {
 }
 
 pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
-    let wrong = |e: serde_json::Error| {
-        let place = Place { line: Some(e.line()), column: Some(e.column()), name: None };
-        let words = e.to_string();
-        let words = words.rsplit_once(" at line ").map_or(words.as_str(), |(words, _)| words);
-        FileError::at(place, format!("JSON: {words}"))
-    };
     let entries = if text.starts_with('[') {
         serde_json::from_str::<Vec<Entry>>(text)
     } else {
         serde_json::from_str::<Whole>(text).map(|whole| whole.waypoints)
     };
-    let entries = entries.map_err(wrong)?;
+    let entries = entries.map_err(|e| json_error(&e, text))?;
     if entries.is_empty() {
         return Err(FileError::form("no waypoints"));
     }
@@ -84,7 +79,7 @@ impl<'de> Visitor<'de> for Keys {
             let given = match column {
                 Column::Pose => set(&mut entry.pose, map.next_value()?),
                 Column::Leg => set(&mut entry.leg, map.next_value()?),
-                Column::Time => set(&mut entry.time, map.next_value()?),
+                Column::Time => set(&mut entry.time, map.next_value::<Option<f64>>()?.map(|t| unit * t)),
                 Column::Joint(j) => {
                     set(&mut entry.joints[j], map.next_value::<Option<f64>>()?.map(|v| unit * v))
                 }

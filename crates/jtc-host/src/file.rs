@@ -207,7 +207,7 @@ impl Diagnose for FileError {
                  example"
                     .into()
             }
-            FileError::Foreign { path, form, .. } => form.next(&path.display().to_string()),
+            FileError::Foreign { path, form, .. } => form.next(&path.display().to_string()).into(),
             FileError::JointNames { numbered: true, .. } => next!(
                 "name the arm of this file, or use {} to take the joints in the order of the numbers in their names",
                 JointsByNumber

@@ -83,6 +83,9 @@ impl Header {
     }
 }
 
+/// Columns of one channel: for each joint, the index of its column and the factor to rad.
+type Columns = [(usize, f64); JOINTS];
+
 impl Reader<'_> {
     fn wrong(&self, i: usize, problem: impl Into<String>) -> FileError {
         let name = format!("\"{}\"", short(&self.cells[i]));
@@ -304,11 +307,7 @@ impl Reader<'_> {
         Ok((order.map(|i| keys[i].clone()), notes))
     }
 
-    fn channels(
-        &self,
-        group: &Group,
-        order: [Key; JOINTS],
-    ) -> Result<[Option<[(usize, f64); JOINTS]>; 3], FileError> {
+    fn channels(&self, group: &Group, order: [Key; JOINTS]) -> Result<[Option<Columns>; 3], FileError> {
         let mut channels = [None; 3];
         for (c, (to, columns)) in channels.iter_mut().zip(&group.0).enumerate() {
             if columns.is_empty() {

@@ -326,7 +326,7 @@ fn j40_a_mimic_joint_is_right_at_any_place_or_refused() {
             ),
         )
     };
-    let six = ArmChoice { joints: Some((1..=6).map(|n| format!("j{n}")).collect()), tip: None };
+    let six = ArmChoice { joints: Some((1..=6).map(|n| format!("j{n}")).collect()), ..ArmChoice::default() };
     let read = |mimic: &str| Arm::import_text(&between(mimic), &six);
     let error = read("<mimic joint=\"j2\" multiplier=\"-1\"/>").unwrap_err().to_string();
     assert!(

@@ -3,7 +3,7 @@
 usage: check_readers.py JTC RECORDING.mcap
 
 Needs `mcap`, `mcap-ros2-support` and `rosbags` from PyPI. Each channel must have a schema: ROS 2's own programs refuse the whole file
-if one channel has none. JTC is the command `jtc`. It runs a simulated arm, and records a run, a repeated run and the flight recorder.
+if one channel has none. JTC is the command `jtc`. The check runs a simulated arm, and records a run, a repeated run and the flight recorder.
 """
 
 import subprocess

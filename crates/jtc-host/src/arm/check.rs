@@ -250,7 +250,7 @@ impl Arm {
             );
         }
         let (torque, step) = (self.joints[joint.index()].torque_max, TORQUE_STEP);
-        if torque < FEW_STEPS * step {
+        if torque < FEW_STEPS * step && !self.lacks(joint, "torque_max_nm") {
             let what = format!(
                 "{}, torque_max_nm: {torque} N·m are {:.0} steps of the joint bus, which has {step:.3} N·m",
                 self.titled(joint),
@@ -273,7 +273,7 @@ impl Arm {
             for setting in settings::TABLE.iter().filter(|setting| setting.of_joint() && setting.of_arm()) {
                 let Some(value) = setting.get(&config, joint.number()) else { continue };
                 let (low, high) = (setting.low, setting.high);
-                if !(low..=high).contains(&value) {
+                if !(low..=high).contains(&value) && !self.lacks(joint, setting.name) {
                     let what =
                         format!("{}, {}: {value} is outside {low}..{high}", self.titled(joint), setting.name);
                     let limit = if value < low { low } else { high };

@@ -160,9 +160,9 @@ impl Arm {
                     self.lacking.push(Lacking::OfJoint(joint, key));
                 }
             }
-            let to = &mut self.joints[joint.index()];
             if self.sources.of((Some(joint), "torque_max_nm")) == Source::Default {
-                to.torque_max = 0.0;
+                self.joints[joint.index()].torque_max = 0.0;
+                self.correct_effort_warning(joint.index(), "the rule for torque_max_nm needs the masses");
             }
         }
     }
@@ -255,12 +255,17 @@ impl Arm {
             let fine = rounded(1.01 * torque, 3).min(drive);
             let coarse = rounded(torque, 2);
             self.joints[j].torque_max = if coarse < enough { fine } else { coarse };
-            let place = format!("joint {}", self.joint_names[j]);
-            let assumed = |w: &&mut Warning| w.place == place && w.problem.starts_with("effort limit");
-            if let Some(warning) = self.warnings.iter_mut().find(assumed) {
-                let given = warning.problem.split(':').next().unwrap_or_default();
-                warning.problem = format!("{given}: {} N·m is used", self.joints[j].torque_max);
-            }
+            self.correct_effort_warning(j, &format!("{} N·m is used", self.joints[j].torque_max));
+        }
+    }
+
+    /// Corrects the warning about a missing effort of a joint, which was written before the rules were applied.
+    fn correct_effort_warning(&mut self, joint: usize, what: &str) {
+        let place = format!("joint {}", self.joint_names[joint]);
+        let assumed = |w: &&mut Warning| w.place == place && w.problem.starts_with("effort limit");
+        if let Some(warning) = self.warnings.iter_mut().find(assumed) {
+            let given = warning.problem.split(':').next().unwrap_or_default();
+            warning.problem = format!("{given}: {what}");
         }
     }
 

@@ -12,7 +12,7 @@ export interface components {
             joint: number;
             /**
              * Format: double
-             * @description Position of the joint in the model, rad.
+             * @description Assumed position of the absent joint in the arm model, rad.
              */
             position_rad: number;
         };
@@ -101,10 +101,10 @@ export interface components {
             phase: string;
             /** @description Number of segments of the motion. */
             segments: number;
-            /** @description Number of segments that the controller has. */
+            /** @description Number of segments that the controller has confirmed. */
             segments_done: number;
         } | {
-            /** @description Number of bytes on the line. */
+            /** @description Number of bytes of all segments. */
             bytes: number;
             /**
              * Format: u-int64
@@ -199,7 +199,7 @@ export interface components {
         };
         /** @description Arm that the controller uses. */
         ArmObject: {
-            /** @description Hash of all parameters that decide how the arm moves. */
+            /** @description Hash of all parameters that determine how the arm moves. */
             hash: string;
             /** @description Name of the arm. */
             name: string;
@@ -209,8 +209,8 @@ export interface components {
         /** @description Arm to send to the controller. */
         ArmRequest: {
             /**
-             * @description `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
-             *     afterwards.
+             * @description `true`: store the arm in non-volatile memory. While the controller stores the arm, the arm has no torque.
+             *     Afterwards, the controller stays in Init.
              */
             store?: boolean;
             /** @description Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints. */
@@ -254,7 +254,7 @@ export interface components {
             /** @description Problems, worst first. */
             problems: components["schemas"]["ProblemObject"][];
         };
-        /** @description Nodes whose errors to clear. */
+        /** @description Nodes whose errors are to be cleared. */
         ClearRequest: {
             /** @description `true` for the gripper. */
             gripper?: boolean;
@@ -278,11 +278,11 @@ export interface components {
              *     trajectory until the drives of these joints are reset.
              */
             encoder_jumped?: number[];
-            /** @description Codes of these errors, in the same order, for `GET /api/explain/{code}`. */
+            /** @description Codes of the current errors, in the order of `errors`, for `GET /api/explain/{code}`. */
             error_codes: string[];
             /** @description Current errors. */
             errors: string[];
-            /** @description Errors that have occurred since they were last cleared. */
+            /** @description Errors that have occurred since the list of occurred errors was last cleared. */
             errors_occurred: string[];
             held_stop?: components["schemas"]["HeldStopObject"] | null;
             /** @description Joints, from the base. */
@@ -312,7 +312,7 @@ export interface components {
             listened_s: number;
             /**
              * Format: u-int64
-             * @description Number of statuses received in this time.
+             * @description Number of statuses received during the listening time.
              */
             statuses: number;
         };
@@ -337,7 +337,10 @@ export interface components {
              * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description Message for people: request, joint, board or point, value and limit. */
+            /**
+             * @description Message for people. As far as they apply, it contains the request, the joint, board or point, the value and
+             *     the limit.
+             */
             message: string;
             /** @description Next step. */
             next: string;
@@ -385,11 +388,11 @@ export interface components {
         FindingObject: {
             /** @description Next step; empty if no action is needed. */
             next: string;
-            /** @description `problem`, `warning` or `good`. */
+            /** @description Severity: `problem`, `warning` or `good`. */
             severity: string;
             /** @description Text of the finding. */
             what: string;
-            /** @description Usual cause; empty if no cause is known. */
+            /** @description Probable cause; empty if no cause is known. */
             why: string;
         };
         /** @description Pose of the flange in the frame of the base. */
@@ -410,7 +413,7 @@ export interface components {
         GivenObject: {
             /** @description Hash of the arm, if all parameters were read back without a difference. */
             hash?: string | null;
-            /** @description `true` if the controller has the name of the arm. */
+            /** @description `true` if the controller has confirmed the name of the arm. */
             named: boolean;
             /** @description Friction, gains and model, as far as the controller confirmed them. */
             parts: components["schemas"]["PartObject"][];
@@ -428,7 +431,7 @@ export interface components {
             code: string;
             /**
              * Format: u-int8
-             * @description First joint with the cause, counted from 1; missing: no particular joint.
+             * @description First joint in which the cause occurred, counted from 1; missing if the cause does not concern a joint.
              */
             joint?: number | null;
             /**
@@ -486,7 +489,7 @@ export interface components {
             extension: number;
             /** @description Version of the firmware. */
             firmware: string;
-            /** @description Hash of all parameters that decide how the arm moves. */
+            /** @description Hash of all parameters that determine how the arm moves. */
             hash: string;
             /**
              * Format: u-int32
@@ -504,7 +507,7 @@ export interface components {
              */
             uptime_s: number;
         };
-        /** @description Job: a request that continues after its answer. */
+        /** @description Job: work of the agent that continues after the answer to its request. */
         JobObject: {
             /** @description Name of the client that requested it. */
             client: string;
@@ -538,7 +541,7 @@ export interface components {
         };
         /** @description Status of a joint. */
         JointObject: {
-            /** @description Codes of these errors, in the same order, for `GET /api/explain/{code}`. */
+            /** @description Codes of the errors of this joint, in the order of `errors`, for `GET /api/explain/{code}`. */
             error_codes: string[];
             /** @description Errors of this joint that the controller has detected. */
             errors: string[];
@@ -594,7 +597,7 @@ export interface components {
             position_min_rad: number;
             /**
              * Format: double
-             * @description Largest absolute torque by the model, N·m.
+             * @description Largest absolute torque that the model predicts, N·m.
              */
             torque_peak_nm?: number | null;
             /**
@@ -635,7 +638,7 @@ export interface components {
         };
         /** @description Number and name of a planned trajectory. */
         KeepRequest: {
-            /** @description Name for people: the first 64 characters. */
+            /** @description Name of the trajectory for users. The agent uses the first 64 characters. */
             name: string;
             /** @description `true`: refuse the plan if the number is taken, and replace nothing. */
             new?: boolean;
@@ -647,7 +650,7 @@ export interface components {
         };
         /** @description Client that holds the lease or waits for it. */
         LeaseGrant: {
-            /** @description `true` if the client holds the lease; otherwise it waits until the holder releases it. */
+            /** @description `true` if the client holds the lease; `false` if it waits until the lease holder releases the lease. */
             held: boolean;
             /** @description Secret key, which this client sends with each request in the header `Lease-Key`. */
             key: string;
@@ -688,7 +691,7 @@ export interface components {
              * @description Time without a request of this client after which the lease lapses, s.
              */
             lasts_s?: number;
-            /** @description Name of the client for people: the first 64 characters. */
+            /** @description Name of the client for users. The agent uses the first 64 characters. */
             name: string;
             /** @description Policy for a motion after the lease has lapsed. */
             policy?: components["schemas"]["Policy"];
@@ -728,7 +731,10 @@ export interface components {
             /** @description State in words: recording, or the reason why the recorder has stopped. */
             state: string;
         };
-        /** @description Values of the log in columns of the same length. A row is a tick: 1000 rows per second. An unknown value is null. */
+        /**
+         * @description Values of the log in columns of the same length. Each row is one tick of the controller, at 1000 rows per second.
+         *     An unknown value is null.
+         */
         LogValues: {
             /** @description Joints, base to wrist. */
             joints: components["schemas"]["LogJoint"][];
@@ -761,7 +767,7 @@ export interface components {
             temperature_c: number;
             /**
              * Format: double
-             * @description Time, s from the start.
+             * @description Time of the smallest margin, s from the start.
              */
             time_s: number;
             /**
@@ -830,7 +836,7 @@ export interface components {
             flange: components["schemas"]["FrameObject"];
             /** @description Acceleration of gravity in the frame of the base, m/s². */
             gravity_m_s2: number[];
-            /** @description Hash of all parameters that decide how the arm moves; missing if the agent's arm lacks one of them. */
+            /** @description Hash of all parameters that determine how the arm moves; missing if the agent's arm lacks one of them. */
             hash?: string | null;
             /** @description Joints, from the base. Each rotates about the z axis of its frame. */
             joints: components["schemas"]["ModelJoint"][];
@@ -846,7 +852,7 @@ export interface components {
          * @enum {string}
          */
         ModelSource: "controller" | "agent";
-        /** @description Move from the current position to one of the three targets. */
+        /** @description Move from the current position to one of three targets: joint positions, a named pose, or a pose of the flange. */
         MoveRequest: {
             /** @description `true`: accept a controller that cannot report its limits. Its built-in limits must be safe for this arm. */
             accept_device_limits?: boolean;
@@ -893,7 +899,7 @@ export interface components {
             time_s: number;
             /**
              * Format: u-int32
-             * @description Number of intended transmissions; a friction table is sent twice.
+             * @description Number of times that the frame must be sent: 2 for a friction table, otherwise 1.
              */
             times: number;
         };
@@ -922,7 +928,7 @@ export interface components {
             joints: components["schemas"]["JointPlan"][];
             kept?: components["schemas"]["TrajectoryObject"] | null;
             margin?: components["schemas"]["MarginObject"] | null;
-            /** @description Changes and hints in words. */
+            /** @description Notes for the user, for example about options that have no effect. */
             notes: string[];
             /** @description Number of points. */
             points: number;
@@ -944,14 +950,14 @@ export interface components {
         PlanRequest: {
             /**
              * Format: double
-             * @description Largest distance from a waypoint for rounding the corner between two lines or arcs, m. 0: the arm stops at the
-             *     waypoint.
+             * @description Size of a rounded corner between two lines or arcs, m: the largest distance of the flange from the waypoint in
+             *     the corner. 0: the arm stops at the waypoint.
              */
             blend_m?: number;
             /**
              * Format: double
-             * @description Largest distance from a waypoint for rounding its corner, rad. The joint that is furthest from the waypoint counts.
-             *     0: the arm stops at each waypoint.
+             * @description Size of a rounded corner, rad: the path leaves the straight legs only within this distance from the waypoint.
+             *     The distance is that of the joint that is furthest from the waypoint. 0: the arm stops at each waypoint.
              */
             blend_rad?: number;
             /** @description `true` if the angles are in degrees. */
@@ -965,8 +971,8 @@ export interface components {
              */
             margin_percent?: number;
             /**
-             * @description `true`: the acceleration may change within 20 ms instead of 100 ms. The motion is faster, and harder on gears and
-             *     load.
+             * @description `true`: the acceleration may change within 20 ms instead of 100 ms. The motion is faster, and stresses gears
+             *     and payload more.
              */
             no_jerk_limit?: boolean;
             payload?: components["schemas"]["PayloadObject"] | null;
@@ -977,7 +983,7 @@ export interface components {
             speed_percent?: number;
             /**
              * Format: double
-             * @description Lowest bearing temperature of a run, °C; cold bearings need more torque.
+             * @description Lowest bearing temperature that is expected during a run, °C; cold bearings need more torque.
              */
             temperature_c?: number;
             /**
@@ -1080,10 +1086,10 @@ export interface components {
             last_held_stop?: components["schemas"]["HeldStopObject"] | null;
             /**
              * Format: float
-             * @description Rate of path time, path seconds per second; 0 if no trajectory is executed.
+             * @description Speed along the path, in seconds of trajectory time per second of real time; 0 if no trajectory is executed.
              */
             path_rate: number;
-            /** @description Joints that yield to a push or lower a load, counted from 1. */
+            /** @description Joints, counted from 1, that yield to a push (J-68) or lower their load because of an overload (J-70). */
             yields: number[];
         };
         /** @description Options of a recovery. */
@@ -1139,7 +1145,10 @@ export interface components {
              *     controller.
              */
             approach?: boolean;
-            /** @description Digest of the trajectory that the client saw. The agent refuses the run if the number now has another trajectory. */
+            /**
+             * @description Digest of the trajectory that the client saw. The agent refuses the run if another trajectory is now stored
+             *     under the number.
+             */
             digest?: string | null;
             policy?: components["schemas"]["Policy"] | null;
             /**
@@ -1235,7 +1244,8 @@ export interface components {
         StatusObject: {
             /**
              * Format: u-int64
-             * @description Age of the last status, ms; missing before the first one. Values of an old status are not current.
+             * @description Age of the last status, ms; missing before the first status. At a high age, the values of the status are not
+             *     current.
              */
             age_ms?: number | null;
             /** @description Number that identifies this run of the agent. */
@@ -1307,7 +1317,12 @@ export interface components {
         TrajectoryRequest: {
             /** @description `true` if the angles are in degrees. */
             degrees?: boolean;
-            /** @description Name for people: the first 64 characters. */
+            /**
+             * @description `true` if the numbers in the names of the joints determine their order. Otherwise, the agent refuses a file that
+             *     names the joints of another arm.
+             */
+            joints_by_number?: boolean;
+            /** @description Name of the trajectory for users. The agent uses the first 64 characters. */
             name: string;
             /**
              * @description Text of a file in a format that `jtc traj run` accepts: CSV with a time column and joints, JSON, or a ROS

@@ -3,7 +3,7 @@ export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description Board as it answered after a command. */
+        /** @description State of a board, as the board reports it after a command. */
         AnswerObject: {
             /**
              * Format: u-int8
@@ -17,9 +17,9 @@ export interface components {
             /** @description Names of the status bits that are set. */
             status: string[];
         };
-        /** @description Board as last seen. */
+        /** @description Last known state of a board. */
         BoardObject: {
-            /** @description `true` if its outputs were enabled in its last report. */
+            /** @description `true` if the outputs of the board were enabled in its last report. */
             active: boolean;
             /** @description `true` if it has an application. */
             application: boolean;
@@ -39,7 +39,7 @@ export interface components {
             flash_number?: number | null;
             /**
              * Format: u-int64
-             * @description Number of its frames in the last second.
+             * @description Number of frames of this board in the last second.
              */
             frames_per_s: number;
             /** @description State of its heartbeats: `alive`, `late`, `lost`, or `none` if no heartbeats are expected. */
@@ -80,7 +80,8 @@ export interface components {
             kind: "halt";
             /**
              * Format: u-int64
-             * @description Number of Stops within 0.1 s up to this Stop; missing: a single Stop.
+             * @description Number of Stops that this event reports together, because they followed within 0.1 s; missing: a single
+             *     Stop.
              */
             times?: number | null;
         } | {
@@ -88,7 +89,10 @@ export interface components {
             boards: number[];
             /** @enum {string} */
             kind: "stopped";
-            /** @description Boards that may still run, each with the reason. This includes boards that ran and do not answer now. */
+            /**
+             * @description Boards that possibly still run, each with the reason. These include boards that ran before and do not
+             *     answer now.
+             */
             not_stopped: string[];
         } | {
             /**
@@ -189,12 +193,12 @@ export interface components {
             boards: number[];
             /**
              * Format: u-int64
-             * @description Number of accepted bytes of both cycles.
+             * @description Number of bytes, of both cycles, that the boards have confirmed in this attempt.
              */
             bytes: number;
             /**
              * Format: u-int32
-             * @description Cycle; 1: checked, 2: written.
+             * @description Cycle of the update. In cycle 1 the boards check the image; in cycle 2 they write it.
              */
             cycle: number;
             /**
@@ -206,7 +210,7 @@ export interface components {
             kind: "progress";
             /**
              * Format: u-int64
-             * @description Number of bytes of both cycles.
+             * @description Number of bytes that the agent sends in both cycles.
              */
             total: number;
         } | {
@@ -230,9 +234,9 @@ export interface components {
         };
         /** @description State of this computer's CAN controller. */
         ControllerObject: {
-            /** @description `true` if it is bus-off. */
+            /** @description `true` if the CAN controller is bus-off. */
             bus_off: boolean;
-            /** @description `true` if it is error passive. */
+            /** @description `true` if the CAN controller is error passive. */
             passive: boolean;
             /**
              * Format: u-int16
@@ -271,7 +275,10 @@ export interface components {
              * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description Message for people: request, joint, board or point, value and limit. */
+            /**
+             * @description Message for people. As far as they apply, it contains the request, the joint, board or point, the value and
+             *     the limit.
+             */
             message: string;
             /** @description Next step. */
             next: string;
@@ -339,7 +346,7 @@ export interface components {
             /** @description Probable cause; empty if no cause is known. */
             why: string;
         };
-        /** @description Board as it answered. */
+        /** @description Board that has answered during a scan or a numbering. */
         FoundObject: {
             /** @description Description that the board reports. */
             description?: string | null;
@@ -395,7 +402,7 @@ export interface components {
         };
         /** @description Client that holds the lease or waits for it. */
         LeaseGrant: {
-            /** @description `true` if the client holds the lease; otherwise it waits until the holder releases it. */
+            /** @description `true` if the client holds the lease; `false` if it waits until the lease holder releases the lease. */
             held: boolean;
             /** @description Secret key, which this client sends with each request in the header `Lease-Key`. */
             key: string;
@@ -433,7 +440,7 @@ export interface components {
              * @description Time without a request of this client after which the lease lapses, s.
              */
             lasts_s?: number;
-            /** @description Name of the client for people: the first 64 characters. */
+            /** @description Name of the client for users. The agent uses the first 64 characters. */
             name: string;
             /** @description Policy for running boards after the lease has lapsed. */
             policy?: components["schemas"]["Policy"];
@@ -556,7 +563,7 @@ export interface components {
             boards: number;
             /** @description Name of the bus. */
             bus: string;
-            /** @description `true` if another PC commands on this bus. */
+            /** @description `true` if another PC sends commands on this bus. */
             competing_master: boolean;
             controller?: components["schemas"]["ControllerObject"] | null;
             /**
@@ -565,8 +572,8 @@ export interface components {
              */
             foreign_frames: number;
             /**
-             * @description `true` if this agent sends heartbeats. The agent sends them after a command of the lease holder, and while boards
-             *     that the agent has started are not stopped.
+             * @description `true` if this agent sends heartbeats. The agent sends them after a command of the lease holder, and as long as
+             *     a board that it has started is not stopped.
              */
             is_master: boolean;
             /**
@@ -628,11 +635,13 @@ export interface components {
             boards: components["schemas"]["UpdatedObject"][];
             /**
              * Format: u-int64
-             * @description Number of bytes of both cycles.
+             * @description Number of bytes that the agent sends in both cycles of the update.
              */
             bytes: number;
             /** @description `true` if the agent sent only requests that change nothing. */
             dry_run: boolean;
+            /** @description Changes that the agent made to the images, such as a gap that it filled. */
+            notes: string[];
             /**
              * Format: u-int16
              * @description Program ID that the boards must show; missing: not known.
@@ -660,8 +669,12 @@ export interface components {
              * @description Program ID that the boards must show at the end.
              */
             expect_program_id?: number | null;
-            /** @description `true`: fill gaps between records with FF. */
-            fill_gaps?: boolean;
+            /**
+             * Format: u-int8
+             * @description Byte that fills gaps between records, for example 255, the erased state of flash; missing: an image with a gap
+             *     is refused.
+             */
+            fill_gaps?: number | null;
             /** @description `true`: update even if boards run, another PC is on the bus, or the board already shows the program. */
             force?: boolean;
             format?: components["schemas"]["ImageFormat"] | null;
@@ -671,7 +684,7 @@ export interface components {
             image: string;
             /** @description `true`: update even if the board already shows the program; all checks still apply. */
             rewrite?: boolean;
-            /** @description Image of the other cycle, as base64, if the profile's plan sends two images. */
+            /** @description Second image, as base64; needed only if the plan of the profile sends a different image in each cycle. */
             second?: string | null;
             /** @description `true`: start the application at the end. */
             start?: boolean;
@@ -715,8 +728,8 @@ export interface components {
              */
             time_s: number;
             /**
-             * @description `true` if the board shows Program ID and date of the image, and exactly this image was written to this address, now
-             *     or before. The records of the agent or its inventory show this.
+             * @description `true` if the result is verified: the board reports the Program ID and date of the image. In addition, the
+             *     records show that exactly this image was written to this address, in this update or in an earlier one.
              */
             verified: boolean;
         };

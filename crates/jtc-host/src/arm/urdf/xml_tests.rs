@@ -215,6 +215,8 @@ fn missing_masses_are_all_listed_and_the_file_is_written() {
             assert!(all.contains(&"mass_kg: missing for links l2, l4"), "{all:?}");
             assert!(all.contains(&"inertia_kg_m2: missing for links l2, l4"), "{all:?}");
             assert!(!checked.findings.iter().any(|f| f.finding.severity == Severity::Good), "{all:?}");
+            // A value that the file lacks is missing, not 0.
+            assert!(checked.findings.iter().all(|f| f.value != Some(0.0)), "{all:?}");
         }
     }
     let no_inertia = arm().replacen(

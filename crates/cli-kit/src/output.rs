@@ -8,7 +8,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-use host_kit::visible;
+use host_kit::{visible, visible_in_line};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -246,6 +246,9 @@ fn table_within(head: &[&str], rows: &[Vec<String>], width: Option<u16>) -> Stri
 }
 
 fn whole_table(head: &[&str], rows: &[Vec<String>]) -> String {
+    // A text from a bus or a file must not look like another row.
+    let rows: Vec<Vec<String>> =
+        rows.iter().map(|row| row.iter().map(|cell| visible_in_line(cell).into_owned()).collect()).collect();
     let right: Vec<bool> = head.iter().map(|h| h.starts_with('>')).collect();
     let head: Vec<&str> = head.iter().map(|h| h.trim_start_matches('>')).collect();
     let width = |i: usize| {
@@ -265,7 +268,7 @@ fn whole_table(head: &[&str], rows: &[Vec<String>]) -> String {
     };
     let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
     let mut text = line(&head) + "\n";
-    for row in rows {
+    for row in &rows {
         text += &(line(row) + "\n");
     }
     text

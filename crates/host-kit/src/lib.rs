@@ -26,4 +26,4 @@ pub use kind::ErrorKind;
 pub use next::{Action, FrontEnd, Next};
 pub use suggest::{nearest, similarity};
 pub use user_folder::user_folder;
-pub use visible::{is_hidden, visible};
+pub use visible::{is_hidden, visible, visible_in_line};

@@ -15,7 +15,15 @@ pub fn is_hidden(c: char) -> bool {
 /// Without this function, a board's description or a file could change the title of the terminal, its colours or the
 /// clipboard by escape sequences. A JSON text keeps its value, because JSON has the same escape sequences.
 pub fn visible(text: &str) -> Cow<'_, str> {
-    let hidden = |c: char| is_hidden(c) && !matches!(c, '\n' | '\t');
+    replaced(text, |c| is_hidden(c) && !matches!(c, '\n' | '\t'))
+}
+
+/// Like [`visible`], for a text that must stay in its line, such as a cell of a table. Also replaces line ends and tabs.
+pub fn visible_in_line(text: &str) -> Cow<'_, str> {
+    replaced(text, is_hidden)
+}
+
+fn replaced(text: &str, hidden: impl Fn(char) -> bool + Copy) -> Cow<'_, str> {
     if !text.contains(hidden) {
         return text.into();
     }
@@ -40,6 +48,7 @@ mod tests {
         let board = "X\u{1b}[31mR\u{1b}]0;title\u{7}\u{9b}1mZ";
         assert_eq!(visible(board), "X\\u001b[31mR\\u001b]0;title\\u0007\\u009b1mZ");
         assert_eq!(visible("anna\u{202e}gnp\r\u{7f}"), "anna\\u202egnp\\u000d\\u007f");
+        assert_eq!(visible_in_line("a\n1\tb"), "a\\u000a1\\u0009b");
         // Lines, tabs and the letters of all languages stay.
         for plain in ["", "joint 1:\t0.2 N·m\nµ ✓ é 関節 🦾"] {
             assert!(matches!(visible(plain), Cow::Borrowed(text) if text == plain), "{plain:?}");

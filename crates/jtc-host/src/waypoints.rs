@@ -190,7 +190,7 @@ impl WaypointFile {
                     "`via` (a point on an arc) is not followed by `arc` (the end of the arc)".into()
                 }
                 Some(LegKind::Arc) if before != Some(LegKind::Via) => {
-                    "`arc` (the end of an arc) must come directly after `via` (a point on the arc)".into()
+                    "`arc` (the end of an arc) does not follow `via` (a point on the arc)".into()
                 }
                 _ => continue,
             };

@@ -53,7 +53,7 @@ pub enum Denied {
     /// Host supervision of the controller is active, and the lease holder is silent. Queries of other clients would
     /// hide this silence from the controller (J-59).
     #[error(
-        "{who} sends no more requests: the agent holds back the queries of other clients until the arm is at rest, so that the \
+        "{who} is silent: the agent sends no queries of other clients until the arm is at rest, so that the \
          controller can pause the motion"
     )]
     Unattended {

@@ -249,7 +249,7 @@ impl<'a> Chain<'a> {
                 FileError::form(format!("link {at} is named by a joint, but does not exist"))
             })?;
             let own = link.body()?;
-            if own.mass != 0.0 && !link.has_inertia() {
+            if own.mass != 0.0 && !link.has_inertia()? {
                 pointlike.push(at.clone());
             }
             if at != name && own.mass != 0.0 {

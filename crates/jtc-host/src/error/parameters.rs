@@ -21,6 +21,16 @@ pub enum ParametersError {
         /// Joint, value and bounds of the refused parameter.
         beyond: Beyond,
     },
+    /// The arm lacks values, or has a body that cannot be a link of this arm. `jtc arm check` refuses this arm.
+    #[error("{arm}: {problem}; nothing was sent")]
+    Impossible {
+        /// Name of the arm.
+        arm: String,
+        /// Text with the link or joint, the value and the limit.
+        problem: String,
+        /// Next step for the operator.
+        next: Next,
+    },
     /// The control loop of the arm is unstable with the gains.
     #[error("{arm}: {problem}; nothing was sent")]
     Unstable {
@@ -55,6 +65,11 @@ impl Diagnose for ParametersError {
                 ErrorKind::Device,
                 "beyond-bounds",
                 "this number could throw or drop the arm: correct the file (`jtc params show FILE`). The parameters in the controller are unchanged",
+            ),
+            Self::Impossible { next, .. } => Diagnosis::new(
+                ErrorKind::Refused,
+                "impossible-arm",
+                next.clone().then(next!("; {} lists all problems", ArmCheck)),
             ),
             Self::Unstable { next, .. } => Diagnosis::new(
                 ErrorKind::Refused,

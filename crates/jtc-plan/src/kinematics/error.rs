@@ -94,7 +94,7 @@ pub enum PoseError {
     #[error("a point on an arc (`via`) is not followed by the end of the arc")]
     NoArc,
     /// An arc without its `via` point.
-    #[error("the end of an arc must come directly after a point on the arc (`via`)")]
+    #[error("the end of an arc does not follow a point on the arc (`via`)")]
     NoVia,
     /// Joint positions at the end of a line that the arm does not reach, because it keeps its configuration (elbow,
     /// wrist, shoulder) along the line.

@@ -67,7 +67,7 @@ pub(super) async fn scan(
 
 /// Expected board at a position of the chain.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, expecting = "an object with the fields number and flash_number")]
+#[serde(deny_unknown_fields, expecting = "an object with the fields board and flash_number")]
 pub(super) struct ExpectedBoard {
     /// Position of the board in the chain. The board receives this number.
     board: u8,

@@ -50,12 +50,12 @@ pub(super) fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result
     let mut start = None;
     let mut interface = args.interface.clone();
     for record in records {
+        if frames == left || Output::gone() || stop.asked() {
+            return Ok(());
+        }
         let record = record?;
         if stdin && !is_of(&record, &mut interface, args.interface.is_some())? {
             continue;
-        }
-        if frames == left || Output::gone() || stop.asked() {
-            return Ok(());
         }
         frames += 1;
         let start_ns = *start.get_or_insert(record.time_ns);

@@ -1,5 +1,6 @@
 //! Commands `ucom io`, `ucom ci` and `ucom dbc`: inputs, outputs and parameters by name.
 
+use host_kit::visible_in_line;
 use std::time::{Duration, Instant};
 
 use cli_kit::output_file::OutputError;
@@ -132,7 +133,7 @@ fn io_text((known, initial): &Described) -> String {
         }
     }
     let table = table(&["", ">#", "name", "", ""], &rows);
-    format!("board {}: {}\n{table}", known.board, known.names.description)
+    format!("board {}: {}\n{table}", known.board, visible_in_line(&known.names.description))
 }
 
 fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {

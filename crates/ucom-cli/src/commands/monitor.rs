@@ -1,6 +1,7 @@
 //! Command `ucom monitor`: live view of boards, bus load and foreign frames. On a terminal, the command shows a
 //! full-screen view; on other outputs, it prints one object per second.
 
+use host_kit::visible_in_line;
 use std::time::{Duration, Instant};
 
 use cli_kit::view::Scroll;
@@ -85,7 +86,7 @@ fn text(driver: &Driver) -> String {
         let status = b.status().filter(|_| b.is_known()).map(|s| bits(s).join(" ")).unwrap_or("?".into());
         text += &format!(
             "  board {number:<2} {:20} {:34} {:8} {:5} frames/s\n",
-            b.description.as_deref().unwrap_or("?"),
+            visible_in_line(b.description.as_deref().unwrap_or("?")),
             status,
             b.life.name(),
             statistics.frames_per_s(number, now)

@@ -1,5 +1,6 @@
 //! Command `ucom par`: reads and writes parameters by name, and processes parameter files.
 
+use host_kit::visible_in_line;
 use std::path::Path;
 
 use cli_kit::output_file::OutputError;
@@ -88,7 +89,8 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
             };
             let rows: Vec<Vec<String>> = rows(driver, p).map(row).collect();
             if !one {
-                text += &format!("board {}: {}\n", p.known.board, p.known.names.description);
+                text +=
+                    &format!("board {}: {}\n", p.known.board, visible_in_line(&p.known.names.description));
             }
             text += &table(&[">#", "name", "value", "last written by this tool"], &rows);
         }

@@ -88,8 +88,8 @@ fn advice(error: &ImageError) -> String {
             "if nothing belongs there, use --fill-gaps 0xFF (the erased state of flash)".into()
         }
         ImageAdvice::OtherUnit(unit) => format!(
-            "if the tool chain counts {unit}s, use --addresses {unit}: then the records are contiguous. If \
-             the gap is intended, use --fill-gaps 0xFF"
+            "if the tool chain counts {unit}s, use --addresses {unit}. Otherwise use --addresses with the other unit. \
+             If gaps remain and are intended, also use --fill-gaps 0xFF"
         ),
         ImageAdvice::Addresses => {
             "make the file again: its addresses are valid neither in bytes nor in words".into()

@@ -280,7 +280,16 @@ impl Image {
                     image.notes.push(ImageNote::AddressesCount(other));
                     Ok(image)
                 }
-                _ if options.gaps != Gaps::Refuse => read(usual, options.gaps).map(|(image, _)| image),
+                _ if options.gaps != Gaps::Refuse => {
+                    let (image, _) = read(usual, options.gaps)?;
+                    // If the records are closer together in the other unit, the tool chain may count in that unit.
+                    match read(other, options.gaps) {
+                        Ok((closer, _)) if closer.bytes.len() < image.bytes.len() => {
+                            Err(ImageError::OtherUnit { error: Box::new(e), unit: other })
+                        }
+                        _ => Ok(image),
+                    }
+                }
                 // The records are too few or too short to show the unit, so the user must decide.
                 Ok(_) if e.is_of_addresses() => {
                     Err(ImageError::OtherUnit { error: Box::new(e), unit: other })

@@ -22,23 +22,31 @@ pub struct RotorMargins {
 }
 
 impl Arm {
-    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71). The rules are the same as in [`Arm::check`]. An arm
-    /// without gains is accepted.
+    /// Rejects an arm that lacks values or has impossible bodies, unstable gains, and gains that a controller refuses for this arm (J-71).
+    /// The rules are the same as in [`Arm::check`]. An arm without gains is accepted.
     ///
     /// # Errors
     ///
-    /// Returns [`ParametersError::Unstable`] with the first finding about the gains that has the severity `Problem`.
+    /// Returns [`ParametersError::Impossible`] with the first missing value or impossible body. Returns [`ParametersError::Unstable`] with the first finding about the gains that has the severity `Problem`.
     pub fn check_gains(&self) -> Result<(), ParametersError> {
+        let worst = |findings: Vec<ArmFinding>| {
+            let found = findings.into_iter().find(|found| found.finding.severity == Severity::Problem)?;
+            let Finding { what, why, next, .. } = found.finding;
+            Some((self.name.clone(), format!("{what}: {why}"), next))
+        };
+        let mut findings = Vec::new();
+        self.find_lacking(&mut findings);
+        self.find_bodies(&mut findings);
+        if let Some((arm, problem, next)) = worst(findings) {
+            return Err(ParametersError::Impossible { arm, problem, next });
+        }
         let mut findings = Vec::new();
         if self.is_physical().is_ok() {
             self.find_gains(&mut findings);
             self.find_borne(&mut findings);
         }
-        match findings.into_iter().find(|found| found.finding.severity == Severity::Problem) {
-            Some(ArmFinding { finding: Finding { what, why, next, .. }, .. }) => {
-                let problem = format!("{what}: {why}");
-                Err(ParametersError::Unstable { arm: self.name.clone(), problem, next })
-            }
+        match worst(findings) {
+            Some((arm, problem, next)) => Err(ParametersError::Unstable { arm, problem, next }),
             None => Ok(()),
         }
     }

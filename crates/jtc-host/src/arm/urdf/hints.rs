@@ -11,9 +11,9 @@ use crate::arm::{ArmChoice, Change};
 use crate::file::FileError;
 
 /// Words in the names of joints that belong to a gripper, a hand, a head, a leg or a wheel.
-const TOOLS: [&str; 15] = [
-    "finger", "gripper", "jaw", "thumb", "knuckle", "claw", "wheel", "caster", "steer", "head", "neck",
-    "leg", "hip", "knee", "ankle",
+const TOOLS: [&str; 16] = [
+    "finger", "grip", "gripper", "jaw", "thumb", "knuckle", "claw", "wheel", "caster", "steer", "head",
+    "neck", "leg", "hip", "knee", "ankle",
 ];
 /// Words in the names of joints that often carry the whole arm. Some arms use such a name for their first joint.
 const BELOW: [&str; 9] = ["base", "torso", "waist", "body", "chest", "lift", "column", "track", "rail"];

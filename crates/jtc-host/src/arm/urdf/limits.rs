@@ -19,6 +19,8 @@ const TURN: f64 = 6.3;
 /// Largest credible velocity limit of a joint, rad/s. The fastest wrist joints reach 900 °/s, which is 15.7 rad/s. A larger velocity limit
 /// is in degrees per second, or is a placeholder.
 const BELIEVABLE_SPEED: f64 = 16.0;
+/// Largest acceleration that a frame of a trajectory can contain, rad/s².
+const ACCELERATION_MAX: f64 = jtc_wire::ACCELERATION_SCALE;
 
 /// Rounds a number to four decimals.
 pub(super) fn short(value: f64) -> f64 {
@@ -201,7 +203,14 @@ impl Chain<'_> {
             self.warn(Change::LimitAssumed, &place, problem);
         }
         if is_limit(limit.acceleration) {
-            to.acceleration_max = limit.acceleration;
+            to.acceleration_max = limit.acceleration.min(ACCELERATION_MAX);
+            if limit.acceleration > ACCELERATION_MAX {
+                let problem = format!(
+                    "acceleration limit {}: {ACCELERATION_MAX:.4} rad/s² is used, because a trajectory cannot contain more",
+                    limit.acceleration
+                );
+                self.warn(Change::LimitCut, &place, problem);
+            }
         } else {
             self.sources.fill_in((Some(number), "acceleration_max_rad_s2"));
         }

@@ -23,6 +23,9 @@ impl Element {
     }
 }
 
+/// Largest angle of an `origin`, rad: one turn, with room for rounding in the file.
+const TURN: f64 = 6.3;
+
 /// Link or joint with the elements that it contains.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Part {
@@ -84,6 +87,21 @@ impl Part {
     }
 
     fn origin(&self) -> Result<Origin, FileError> {
+        if let Some(element) = self.only("origin")? {
+            if element.text("quat_xyzw").is_some() {
+                let problem =
+                    "attribute quat_xyzw of <origin> is not supported: write the rotation as rpy, in rad";
+                return Err(self.wrong(element.line, problem));
+            }
+            let rpy = self.numbers::<3>(element, "rpy")?.unwrap_or_default();
+            if let Some(angle) = rpy.into_iter().find(|angle| angle.abs() > TURN) {
+                let problem = format!(
+                    "rpy: {angle} rad exceeds one turn; if it is in degrees, {angle}° are {:.6} rad",
+                    angle.to_radians()
+                );
+                return Err(self.wrong(element.line, problem));
+            }
+        }
         Ok(Origin {
             xyz: self.value("origin", "xyz", [0.0; 3])?,
             rpy: self.value("origin", "rpy", [0.0; 3])?,
@@ -246,9 +264,15 @@ impl Link {
         Ok(Body { origin: self.part.origin()?, inertia, mass })
     }
 
-    /// Returns `true` if the description contains the inertia of the link.
-    pub(super) fn has_inertia(&self) -> bool {
-        self.part.elements.iter().any(|element| element.name == "inertia")
+    /// Returns `true` if the description contains the moments of inertia of the link about all three axes.
+    pub(super) fn has_inertia(&self) -> Result<bool, FileError> {
+        let Some(element) = self.part.only("inertia")? else { return Ok(false) };
+        for key in ["ixx", "iyy", "izz"] {
+            if self.part.number(element, key)?.is_none() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 }
 

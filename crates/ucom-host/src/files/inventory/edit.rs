@@ -54,11 +54,21 @@ impl Inventory {
             let position = table.get("number").and_then(Item::as_integer).and_then(|n| u8::try_from(n).ok());
             *owner = owner.or_else(|| position.filter(|number| left.remove(number)));
         }
+        let mut heading = heading;
         for (index, owner) in owners.iter().enumerate().rev() {
             let board = owner.and_then(|number| self.get(number));
             match (board, tables.get_mut(index)) {
                 (Some(board), Some(table)) => set(table, board)?,
-                _ => drop(tables.remove(index)),
+                (_, table) => {
+                    // The comment before a removed table may be about the whole file, so it is kept.
+                    let before = table.and_then(|table| table.decor().prefix()?.as_str().map(str::to_owned));
+                    for line in
+                        before.iter().flat_map(|text| text.lines()).filter(|line| line.starts_with('#'))
+                    {
+                        heading += &format!("{line}\n");
+                    }
+                    tables.remove(index);
+                }
             }
         }
         for board in left.iter().filter_map(|number| self.get(*number)) {

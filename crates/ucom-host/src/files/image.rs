@@ -282,9 +282,13 @@ impl Image {
                 }
                 _ if options.gaps != Gaps::Refuse => {
                     let (image, _) = read(usual, options.gaps)?;
-                    // If the records are closer together in the other unit, the tool chain may count in that unit.
+                    // If more records follow each other in the other unit, the tool chain may count in that unit. One gap alone
+                    // shows nothing: a single record at an odd byte address is whole in words.
+                    let gaps = |image: &Self| {
+                        image.notes.iter().filter(|note| matches!(note, ImageNote::GapFilled { .. })).count()
+                    };
                     match read(other, options.gaps) {
-                        Ok((closer, _)) if closer.bytes.len() < image.bytes.len() => {
+                        Ok((closer, _)) if gaps(&closer) + 1 < gaps(&image) => {
                             Err(ImageError::OtherUnit { error: Box::new(e), unit: other })
                         }
                         _ => Ok(image),

@@ -144,6 +144,14 @@ fn gaps_are_refused_or_filled_with_a_word() {
         assert_eq!(image.bytes(), [1, 2, with, with, with, with, 3, 4]);
         assert_eq!(image.notes(), [ImageNote::GapFilled { address_words: 9, bytes: 4, with }]);
     }
+    // Records that follow each other in bytes, but not in words: with one real gap, the unit is not clear.
+    let far =
+        [0, 0x10, 0x20, 0x80, 0x90].map(|at| s_line(1, 2, at, &[7; 16])).concat() + &s_line(9, 2, 0, &[]);
+    let options = ImageOptions { gaps: Gaps::Fill(0xFF), ..Default::default() };
+    let refused = Image::parse(far.as_bytes(), &options);
+    assert!(matches!(refused, Err(ImageError::OtherUnit { unit: AddressUnit::Byte, .. })), "{refused:?}");
+    let bytes = ImageOptions { address_unit: Some(AddressUnit::Byte), ..options };
+    assert_eq!(Image::parse(far.as_bytes(), &bytes).unwrap().bytes().len(), 160);
     // Half a word can be missing before the first record and after the last record.
     let odd = hex_line(0x11, 0, &[1, 2]) + ":00000001FF\n";
     assert_eq!(parse(&odd).unwrap_err().to_string(), "no record contains the 1 byte at word address 0x8");

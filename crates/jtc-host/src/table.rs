@@ -28,7 +28,7 @@ pub(crate) fn rows(text: &str) -> Vec<Row<'_>> {
             (separator, cells.len())
         });
         let mut cells = split(line, separator);
-        if cells.len() != count {
+        if cells.len() != count || separator.is_none() && cells.iter().any(|cell| cell.ends_with(',')) {
             // Some files have a header with another separator than the numbers.
             let other = split(line, self::separator(line));
             if other.len() == count {
@@ -65,7 +65,8 @@ fn separator(line: &str) -> Option<char> {
     if bare.trim().contains('\t') && !bare.trim().split('\t').any(aligned) {
         return Some('\t');
     }
-    let decimal = |cell: &str| cell.replacen(',', ".", 1).parse::<f64>().is_ok();
+    // A decimal comma is before a digit. In "0, 0" the comma separates cells.
+    let decimal = |cell: &str| !cell.ends_with(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok();
     let mut blank = bare.split_whitespace();
     let by_blanks = bare.split_whitespace().count() > 1 && blank.all(decimal);
     (bare.contains(',') && !by_blanks).then_some(',')
@@ -140,8 +141,8 @@ impl Unit {
         };
         let divisions = match rest.as_str() {
             "" => 0,
-            "s" | "sec" => 1,
-            "s2" | "ss" | "sec2" => 2,
+            "s" | "sec" | "second" | "seconds" | "pers" | "persec" | "persecond" => 1,
+            "s2" | "ss" | "sec2" | "second2" | "pers2" | "persec2" | "persecond2" => 2,
             _ => return None,
         };
         Some(Self::Angle(factor, divisions))
@@ -211,6 +212,8 @@ mod tests {
         }
         assert_eq!(cells("a;\"x;\"\"y\"\"\"\n"), [vec!["a", "x;\"y\""]]);
         assert_eq!(cells("t\tq1\n0,0\t0,5\n")[1], ["0,0", "0,5"]);
+        assert_eq!(cells("0, 0, 1\n")[0], ["0", "0", "1"]);
+        assert_eq!(cells("t q1 q2\n0, 0, 1\n")[1], ["0", "0", "1"]);
         assert_eq!(cells("0,0 0,5\n")[0], ["0,0", "0,5"]);
     }
 
@@ -219,6 +222,8 @@ mod tests {
         for (name, base, unit) in [
             ("Q1_DEG", "q1", Some(Unit::Angle(1f64.to_radians(), 0))),
             ("qd1 (deg/s)", "qd1", Some(Unit::Angle(1f64.to_radians(), 1))),
+            ("qd1_deg_per_s", "qd1", Some(Unit::Angle(1f64.to_radians(), 1))),
+            ("qd1_deg_second", "qd1", Some(Unit::Angle(1f64.to_radians(), 1))),
             ("qdd1_rad_s2", "qdd1", Some(Unit::Angle(1.0, 2))),
             ("qdd1 [rad/s²]", "qdd1", Some(Unit::Angle(1.0, 2))),
             ("q1 (°)", "q1", Some(Unit::Angle(1f64.to_radians(), 0))),

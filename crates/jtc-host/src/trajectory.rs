@@ -8,6 +8,8 @@ mod header;
 mod joints;
 pub(crate) mod message;
 #[cfg(test)]
+mod other_columns;
+#[cfg(test)]
 mod other_tools;
 mod overshoot;
 mod replay;
@@ -181,8 +183,10 @@ fn starts_with_digit(text: &str) -> bool {
 
 /// Returns `true` if the text is YAML: it has a key of a message, or begins with a key.
 fn is_yaml(text: &str) -> bool {
-    let first =
-        text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
+    let first = text
+        .lines()
+        .find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'))
+        .unwrap_or_default();
     let begins =
         first.trim_end() == "---" || first.split_whitespace().next().is_some_and(|word| word.ends_with(':'));
     begins || has_message(text)
@@ -194,7 +198,8 @@ fn has_message(text: &str) -> bool {
         let key = line.trim_start_matches([' ', '-']);
         ["points:", "joint_trajectory:"].iter().any(|known| key.starts_with(known))
     };
-    ["joint_names:", "\"joint_names\":"].iter().any(|key| text.contains(key)) || text.lines().any(known)
+    let named = |line: &str| ["joint_names:", "\"joint_names\":"].iter().any(|key| line.contains(key));
+    text.lines().filter(|line| !line.trim_start().starts_with('#')).any(|line| named(line) || known(line))
 }
 
 /// Returns `true` if the text is a trajectory in a message, or a trajectory of this project in JSON. The text is not a valid waypoint file.

@@ -37,57 +37,64 @@ pub(super) enum Meaning {
     Unknown,
 }
 
-/// Words of columns that contain other quantities of a joint.
-const OTHERS: &[&str] = &[
-    "effort",
-    "efforts",
-    "torque",
-    "torques",
-    "tau",
-    "current",
-    "currents",
-    "temp",
-    "temperature",
-    "error",
-    "err",
-    "mode",
-    "status",
-    "voltage",
-    "force",
-    "moment",
-    "limit",
-    "limits",
-    "min",
-    "max",
-    "std",
-    "raw",
-    "count",
-    "counts",
-    "load",
-    "pwm",
-    "kp",
-    "kd",
-    "jerk",
-    "delay",
-    "state_id",
-    "enabled",
-    "valid",
+/// Words that can be next to a joint. A column with another word is not used: the word can change the meaning of the numbers.
+const ALLOWED: &[&str] = &[
+    "act",
+    "action",
+    "actual",
+    "cmd",
+    "command",
+    "commanded",
+    "commands",
+    "controller",
+    "data",
+    "des",
+    "desired",
+    "feedback",
+    "field",
+    "goal",
+    "jnt",
+    "joint",
+    "joints",
+    "meas",
+    "measured",
+    "message",
+    "msg",
+    "observation",
+    "output",
+    "ref",
+    "reference",
+    "setpoint",
+    "state",
+    "states",
+    "target",
+    "trajectory",
+    "value",
+    "values",
 ];
 
-/// Words that can precede the name of a joint.
-const BEFORE: &[&str] = &[
-    "actual",
-    "target",
-    "desired",
-    "commanded",
-    "command",
-    "measured",
-    "reference",
-    "feedback",
-    "state",
-    "observation",
-    "action",
-];
+/// Words for one of several arms. They can be next to a joint if the numbers determine the order of the joints.
+const SIDES: &[&str] = &["arm", "l", "left", "r", "right", "robot"];
+
+/// Returns `true` if the word does not change the meaning of the numbers.
+fn allowed((word, number): &Word, arm: &[Word]) -> bool {
+    number.is_none() && (ALLOWED.contains(&word.as_str()) || channel(word).is_some())
+        || arm.iter().any(|own| own.0 == *word && own.1 == *number)
+}
+
+/// Returns the only quantity that the words name. Words for several quantities are an error.
+fn quantity(words: &[&Word], own: Option<Channel>) -> Result<Channel, ()> {
+    let mut found = own;
+    for (word, _) in words {
+        let Some(next) = channel(word) else { continue };
+        match found {
+            None | Some(Channel::Position) => found = Some(next),
+            Some(before) if next != before && next != Channel::Position => return Err(()),
+            Some(_) => {}
+        }
+    }
+    Ok(found.unwrap_or(Channel::Position))
+}
 
 /// Word of a name, with the number after the word.
 type Word = (String, Option<u32>);
@@ -98,6 +105,11 @@ fn words(name: &str) -> Vec<Word> {
     for part in name.split(|c: char| !c.is_alphanumeric()).filter(|part| !part.is_empty()) {
         let word = part.trim_end_matches(|c: char| c.is_ascii_digit());
         let number = part[word.len()..].parse().ok();
+        if number.is_none() && word.len() < part.len() {
+            // The number is too large for an index.
+            found.push((part.to_owned(), None));
+            continue;
+        }
         match found.last_mut() {
             Some((_, last @ None)) if word.is_empty() => *last = number,
             _ => found.push((word.to_owned(), number)),
@@ -113,6 +125,19 @@ fn channel(word: &str) -> Option<Channel> {
         "qdd" | "ddq" | "qddot" | "acc" | "accel" | "acceleration" | "accelerations" => Channel::Acceleration,
         _ => return None,
     })
+}
+
+/// Returns `true` if the first column contains seconds, and the second column contains the rest of the same time in ns.
+pub(super) fn is_rest(seconds: &str, rest: &str) -> bool {
+    let split = |name: &str, ends: &[&str]| {
+        let mut words = words(&name.to_lowercase());
+        let ended = words.pop_if(|(word, _)| ends.contains(&word.as_str())).is_some();
+        (words, ended)
+    };
+    let (head, _) = split(seconds, &["s", "sec", "secs", "second", "seconds"]);
+    let nanos = ["ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"];
+    let (other, ended) = split(rest, &nanos);
+    ended && head == other
 }
 
 /// Returns the meaning of a column, and the unit in its name. An unknown unit is an error with the text of the unit.
@@ -131,6 +156,10 @@ fn of_base(base: &str, names: Option<ArmNames<'_>>) -> Meaning {
     if ["header_stamp", "header_stamp_secs"].iter().any(|end| joined.ends_with(end)) {
         return Meaning::Time { of_header: true };
     }
+    let plain = |c: char| c.is_alphanumeric() || "_/.-:[]() %".contains(c);
+    if base.starts_with('-') || !base.chars().all(plain) {
+        return Meaning::Unknown;
+    }
     if let Some(meaning) = names.and_then(|names| of_arm(base, names)) {
         return meaning;
     }
@@ -145,9 +174,11 @@ fn of_base(base: &str, names: Option<ArmNames<'_>>) -> Meaning {
     let (word, number) = (&words[at].0, words[at].1.unwrap_or_default());
     let others: Vec<&Word> =
         words.iter().enumerate().filter(|(i, _)| *i != at).map(|(_, word)| word).collect();
-    if others.iter().any(|(word, _)| OTHERS.contains(&word.as_str())) {
+    let side = |word: &Word| is_joint(&words[at].0) && SIDES.contains(&word.0.as_str());
+    if !names_of(word) && others.iter().any(|word| !allowed(word, &[]) && !side(word)) {
         return Meaning::Unknown;
     }
+    let Ok(quantity) = quantity(&others, channel(word)) else { return Meaning::Unknown };
     let text = |words: &[&Word]| {
         let one = |(word, number): &&Word| word.clone() + &number.map_or(String::new(), |n| n.to_string());
         words.iter().map(one).collect::<Vec<_>>().join("_")
@@ -159,18 +190,17 @@ fn of_base(base: &str, names: Option<ArmNames<'_>>) -> Meaning {
     if is_list(word) {
         return Meaning::Value {
             group: text(&others) + "." + word,
-            channel: Channel::Position,
+            channel: quantity,
             key: Key::Index(number),
         };
     }
-    if let Some(channel) = channel(word) {
-        return Meaning::Value { group: text(&others), channel, key: Key::Index(number) };
+    if channel(word).is_some() {
+        return Meaning::Value { group: text(&others), channel: quantity, key: Key::Index(number) };
     }
-    let of = others.iter().find_map(|(word, number)| channel_without(word, *number));
     let group: Vec<&Word> =
         others.iter().copied().filter(|(word, number)| channel_without(word, *number).is_none()).collect();
     let joint = Key::Name(number, text(&[group.as_slice(), &[&words[at]]].concat()));
-    Meaning::Value { group: text(&group), channel: of.unwrap_or(Channel::Position), key: joint }
+    Meaning::Value { group: text(&group), channel: quantity, key: joint }
 }
 
 fn channel_without(word: &str, number: Option<u32>) -> Option<Channel> {
@@ -183,7 +213,7 @@ fn of_arm(base: &str, names: ArmNames<'_>) -> Option<Meaning> {
     let begins = |head: &str| {
         let word =
             head.trim_end_matches('_').rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-        is_end(head.chars().next_back()) || BEFORE.contains(&word) || channel(word).is_some()
+        is_end(head.chars().next_back()) || ALLOWED.contains(&word) || channel(word).is_some()
     };
     let find = |joint: &str| {
         let joint = joint.to_lowercase();
@@ -203,18 +233,17 @@ fn of_arm(base: &str, names: ArmNames<'_>) -> Option<Meaning> {
     let (j, (from, to)) =
         (0..JOINTS).filter_map(|j| Some((j, of(j)?))).max_by_key(|(_, (from, to))| to - from)?;
     let rest = words(&format!("{} {}", &base[..from], &base[to..]));
-    if rest.iter().any(|(word, _)| OTHERS.contains(&word.as_str())) {
+    let own = words(&names.arm.to_lowercase());
+    if rest.iter().any(|word| !allowed(word, &own)) {
         return Some(Meaning::Unknown);
     }
-    let channel = rest.iter().find_map(|(word, number)| channel_without(word, *number));
+    let Ok(quantity) = quantity(&rest.iter().collect::<Vec<_>>(), None) else {
+        return Some(Meaning::Unknown);
+    };
     let group: Vec<String> = rest
         .iter()
         .filter(|(word, number)| channel_without(word, *number).is_none())
         .map(|(word, number)| word.clone() + &number.map_or(String::new(), |n| n.to_string()))
         .collect();
-    Some(Meaning::Value {
-        group: group.join("_"),
-        channel: channel.unwrap_or(Channel::Position),
-        key: Key::Joint(j),
-    })
+    Some(Meaning::Value { group: group.join("_"), channel: quantity, key: Key::Joint(j) })
 }

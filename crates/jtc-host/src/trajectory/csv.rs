@@ -146,7 +146,7 @@ fn float(rows: &[Row<'_>]) -> Result<Loaded, FileError> {
         lines.push(line);
         samples.push(values[0], |c| values[1 + c]);
     }
-    let notes = times::in_seconds(&mut samples.times, "time");
+    let notes = times::in_seconds(&mut samples.times, "time", true)?;
     finish(samples, notes, &lines, Form::Float)
 }
 
@@ -181,7 +181,7 @@ fn finish(
             let problem = format!("{} s is not after {} s of the line before", times[i], times[i - 1]);
             Err(FileError::at(Place::line(lines[i]).named("time"), problem))
         }
-        Err(other) => Err(FileError::form(other.to_string() + times::hint(&times, &other))),
+        Err(other) => Err(FileError::form(other.to_string() + times::hint(&times, &other, true))),
     }
 }
 
@@ -200,6 +200,10 @@ fn with_header(rows: &[Row<'_>], names: Option<ArmNames<'_>>) -> Result<Loaded, 
     for row in &rows[header.rows..] {
         let (line, cells) = (row.0, &row.1);
         width(row, header.names.len())?;
+        if let Some(i) = header.joint_names.iter().find(|i| cells[**i] != rows[header.rows].1[**i]) {
+            let problem = format!("\"{}\", but the lines before have another joint", short(&cells[*i]));
+            return Err(FileError::at(Place::cell(line, i + 1).named(short(&header.names[*i])), problem));
+        }
         let value = |i: usize| number(&cells[i], || Place::cell(line, i + 1).named(short(&header.names[i])));
         let mut values = [0.0; COLUMNS];
         for (c, channel) in header.channels.iter().enumerate() {
@@ -217,7 +221,7 @@ fn with_header(rows: &[Row<'_>], names: Option<ArmNames<'_>>) -> Result<Loaded, 
     let mut notes = header.notes.clone();
     match header.time.1 {
         Some(unit) => samples.times.iter_mut().for_each(|t| *t *= unit),
-        None => notes.append(&mut times::in_seconds(&mut samples.times, &header.names[header.time.0])),
+        None => notes.append(&mut times::in_seconds(&mut samples.times, &header.names[header.time.0], true)?),
     }
     let loaded = finish(samples, notes, &lines, Form::Csv)?;
     Ok(Loaded { units_named: header.angles_named, ..loaded })

@@ -194,7 +194,7 @@ fn data_words(words: &str) -> String {
     if let Some((found, expected)) =
         words.strip_prefix("invalid type: ").and_then(|w| w.split_once(", expected "))
     {
-        return format!("invalid type: {}, expected {}", short(found), type_words(expected));
+        return format!("invalid type: {}, expected {}", short(&found_words(found)), type_words(expected));
     }
     if let Some((count, _)) = words.strip_prefix("invalid length ").and_then(|w| w.split_once(',')) {
         return format!("{count} values, expected 6");
@@ -212,6 +212,20 @@ fn data_words(words: &str) -> String {
         return "a value is out of range".to_owned();
     }
     words.chars().filter(|c| !c.is_control()).collect()
+}
+
+fn found_words(found: &str) -> String {
+    let (kind, value) = found.split_once(' ').unwrap_or((found, ""));
+    let value = value.trim_start_matches("point ").trim_matches('`');
+    match kind {
+        "sequence" => "a list".to_owned(),
+        "map" => "an object".to_owned(),
+        "null" | "unit" => "nothing".to_owned(),
+        "boolean" => value.to_owned(),
+        "floating" | "integer" => format!("the number {value}"),
+        "string" => format!("the text {value}"),
+        _ => "a value of another kind".to_owned(),
+    }
 }
 
 fn type_words(expected: &str) -> &str {

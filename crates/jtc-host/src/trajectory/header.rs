@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use jtc_core::JOINTS;
 
 use super::ArmNames;
-use super::columns::{Channel, Key, Meaning, meaning};
+use super::columns::{Channel, Key, Meaning, is_rest, meaning};
 use super::joints::{joint_order, listed, other_arm};
 use crate::file::{FileError, Place, short};
 use crate::table::{Row, Unit, units};
@@ -27,8 +27,13 @@ pub(super) struct Header {
     pub angles_named: bool,
     /// Messages about the columns.
     pub notes: Vec<String>,
+    /// Columns with the names of the joints.
+    pub joint_names: Vec<usize>,
     left_out: Vec<usize>,
 }
+
+/// Largest number of columns.
+const COLUMNS_MAX: usize = 1000;
 
 /// Columns of one group: for each channel, the joint and the column.
 #[derive(Default)]
@@ -49,6 +54,10 @@ struct Reader<'a> {
 impl Header {
     pub(super) fn of(rows: &[Row<'_>], names: Option<ArmNames<'_>>) -> Result<Self, FileError> {
         let (line, cells) = (rows[0].0, rows[0].1.as_slice());
+        if cells.len() > COLUMNS_MAX {
+            let problem = format!("{} columns, expected at most {COLUMNS_MAX}", cells.len());
+            return Err(FileError::at(Place::line(line), problem));
+        }
         let (meanings, mut stated): (Vec<_>, Vec<_>) = cells.iter().map(|name| meaning(name, names)).unzip();
         let below = rows.get(1).filter(|row| row.1.len() <= cells.len()).and_then(|row| units(&row.1));
         for (i, unit) in below.iter().flatten().enumerate() {
@@ -106,6 +115,7 @@ impl Reader<'_> {
         let time = self.time()?;
         let name = chosen?;
         let (order, mut notes) = self.order(name, &groups[name], names)?;
+        self.seventh(name, &groups, names)?;
         let channels = self.channels(&groups[name], order)?;
         let used =
             |i: &usize| *i == time || channels.iter().flatten().flatten().any(|(column, _)| column == i);
@@ -121,6 +131,7 @@ impl Reader<'_> {
                 .any(|(i, _)| matches!(self.units[*i], Ok(Some(_)))),
             left_out: (0..self.cells.len()).filter(|i| !used(i) && !is_name(i)).collect(),
             channels,
+            joint_names: self.joint_names(&name.0).into_values().collect(),
             ..Header::default()
         };
         let left_out = header.left_out_words("");
@@ -173,7 +184,18 @@ impl Reader<'_> {
             [] => Err(self.line(
                 "column t (time in s) is missing; `jtc plan` makes a trajectory from waypoints without times",
             )),
-            [one] => Ok(one),
+            [one] => match (0..self.cells.len())
+                .find(|i| *i != one && is_rest(&self.cells[one], &self.cells[*i]))
+            {
+                Some(rest) => Err(self.wrong(
+                    rest,
+                    format!(
+                        "with \"{}\" the time is in two columns; write it in one column t, in s",
+                        short(&self.cells[one])
+                    ),
+                )),
+                None => Ok(one),
+            },
             [_, second, ..] => {
                 let names: Vec<&str> = found.iter().map(|i| &*self.cells[*i]).collect();
                 let problem = format!("{} are all times; keep one of these columns", listed(&names));
@@ -225,8 +247,8 @@ impl Reader<'_> {
         let positions = &group.0[Channel::Position as usize];
         let named = !self.joint_names(name).is_empty();
         let Some(Key::Index(first)) = positions.keys().next() else { return positions.len() >= JOINTS };
-        let counted = positions.keys().zip(*first..).all(|(key, n)| *key == Key::Index(n));
-        counted && *first <= 1 && (positions.len() == JOINTS || named && positions.len() > JOINTS)
+        let counted = || positions.keys().zip(*first..).all(|(key, n)| *key == Key::Index(n));
+        *first <= 1 && counted() && (positions.len() == JOINTS || named && positions.len() > JOINTS)
     }
 
     /// Returns the columns with the names of the joints of a group.
@@ -245,7 +267,10 @@ impl Reader<'_> {
         let most = groups.iter().max_by_key(|(_, group)| group.0[0].len());
         let Some((name, group)) = most.filter(|(_, group)| !group.0[0].is_empty()) else {
             let unknown = self.meanings.iter().position(|m| *m == Meaning::Unknown);
-            return unknown.map_or_else(|| self.line("column q1 is missing"), |i| self.wrong(i, KNOWN));
+            return unknown.map_or_else(
+                || self.line("column q1 is missing"),
+                |i| self.wrong(i, KNOWN.to_owned() + &self.unknown()),
+            );
         };
         let positions = &group.0[0];
         let indices: Vec<u32> = positions
@@ -260,10 +285,40 @@ impl Reader<'_> {
         }
         if name.0.is_empty() && name.1 == 0 {
             let missing = (base..).find(|n| !indices.contains(n)).unwrap_or_default();
-            return self.line(format!("column q{missing} is missing"));
+            return self.line(format!("column q{missing} is missing{}", self.unknown()));
         }
         let found: Vec<&str> = positions.values().map(|i| &*self.cells[*i]).collect();
-        self.line(format!("positions of {} joints, expected 6: {}", found.len(), listed(&found)))
+        self.line(format!(
+            "positions of {} joints, expected 6: {}{}",
+            found.len(),
+            listed(&found),
+            self.unknown()
+        ))
+    }
+
+    /// Returns the list of the columns with an unknown meaning, for the end of a message.
+    fn unknown(&self) -> String {
+        let is = |i: &usize| self.meanings[*i] == Meaning::Unknown && !self.cells[*i].is_empty();
+        let names: Vec<&str> = (0..self.cells.len()).filter(is).map(|i| &*self.cells[i]).collect();
+        if names.is_empty() { String::new() } else { format!("; unknown columns: {}", listed(&names)) }
+    }
+
+    /// Returns an error if the file continues the numbers of the joints of the arm with a seventh joint.
+    fn seventh(
+        &self,
+        (name, kind): &GroupName,
+        groups: &BTreeMap<GroupName, Group>,
+        arm: Option<ArmNames<'_>>,
+    ) -> Result<(), FileError> {
+        let (Some(arm), 1) = (arm, *kind) else { return Ok(()) };
+        let Some(stem) = arm.bare(&arm.joints[JOINTS - 1]).strip_suffix('6') else { return Ok(()) };
+        let Some(others) = groups.get(&(name.clone(), 2)) else { return Ok(()) };
+        let next = format!("{stem}7").to_lowercase().replace('_', "");
+        let is = |key: &Key| matches!(key, Key::Name(7, found) if found.replace('_', "").ends_with(&next));
+        match others.0[Channel::Position as usize].iter().find(|(key, _)| is(key)) {
+            Some((_, i)) => Err(self.wrong(*i, "a seventh joint; the arm has six joints")),
+            None => Ok(()),
+        }
     }
 
     /// Returns the keys of the six joints, base to wrist, and notes about their order.
@@ -325,6 +380,12 @@ impl Reader<'_> {
                     return Err(self.line(format!("{missing} is missing")));
                 };
                 *to = (*i, self.angle_unit(*i, c as u8)?);
+            }
+            if let Some((i, _)) = found.iter().find(|(_, factor)| *factor != found[0].1) {
+                let first = short(&self.cells[found[0].0]);
+                return Err(
+                    self.wrong(*i, format!("another unit than \"{first}\"; write all six in one unit"))
+                );
             }
             *to = Some(found);
         }

@@ -176,7 +176,7 @@ fn trajectory(found: &Found<'_>, names: Option<ArmNames<'_>>) -> Result<Loaded, 
     samples.velocity = all_or_none(&channels[0], "velocities", |v| *v)?;
     samples.acceleration = all_or_none(&channels[1], "accelerations", |v| *v)?;
     if without_unit {
-        notes.append(&mut times::in_seconds(&mut samples.times, "time_from_start"));
+        notes.append(&mut times::in_seconds(&mut samples.times, "time_from_start", false)?);
     }
     let mut loaded = finish(samples, Form::JointTrajectory)?;
     notes.append(&mut loaded.notes);
@@ -255,7 +255,15 @@ fn time(point: &Node, i: usize) -> Result<(f64, bool), FileError> {
         number.map(Some).ok_or_else(|| wrong(format!("{key}: {} is not a finite number", value.words())))
     };
     if let Node::Map(_) = node {
+        let Node::Map(entries) = node else { return Err(wrong("not an object".into())) };
+        let known = ["sec", "secs", "s", "nanosec", "nsecs", "nsec"];
+        if let Some((key, _)) = entries.iter().find(|(key, _)| !known.contains(&key.as_str())) {
+            return Err(wrong(format!("unknown key {}, expected sec and nanosec", short(key))));
+        }
         let (sec, nanosec) = (part(["sec", "secs", "s"])?, part(["nanosec", "nsecs", "nsec"])?);
+        if entries.len() > usize::from(sec.is_some()) + usize::from(nanosec.is_some()) {
+            return Err(wrong("a part of the time occurs twice".into()));
+        }
         let Some(sec) = sec else { return Err(wrong("the key sec is missing".into())) };
         return Ok((sec + nanosec.unwrap_or_default() * 1e-9, true));
     }

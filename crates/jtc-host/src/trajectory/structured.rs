@@ -118,7 +118,7 @@ pub(super) fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileErr
             let problem = format!("time {} s is not after {} s of the point before", times[i], times[i - 1]);
             Err(FileError::at(Place::name(format!("point {i}")), problem))
         }
-        Err(other) => Err(FileError::form(other.to_string() + times::hint(&times, &other))),
+        Err(other) => Err(FileError::form(other.to_string() + times::hint(&times, &other, false))),
     }
 }
 

@@ -73,7 +73,7 @@ const ALLOWED: &[&str] = &[
     "values",
 ];
 
-/// Words for one of several arms. They can be next to a joint if the numbers determine the order of the joints.
+/// Words for one of several arms. These words can be next to a joint if the numbers determine the order of the joints.
 const SIDES: &[&str] = &["arm", "l", "left", "r", "right", "robot"];
 
 /// Returns `true` if the word does not change the meaning of the numbers.

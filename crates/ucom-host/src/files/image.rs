@@ -282,8 +282,8 @@ impl Image {
                 }
                 _ if options.gaps != Gaps::Refuse => {
                     let (image, _) = read(usual, options.gaps)?;
-                    // If more records follow each other in the other unit, the tool chain may count in that unit. One gap alone
-                    // shows nothing: a single record at an odd byte address is whole in words.
+                    // If more records follow each other in the other unit, the tool chain may count in that unit. A single gap
+                    // shows nothing, because a single record at an odd byte address is whole in words.
                     let gaps = |image: &Self| {
                         image.notes.iter().filter(|note| matches!(note, ImageNote::GapFilled { .. })).count()
                     };

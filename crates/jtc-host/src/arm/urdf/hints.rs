@@ -164,7 +164,7 @@ impl<'a> Chain<'a> {
         let mut found: Vec<&str> = Vec::new();
         let mut todo = vec![link];
         while let Some(at) = todo.pop() {
-            for joint in self.robot.on(at).filter(|joint| self.rigid(joint)) {
+            for joint in self.robot.on(at).filter(|joint| joint.kind == Kind::Fixed) {
                 found.push(&joint.child);
                 todo.push(&joint.child);
             }

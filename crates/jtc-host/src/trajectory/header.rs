@@ -381,12 +381,6 @@ impl Reader<'_> {
                 };
                 *to = (*i, self.angle_unit(*i, c as u8)?);
             }
-            if let Some((i, _)) = found.iter().find(|(_, factor)| *factor != found[0].1) {
-                let first = short(&self.cells[found[0].0]);
-                return Err(
-                    self.wrong(*i, format!("another unit than \"{first}\"; write all six in one unit"))
-                );
-            }
             *to = Some(found);
         }
         if channels[1].is_none() && channels[2].is_some() {

@@ -41,19 +41,7 @@ pub enum PayloadError {
         /// Sum of the other two principal moments, kg·m²; this is the limit for `moment`.
         limit: f64,
     },
-    /// The largest principal moment of inertia is larger than that of any body that an arm carries.
-    InertiaTooLarge {
-        /// Mass of the payload, kg.
-        mass: f64,
-        /// The largest principal moment, kg·m².
-        moment: f64,
-        /// Largest moment of a body with this mass, kg·m²; this is the limit for `moment`.
-        limit: f64,
-    },
 }
-
-/// Largest radius of gyration of a payload, m. A straight rod of 3.4 m has this radius.
-const RADIUS_MAX: f64 = 1.0;
 
 impl fmt::Display for PayloadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -72,11 +60,6 @@ impl fmt::Display for PayloadError {
                 "payload: largest principal moment of inertia is {moment} kg m2, more than the sum of the others, {limit} kg m2; check the unit, \
                  and that the inertia is about the centre of mass"
             ),
-            Self::InertiaTooLarge { mass, moment, limit } => write!(
-                f,
-                "payload: largest principal moment of inertia is {moment} kg m2, more than {mass} kg can have within {RADIUS_MAX} m, {limit} kg m2; \
-                 check the unit, and that the inertia is about the centre of mass"
-            ),
         }
     }
 }
@@ -87,8 +70,7 @@ impl Payload {
     /// A payload without mass, which means that the arm has no payload.
     pub const NONE: Self = Self { mass: 0.0, com: [0.0; 3], inertia: [0.0; 6] };
 
-    /// Checks that the payload is physically possible (J-60). The requirements are those of [`crate::ArmModel::check`] for a link. In
-    /// addition, the radius of gyration must be at most 1 m: a larger inertia is in another unit or is a placeholder.
+    /// Checks that the payload is physically possible (J-60). The requirements are those of [`crate::ArmModel::check`] for a link.
     ///
     /// # Errors
     ///
@@ -110,10 +92,6 @@ impl Payload {
         }
         if large > small + middle + tolerance {
             return Err(PayloadError::InertiaTriangle { moment: large, limit: small + middle });
-        }
-        let limit = self.mass * RADIUS_MAX * RADIUS_MAX;
-        if large > limit + tolerance {
-            return Err(PayloadError::InertiaTooLarge { mass: self.mass, moment: large, limit });
         }
         Ok(())
     }

@@ -166,10 +166,6 @@ fn j60_what_is_no_body_is_refused() {
         matches!(refused([0.02, 0.05, 0.0, 0.02, 0.0, 0.01]), PayloadError::InertiaNegative { moment } if moment < -0.02)
     );
     assert!(
-        matches!(refused([100.0, 0.0, 0.0, 100.0, 0.0, 100.0]), PayloadError::InertiaTooLarge { limit, .. } if limit == 2.0)
-    );
-    assert_eq!(Payload { inertia: [2.0, 0.0, 0.0, 2.0, 0.0, 0.1], ..good }.check(), Ok(()), "a long rod");
-    assert!(
         matches!(refused([0.02, 0.0, 0.0, 0.02, 0.0, 0.05]), PayloadError::InertiaTriangle { limit, .. } if limit == 0.04)
     );
 }

@@ -8,6 +8,24 @@ use super::Session;
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
+/// Largest radius of gyration of a payload, m. A straight rod of 3.4 m has this radius.
+const RADIUS_MAX: f64 = 1.0;
+
+/// Returns the reason why the inertia is larger than that of any body that an arm carries. Returns `None` for a credible
+/// inertia. Such an inertia is in another unit, is not about the centre of mass, or is a placeholder.
+fn too_wide(payload: &Payload) -> Option<String> {
+    let [xx, _, _, yy, _, zz] = payload.inertia;
+    // The sum of the moments about three axes is twice the mass times the square of the distance from the centre of mass.
+    let radius = ((xx + yy + zz) / (2.0 * payload.mass)).sqrt();
+    (payload.mass > 0.0 && radius > RADIUS_MAX).then(|| {
+        format!(
+            "payload: {} kg with moments of inertia of {xx}, {yy} and {zz} kg m2 have a radius of gyration of {radius:.2} m, expected {RADIUS_MAX} m at most; \
+             check the unit, and that the inertia is about the centre of mass",
+            payload.mass
+        )
+    })
+}
+
 impl<P: Port> Session<P> {
     /// Returns the payload that the controller assumes at the flange. If the device has no extensions, the payload is
     /// [`Payload::NONE`].
@@ -30,6 +48,9 @@ impl<P: Port> Session<P> {
     /// [`Session::set_settings`]. After an error the controller keeps its earlier payload.
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
+        if let Some(why) = too_wide(payload) {
+            return Err(ExtensionError::NoBody { why }.into());
+        }
         let values: Vec<_> = settings::payload_values(payload).collect();
         // The payload is checked with the default settings. A value that is out of range here is out of range for
         // every controller.
@@ -71,5 +92,28 @@ impl<P: Port> Session<P> {
             torque: torque[joint.index()],
             limit: config.joints[joint.index()].torque_max,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// J-60: a body with the inertia of a much larger one is refused before it is sent, and every real tool is accepted.
+    #[test]
+    fn j60_an_inertia_that_is_too_large_for_a_body_is_refused() {
+        let of = |mass, [xx, yy, zz]: [f64; 3]| Payload {
+            mass,
+            com: [0.0, 0.0, 0.08],
+            inertia: [xx, 0.0, 0.0, yy, 0.0, zz],
+        };
+        let why = too_wide(&of(2.0, [100.0; 3])).expect("the radius of gyration is 8.66 m");
+        assert!(why.contains("8.66 m"), "{why}");
+        // A point mass, a gripper of 2 kg, and a rod of 2 kg that is 2 m long: 2 · 2² / 12 = 0.667 kg·m².
+        for body in
+            [of(2.0, [0.0; 3]), of(2.0, [0.01, 0.01, 0.005]), of(2.0, [0.667, 0.667, 0.001]), Payload::NONE]
+        {
+            assert_eq!(too_wide(&body), None);
+        }
     }
 }

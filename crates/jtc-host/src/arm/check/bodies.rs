@@ -11,7 +11,7 @@ use crate::arm::Arm;
 /// Largest reach of an arm with the known drives, m. Larger lengths are in mm.
 const REACH_MAX: f64 = 5.0;
 /// Largest distance of a body from its joint and largest radius of gyration: [`OWN_SIZE`] times the size of the link
-/// plus [`REACH_SHARE`] of the reach of the arm. The real links of arms stay below half of this limit.
+/// plus [`REACH_SHARE`] of the reach of the arm.
 const OWN_SIZE: f64 = 2.0;
 const REACH_SHARE: f64 = 0.25;
 /// Reach that is assumed for an arm whose joints all have the same position, m.

@@ -7,15 +7,13 @@ use jtc_wire::Joint as Number;
 
 use super::Chain;
 use super::choice::about;
-use super::robot::{Joint, Kind, Limit};
+use super::robot::{Joint, Kind, Limit, TURN};
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
 /// Largest credible position limit of a multi-turn joint in either direction, rad. A larger value is probably in
 /// degrees.
 const TWO_TURNS: f64 = 4.0 * PI;
-/// Largest angle that counts as one full turn, rad. Many descriptions round 2π up to this value.
-const TURN: f64 = 6.3;
 /// Largest credible velocity limit of a joint, rad/s. The fastest wrist joints reach 900 °/s, which is 15.7 rad/s. A larger velocity limit
 /// is in degrees per second, or is a placeholder.
 const BELIEVABLE_SPEED: f64 = 16.0;

@@ -4,6 +4,8 @@
 //! fixed, too. If the leader is one of the six joints, the mimic joint moves while the arm moves. The arm model cannot
 //! represent such a joint.
 
+use std::collections::HashMap;
+
 use jtc_dynamics::Origin;
 
 use super::Chain;
@@ -111,9 +113,11 @@ impl<'a> Chain<'a> {
         if following.is_empty() {
             return Ok(());
         }
-        let moving = self.mass_on(&self.rotary[0].child)?;
+        let carried = self.carried()?;
+        let mass_on = |link: &str| carried.get(link).copied().unwrap_or_default();
+        let moving = mass_on(&self.rotary[0].child);
         for (joint, leader) in following {
-            let mass = self.mass_on(&joint.child)?;
+            let mass = mass_on(&joint.child);
             if mass == 0.0 {
                 continue;
             }
@@ -134,15 +138,16 @@ impl<'a> Chain<'a> {
         Ok(())
     }
 
-    /// Returns the mass of a link and of everything that it carries, kg.
-    fn mass_on(&self, carrier: &str) -> Result<f64, FileError> {
-        let mut sum = 0.0;
+    /// Returns the mass of each link and of everything that the link carries, kg.
+    fn carried(&self) -> Result<HashMap<&'a str, f64>, FileError> {
+        let mut carried = HashMap::new();
         for link in &self.robot.links {
-            let mut below = way_down(self.robot, &link.name).map(|joint| joint.parent.as_str());
-            if link.name == carrier || below.any(|name| name == carrier) {
-                sum += link.body()?.mass;
+            let mass = link.body()?.mass;
+            let below = way_down(self.robot, &link.name).map(|joint| joint.parent.as_str());
+            for carrier in std::iter::once(link.name.as_str()).chain(below) {
+                *carried.entry(carrier).or_default() += mass;
             }
         }
-        Ok(sum)
+        Ok(carried)
     }
 }

@@ -23,8 +23,8 @@ impl Element {
     }
 }
 
-/// Largest angle of an `origin`, rad: one turn, with room for rounding in the file.
-const TURN: f64 = 6.3;
+/// Largest angle that counts as one full turn, rad. Many descriptions round 2π up to this value.
+pub(super) const TURN: f64 = 6.3;
 
 /// Link or joint with the elements that it contains.
 #[derive(Clone, Debug, Default)]
@@ -43,7 +43,7 @@ impl Part {
 
     /// Returns the element with this name. Returns an error if the part has two such elements, because the importer
     /// cannot know which of them is meant.
-    fn only(&self, name: &str) -> Result<Option<&Element>, FileError> {
+    pub(super) fn only(&self, name: &str) -> Result<Option<&Element>, FileError> {
         let mut found = self.elements.iter().filter(|element| element.name == name);
         let first = found.next();
         match (first, found.next()) {
@@ -87,25 +87,22 @@ impl Part {
     }
 
     fn origin(&self) -> Result<Origin, FileError> {
-        if let Some(element) = self.only("origin")? {
-            if element.text("quat_xyzw").is_some() {
-                let problem =
-                    "attribute quat_xyzw of <origin> is not supported: write the rotation as rpy, in rad";
-                return Err(self.wrong(element.line, problem));
-            }
-            let rpy = self.numbers::<3>(element, "rpy")?.unwrap_or_default();
-            if let Some(angle) = rpy.into_iter().find(|angle| angle.abs() > TURN) {
-                let problem = format!(
-                    "rpy: {angle} rad exceeds one turn; if it is in degrees, {angle}° are {:.6} rad",
-                    angle.to_radians()
-                );
-                return Err(self.wrong(element.line, problem));
-            }
+        let Some(element) = self.only("origin")? else { return Ok(Origin { xyz: [0.0; 3], rpy: [0.0; 3] }) };
+        if element.text("quat_xyzw").is_some() {
+            let problem =
+                "attribute quat_xyzw of <origin> is not supported: write the rotation as rpy, in rad";
+            return Err(self.wrong(element.line, problem));
         }
-        Ok(Origin {
-            xyz: self.value("origin", "xyz", [0.0; 3])?,
-            rpy: self.value("origin", "rpy", [0.0; 3])?,
-        })
+        let xyz = self.numbers(element, "xyz")?.unwrap_or_default();
+        let rpy: [f64; 3] = self.numbers(element, "rpy")?.unwrap_or_default();
+        if let Some(angle) = rpy.into_iter().find(|angle| angle.abs() > TURN) {
+            let problem = format!(
+                "rpy: {angle} rad exceeds one turn; if it is in degrees, {angle}° are {:.6} rad",
+                angle.to_radians()
+            );
+            return Err(self.wrong(element.line, problem));
+        }
+        Ok(Origin { xyz, rpy })
     }
 }
 

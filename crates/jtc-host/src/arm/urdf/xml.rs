@@ -273,15 +273,9 @@ impl Description<'_> {
 
 /// Returns the link at one end of a joint.
 fn ended(part: &Part, end: &str) -> Result<String, FileError> {
-    let mut found = part.elements.iter().filter(|element| element.name == end);
-    let first = found.next().ok_or_else(|| part.wrong(part.line, format!("has no element <{end}>")))?;
-    if let Some(second) = found.next() {
-        let problem =
-            format!("second element <{end}>, the first is in line {}: remove one of them", first.line);
-        return Err(part.wrong(second.line, problem));
-    }
-    let link = first.text("link").map(str::to_owned);
-    link.ok_or_else(|| part.wrong(first.line, format!("<{end}> has no attribute link")))
+    let element = part.only(end)?.ok_or_else(|| part.wrong(part.line, format!("has no element <{end}>")))?;
+    let link = element.text("link").map(str::to_owned);
+    link.ok_or_else(|| part.wrong(element.line, format!("<{end}> has no attribute link")))
 }
 
 fn foreign(form: Foreign, line: usize, element: String) -> FileError {

@@ -1,5 +1,6 @@
 //! Functions that read text files with numbers. Each error contains the file and, if known, the line, column and value.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
@@ -305,16 +306,13 @@ fn declared(bytes: &[u8]) -> &'static encoding_rs::Encoding {
 
 /// Decodes UTF-8, or UTF-16 with a byte order mark, as some programs for Windows write it.
 fn decoded(bytes: Vec<u8>) -> Result<String, &'static str> {
-    let word: fn([u8; 2]) -> u16 = match bytes.get(..2) {
-        Some([0xFF, 0xFE]) => u16::from_le_bytes,
-        Some([0xFE, 0xFF]) => u16::from_be_bytes,
-        _ => return String::from_utf8(bytes).map_err(|_| "not a text file (its bytes are not valid UTF-8)"),
-    };
-    let (pairs, rest) = bytes[2..].as_chunks::<2>();
-    let text = String::from_utf16(&pairs.iter().map(|pair| word(*pair)).collect::<Vec<_>>());
-    text.ok()
-        .filter(|_| rest.is_empty())
-        .ok_or("the text begins as UTF-16, but is not valid UTF-16; save the file as UTF-8")
+    match encoding_rs::Encoding::for_bom(&bytes) {
+        Some((encoding, mark)) if encoding != encoding_rs::UTF_8 => encoding
+            .decode_without_bom_handling_and_without_replacement(&bytes[mark..])
+            .map(Cow::into_owned)
+            .ok_or("the text begins as UTF-16, but is not valid UTF-16; save the file as UTF-8"),
+        _ => String::from_utf8(bytes).map_err(|_| "not a text file (its bytes are not valid UTF-8)"),
+    }
 }
 
 /// Parses a number in the notations that occur in these files (`20.`, `-9.e-6`, ` 1`). The function rejects NaN and infinity.

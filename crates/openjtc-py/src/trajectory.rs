@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use jtc_core::JOINTS;
-use jtc_host::trajectory::{Loaded, Trajectory as HostTrajectory, overshoot_words};
+use jtc_host::file::FileError;
+use jtc_host::trajectory::{ArmNames, Loaded, Trajectory as HostTrajectory, overshoot_words};
 use jtc_host::{Point, plan};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -12,6 +13,17 @@ use pyo3::prelude::*;
 use crate::arm::Arm;
 use crate::array;
 use crate::error::Failure;
+
+/// Reads a trajectory with the names of the joints of `arm` (default: the built-in arm), or without names if the numbers in the names of the
+/// joints determine their order.
+fn named(
+    arm: Option<&Arm>,
+    joints_by_number: bool,
+    read: impl FnOnce(Option<ArmNames<'_>>) -> Result<Loaded, FileError>,
+) -> Result<Loaded, FileError> {
+    let arm = arm.map_or_else(|| Arc::new(jtc_host::Arm::avena()), |arm| arm.inner.clone());
+    read((!joints_by_number).then(|| arm.names()))
+}
 
 /// Trajectory: points with a constant time step, `step_ms` (ms). The object is immutable.
 ///
@@ -86,11 +98,7 @@ impl Trajectory {
         degrees: bool,
         joints_by_number: bool,
     ) -> Result<Self, Failure> {
-        py.detach(|| {
-            let arm = arm.map_or_else(|| Arc::new(jtc_host::Arm::avena()), |arm| arm.inner.clone());
-            let names = (!joints_by_number).then(|| arm.names());
-            Self::loaded(Loaded::load(&path, names)?, degrees)
-        })
+        py.detach(|| Self::loaded(named(arm, joints_by_number, |names| Loaded::load(&path, names))?, degrees))
     }
 
     /// Parses the text of a trajectory file.
@@ -103,11 +111,7 @@ impl Trajectory {
         degrees: bool,
         joints_by_number: bool,
     ) -> Result<Self, Failure> {
-        py.detach(|| {
-            let arm = arm.map_or_else(|| Arc::new(jtc_host::Arm::avena()), |arm| arm.inner.clone());
-            let names = (!joints_by_number).then(|| arm.names());
-            Self::loaded(Loaded::parse(text, names)?, degrees)
-        })
+        py.detach(|| Self::loaded(named(arm, joints_by_number, |names| Loaded::parse(text, names))?, degrees))
     }
 
     /// Loads the measured motion from a recording.

@@ -12,6 +12,9 @@ use crate::file::{FileError, Place, short};
 use crate::table::{Row, Unit, units};
 use crate::waypoints;
 
+/// Columns of one channel: for each joint, the index of its column, and the factor from its unit to rad.
+type Columns = [(usize, f64); JOINTS];
+
 /// Columns of a table that contain a trajectory.
 #[derive(Debug, Default)]
 pub(super) struct Header {
@@ -21,8 +24,8 @@ pub(super) struct Header {
     pub rows: usize,
     /// Column of the time, and the factor from its unit to s. `None` if the file does not state the unit.
     pub time: (usize, Option<f64>),
-    /// For each channel, the column of each joint, and the factor from its unit to rad.
-    pub channels: [Option<[(usize, f64); JOINTS]>; 3],
+    /// Columns of the positions, velocities and accelerations.
+    pub channels: [Option<Columns>; 3],
     /// `true` if a column states a unit of angle.
     pub angles_named: bool,
     /// Messages about the columns.
@@ -91,9 +94,6 @@ impl Header {
         format!("{before}columns left out: {}", listed(&names))
     }
 }
-
-/// Columns of one channel: for each joint, the index of its column and the factor to rad.
-type Columns = [(usize, f64); JOINTS];
 
 impl Reader<'_> {
     fn wrong(&self, i: usize, problem: impl Into<String>) -> FileError {

@@ -90,8 +90,8 @@ impl Profile {
         Sequence::all().filter(move |number| profile.is_board(*number))
     }
 
-    /// Returns the value of a 16-bit process word that has no type of its own. The key `pd.signed` of the profile
-    /// defines whether the word is signed (D-11).
+    /// Returns the value of a 16-bit process word whose signal has no stated type. The key `pd.signed` of the
+    /// profile defines whether the word is signed (D-11).
     pub const fn process_value(&self, word: u16) -> i32 {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }

@@ -19,7 +19,7 @@ const PRESSED_MS: u16 = 250;
 const RUN_MS: u16 = 5_000;
 /// Rate of path time below which the arm counts as standing on the path. `STANDS_MS` is the longest time at such a
 /// rate, ms. Then the controller stops the arm. Without this limit, an arm with just enough torque to hold itself
-/// could stand on the path for ever.
+/// could stay at rest on the path without end.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
@@ -308,7 +308,7 @@ mod tests {
         assert!(!hold_back.is_active() && hold_back.is_watched());
         hold_back.end();
         assert!(!hold_back.is_watched());
-        // The arm may stand on the path (rate below 0.02) for 1,000 ms. After a call of `end`, it may stand for
+        // The arm is allowed to be at rest on the path (rate below 0.02) for 1,000 ms, and after a call of `end` for
         // another 1,000 ms.
         let mut hold_back = HoldBack::default();
         for _ in 0..2 {

@@ -103,7 +103,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Writes one CDR message to a channel of its own. `schema` is the name and the text of the ROS 2 message definition.
+/// Writes one CDR message to a new channel. `schema` is the name and the text of the ROS 2 message definition.
 fn write_once<W: Write + Seek>(
     out: &mut mcap::Writer<W>,
     topic: &str,
